@@ -64,7 +64,7 @@ def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(
+def test_what_a_method_prints_is_talk_and_its_interrupt_a_failed_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Also when it is a worker that prints."""
@@ -90,8 +90,8 @@ def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(
         said, talk = capfd.readouterr()
         assert json.loads(said)["outcome"] == "pass"
         assert "hello" in talk
-    assert main(["run", short, "--methods", "noisy:Stopped", "--json", "--out", "stopped"]) == 130
-    assert json.loads(capfd.readouterr().out) == {"outcome": "interrupted"}
+    assert main(["run", short, "--methods", "noisy:Stopped", "--no-report", "--json", "--out", "stopped"]) == 4
+    assert json.loads(capfd.readouterr().out)["outcome"] == "incomplete"
 
 
 def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:

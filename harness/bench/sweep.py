@@ -165,6 +165,7 @@ def _write_summary(out: Path) -> None:
     with CellIndex(out) as index:
         write_table(index, out / "summary.csv")
         compute_group_statistics(index)
+        index.write_digest({})
 
 
 def _fabricate_cells(real: Path, out: Path, count: int) -> None:
@@ -182,6 +183,7 @@ def _fabricate_cells(real: Path, out: Path, count: int) -> None:
         index.expect([key for key, _ in fabricated])
         index.add({**row, "key": key} for key, row in fabricated)
         index.record_outcomes((key, key, "") for key, _ in fabricated)
+        index.write_digest({})
     for n, (key, _) in enumerate(fabricated):
         folder = out / "cells" / key
         folder.mkdir()

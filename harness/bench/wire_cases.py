@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, record_size
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, describe_list
 
 SCENARIO, CLIP = "demo", "boxing_p1_01"
 
@@ -21,7 +21,7 @@ class WireCase:
     def name(self) -> str:
         """The name in the table."""
         line = "pty at 115200" if self.kind == "pty" else "TCP, unpaced"
-        return f"{self.rate_hz:g} Hz x {self.stations}, {record_size(self.items)} bytes, {line}"
+        return f"{self.rate_hz:g} Hz x {self.stations}, {describe_list(self.items)}, {line}"
 
 
 CASES = (

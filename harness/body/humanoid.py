@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.body import anatomy, mounts
 from harness.core import humanoid24
-from harness.core.arrays import Floats, Ints
+from harness.core.arrays import Floats, Ints, immutable
 from harness.core.package_data import data_folder
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput
@@ -31,13 +31,12 @@ class Body:
     @cached_property
     def bone_body_ids(self) -> Ints:
         """(24,) index of each bone's body in the model; the body "root" is not included."""
-        return np.array([self.model.body(name).id for name in self.skeleton.names], dtype=np.int64)
+        return immutable([self.model.body(name).id for name in self.skeleton.names], np.int64)
 
     @cached_property
     def limits_rad(self) -> Floats:
         """(48, 2) lower and upper limit of each hinge angle, in the skeleton's order [rad]."""
-        out: Floats = self.model.jnt_range[1:][humanoid24.QPOS_OF_DOF]
-        return out
+        return immutable(self.model.jnt_range[1:][humanoid24.QPOS_OF_DOF])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return build_body, (self.skeleton, self.mounts)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.common import (
+    DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
@@ -53,8 +54,8 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument("--port", help="as --port of `harness live`")
     text = "scenario with the stations and their nominal mounts (see `harness list`)"
     verb.add_argument("--scenario", metavar="NAME", help=text)
-    text = "number of the scenario's stations, or their names (default: the first 4; a recording's own)"
-    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    text = DEVICE_STATIONS_HELP.replace("4)", "4; a recording's own)")
+    verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=text)
     text = "poses: eight poses, for bone lengths and mounts; tpose: one, for mounts on a known body (default poses)"
     verb.add_argument("--kind", choices=["poses", "tpose"], help=text)
     verb.add_argument("--clip", help="with tpose: clip of the performer (default: the scenario's first)")
@@ -83,7 +84,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
     ):
         if getattr(args, name) is not None:
             users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
-            raise BadInput(f"--{name} with {given[0]}.", f"It applies to {users}: leave it out.")
+            raise BadInput(f"--{name.replace('_', '-')} with {given[0]}.", f"It applies to {users}: leave it out.")
     action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
     with sigterm_as_interrupt():
         try:
@@ -149,7 +150,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
     for name in ("port", "scenario"):
         if getattr(args, name) is None:
             raise BadInput(f"--live without --{name}.", "Give --port and --scenario.")
-    stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args)))
+    stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args, device=True)))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
         terminal = PoseTerminal(session.body.skeleton, sys.stderr)
@@ -164,8 +165,9 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
         device = opened.enter_context(
             open_tracker(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
-        names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
-        print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {names}; Ctrl-C ends it")
+        where = f"{device.identification or 'an IS-900'} at {args.port}"
+        print_status(f"{where}; stations {device.station_list}; Ctrl-C ends it")
+        print_status(device.setup_note)
         collector = session.collect_poses(device, print_status, displays)
     print_status("solving")
     return session.solve(collector.holds, f"the tracker at {args.port}")

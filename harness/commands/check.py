@@ -23,17 +23,19 @@ def add_check(verbs: Verbs) -> None:
 
 def run_check(args: argparse.Namespace) -> Outcome:
     from harness.reconstruct import registry
+    from harness.testing.check_process import check_rules_apart
     from harness.testing.method_checks import check_rules
     from harness.testing.rules import RULES
 
     found: dict[str, list[RuleResult]] = {}
     with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        methods = {name: registry.resolve(name) for name in args.methods or sorted(registry.methods())}
-        for name, method in methods.items():
+        names = args.methods or sorted(registry.methods())
+        inside = {name: registry.resolve(name) for name in names if registry.is_built_in(name)}
+        for name in names:
             found[name] = []
-            for finding in check_rules(method):
+            for finding in check_rules(inside[name]) if name in inside else check_rules_apart(name):
                 found[name].append(finding)
-                bar(f"{name}: {finding.rule}", sum(map(len, found.values())), len(methods) * len(RULES))
+                bar(f"{name}: {finding.rule}", sum(map(len, found.values())), len(names) * len(RULES))
     lines = []
     for name, findings in found.items():
         lines += [name, *(f"  {'ok  ' if f.ok else 'FAIL'}  {f.rule}: {f.seen}" for f in findings)]

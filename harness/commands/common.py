@@ -16,6 +16,14 @@ from harness.errors import BadInput, Outcome
 Verbs = Any  # argparse's subparsers object has no public type
 DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
+LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
+"""Flags of `add_line_flags`, as attributes of the parsed command line."""
+STATION_CHARACTERS = "123456789ABC"
+"""Characters of the stations that a device may have (docs/is900.md 1)."""
+DEVICE_STATIONS_HELP = (
+    "number of the scenario's stations, or their names, in the order of the device's active stations; or names with "
+    "stations of the device: head=3,torso=1 (default: the first 4)"
+)
 Action = Callable[[argparse.Namespace], Outcome]
 
 
@@ -59,18 +67,19 @@ def mocap_words(folders: Path | Sequence[Path] | None) -> list[str]:
     return [word for folder in several for word in ("--mocap", str(folder))]
 
 
-LINE_FLAGS = ("items", "baud", "quality", "boresight", "alignment")
-"""Flags of a verb that opens a device's line, as attributes of the parsed command line."""
-
-
 def add_line_flags(verb: argparse.ArgumentParser) -> None:
     """Add the flags of a verb that opens a device's line; `line_options` reads them."""
     verb.add_argument(
-        "--items", type=parse_items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)"
+        "--items",
+        type=parse_items,
+        metavar="A,B",
+        help="output list of the device (default 40,2,11,21,1; 40,18,19,21,1 is shorter, with a range of 3 m)",
     )
     verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
     text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
+    text = "use the device as other programs left it: tip offset, alignment, boresight, mounting angles and filters"
+    verb.add_argument("--keep-settings", action="store_true", default=None, help=text)
     text = "set the heading of every station to zero at its present direction, when the device is set up"
     verb.add_argument("--boresight", action="store_true", default=None, help=text)
     text = "frame to report in: its origin, a point on +X and a point on +Y, nine numbers in the present frame [m]"
@@ -78,13 +87,16 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The driver options that those flags give; BadInput for --baud without a serial port."""
+    """The driver options that those flags and `--stations head=3` give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    given = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
-    if given and args.port.startswith("udp:"):
-        raise BadInput(f"--{min(given)} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
-    return given
+    options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    if options and args.port.startswith("udp:"):
+        name = min(options).replace("_", "-")
+        raise BadInput(f"--{name} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
+    if args.stations is not None and "=" in args.stations:
+        options["characters"] = "".join(parse_station_map(args.stations).values())
+    return options
 
 
 def is_whole_number(text: str) -> bool:
@@ -129,18 +141,49 @@ def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
 
 
-def parse_stations(args: argparse.Namespace) -> int | list[str]:
-    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name."""
+def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | list[str]:
+    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name.
+
+    With `device` the names may have stations of the device (`head=3`); they are then in the order of the device.
+    """
     from harness.experiment.scenario import load_scenario
 
     if args.stations is None:
         return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).worn_stations))
-    return int(args.stations) if is_whole_number(args.stations) else parse_names(args.stations)
+    if is_whole_number(args.stations):
+        return int(args.stations)
+    return parse_device_names(args.stations) if device else parse_names(args.stations)
+
+
+def parse_device_names(text: str) -> list[str]:
+    """Names of stations with or without stations of the device, in the order of the device."""
+    return list(parse_station_map(text)) if "=" in text else parse_names(text)
+
+
+def parse_station_map(text: str) -> dict[str, str]:
+    """Names with the characters of the device's stations, in the order of the device, from `head=3,torso=1`.
+
+    BadInput for a name without a station, a station that no device has, and a name or station that occurs twice.
+    """
+    pairs = [tuple(part.strip() for part in entry.partition("=")[::2]) for entry in text.split(",")]
+    advice = "Write NAME=STATION for each, such as head=3,torso=1; stations are 1 to 9 and A to C."
+    for name, character in pairs:
+        if not name or not character:
+            raise BadInput(f"--stations {text!r}: {name or character or 'an entry'} has no counterpart.", advice)
+        if len(character) != 1 or character.upper() not in STATION_CHARACTERS:
+            raise BadInput(f"--stations {text!r}: {character!r} is no station of a device.", advice)
+    for what, values in (("name", [name for name, _ in pairs]), ("station", [c.upper() for _, c in pairs])):
+        for value in values:
+            if values.count(value) > 1:
+                raise BadInput(f"--stations {text!r}: {what} {value} occurs {values.count(value)} times.", advice)
+    return dict(sorted(((name, c.upper()) for name, c in pairs), key=lambda pair: STATION_CHARACTERS.index(pair[1])))
 
 
 def parse_names(text: str) -> list[str]:
     """Station names separated by commas; BadInput for an empty name."""
     names = [name.strip() for name in text.split(",")]
+    if "=" in text:
+        raise BadInput(f"--stations {text!r} names stations of a device.", "No device is read here: give names alone.")
     if not all(names):
         raise BadInput(f"--stations {text!r} names no station.", "Separate names by commas: head,torso.")
     return names

@@ -48,7 +48,7 @@ def add_emulate(verbs: Verbs) -> None:
         "--items",
         type=parse_items,
         metavar="A,B",
-        help="output list that clients will request, to check whether the line carries it",
+        help="output list that clients will request, to check that the line and its range carry the motion",
     )
     text = "bits per second of the line, which pace the data (default 115200)"
     verb.add_argument("--baud", type=positive_int, help=text)
@@ -66,7 +66,7 @@ def add_emulate(verbs: Verbs) -> None:
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
     from harness.experiment.playback import prepare_playback
-    from harness.stream.emulator.capacity import check_capacity
+    from harness.stream.emulator.capacity import check_capacity, check_range
     from harness.stream.emulator.server import open_port, play_samples
     from harness.stream.emulator.udp_port import LOOPBACK, parse_udp_address
 
@@ -87,9 +87,11 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     )
     scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario, udp[1] if udp else None)
-    if not (args.unpaced or args.overload):
-        check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
+    check_range(args.items or (), playback.reach_m)
+    if not (args.unpaced or args.overload):
+        items = args.items or tracker.items
+        check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
     with closing(port), sigterm_as_interrupt():
         names = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))

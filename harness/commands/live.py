@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
+    DEVICE_STATIONS_HELP,
     Verbs,
     add_line_flags,
     add_verb,
@@ -50,8 +51,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--method", default="dynamic_map", metavar="NAME", help=text)
     text = "clip whose performer wears the tracker; it is no example (default: the scenario's first)"
     verb.add_argument("--clip", help=text)
-    text = "number of the scenario's stations, or their names (default: the first 4)"
-    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=DEVICE_STATIONS_HELP)
     text = "frames per second of the tracker and of the examples (default: the scenario's)"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
@@ -88,19 +88,20 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
+    from harness.experiment.isolation import DEFAULT_ISOLATION
     from harness.experiment.playback import prepare_playback
+    from harness.experiment.remote_method import resolve_method
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
-    from harness.reconstruct import registry
 
     options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
-    playback = prepare_playback(args.scenario, stations=parse_stations(args), **options)
+    playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
         playback = playback.with_calibration(read_calibration(args.calibration))
-    method = registry.resolve(args.method)
+    method = resolve_method(args.method, DEFAULT_ISOLATION)
     events: list[LineEvent] = []
     if args.calibration == "poses":
         playback = playback.with_calibration(_calibrate_by_poses(args, playback, events))
@@ -144,6 +145,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 @contextmanager
 def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
+    from harness.stream.codec.items import position_range_m
     from harness.stream.driver import DriverConfig, open_tracker
 
     def happened(event: "LineEvent") -> None:
@@ -152,7 +154,9 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
 
     tracker = playback.tracker
     stations = tuple(playback.scenario.stations)
-    config = DriverConfig(**{"items": tracker.items, **line_options(args)}, stations=stations, rate_hz=args.rate)
+    options = {"items": tracker.items, **line_options(args)}
+    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
+    config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
     with open_tracker(args.port, config, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
@@ -160,8 +164,9 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
                 f"The device sends {runs_hz:.1f} frames per second, {playback.scenario.name} has {tracker.rate_hz:g}.",
                 f"Say --rate {runs_hz:.0f}: a method learns at the tracker's rate.",
             )
-        names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
-        print_status(f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz; stations {names}")
+        where = f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz"
+        print_status(f"{where}; stations {device.station_list}")
+        print_status(device.setup_note)
         yield device
 
 

@@ -13,6 +13,7 @@ from harness.commands.common import (
     add_verb,
     is_whole_number,
     line_options,
+    parse_device_names,
     parse_names,
     positive_float,
     print_result,
@@ -34,8 +35,11 @@ def add_record(verbs: Verbs) -> None:
         "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, or sim:SCENARIO for a simulated line"
     )
     verb.add_argument("file", type=Path, help="the recording to write")
-    text = "names of the device's active stations, in order; with sim: names or number of the scenario's stations"
-    verb.add_argument("--stations", metavar="A,B", help=text)
+    text = (
+        "names of the device's active stations, in order, or names with stations of the device (head=3,torso=1); "
+        "with sim: names or number of the scenario's stations"
+    )
+    verb.add_argument("--stations", metavar="A,B|A=3,B=1", help=text)
     text = "frames per second, for a device that does not report its rate"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
@@ -60,7 +64,8 @@ def run_record(args: argparse.Namespace) -> Outcome:
         for name in (*LINE_FLAGS, "send"):
             if getattr(args, name) is not None:
                 raise BadInput(
-                    f"--{name} with {args.port}.", "It is for a device; a simulated line takes it from the scenario."
+                    f"--{name.replace('_', '-')} with {args.port}.",
+                    "It is for a device; a simulated line takes it from the scenario.",
                 )
         return _record_simulation(args, args.port.removeprefix(SIMULATION_PREFIX))
     for name in ("clip", "noise", "poses", "seed"):
@@ -111,12 +116,12 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.recorder import record_port
     from harness.stream.recording.recording import RecordingWriter
 
-    stations = None if args.stations is None else tuple(parse_names(args.stations))
+    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
-        record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
-    return _print_recording(args, writer.counts)
+        line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
+    return _print_recording(args, writer.counts, line.get("out_of_range", 0))
 
 
 def _record_commands(args: argparse.Namespace) -> Outcome:
@@ -127,7 +132,9 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
 
     for name in ("stations", *LINE_FLAGS):
         if name != "baud" and getattr(args, name) is not None:
-            raise BadInput(f"--{name} with --send.", "--send sets nothing but what it names: leave it out.")
+            raise BadInput(
+                f"--{name.replace('_', '-')} with --send.", "--send sets nothing but what it names: leave it out."
+            )
     if args.port.startswith("udp:"):
         raise BadInput(f"--send with {args.port}.", "UDP carries no commands: name the serial line.")
     check_commands(args.send, args.allow_writes)
@@ -138,18 +145,22 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
             args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
         )
     content = [exchange.as_dict() for exchange in exchanges]
-    return _print_recording(args, writer.counts, {"exchanges": content}, format_exchanges(content))
+    return _print_recording(args, writer.counts, more={"exchanges": content}, lines=format_exchanges(content))
 
 
 def _print_recording(
     args: argparse.Namespace,
     counts: Mapping[str, int],
+    out_of_range: int = 0,
+    *,
     more: Mapping[str, Any] | None = None,
     lines: Sequence[str] = (),
 ) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
-    content |= {"set_up": counts["conf"], "events": counts["evnt"], **(more or {})}
+    content |= {"set_up": counts["conf"], "events": counts["evnt"], "out_of_range": out_of_range}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
     if not args.file.exists():
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
-    return print_result(args, content, *lines, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
+    text += f", {counts['evnt']} events" if counts["evnt"] else ""
+    text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
+    return print_result(args, {**content, **(more or {})}, *lines, text)

@@ -91,9 +91,11 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
 
 def _format_counts(stream: "RecordingStream") -> str:
     counts = stream.counts
+    beyond = counts["out_of_range"]
     return (
         f"set up {counts['sessions']} times; {counts['records']} records, {counts['garbage_bytes']} bytes outside "
         f"records; the device's clock was also reset {counts['clock_resets']} times"
+        + (f"; {beyond} positions were beyond the range of the output list" if beyond else "")
     )
 
 

@@ -1,12 +1,12 @@
 """The verb `run`: run a scenario and write its report."""
 
 import argparse
-import json
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result, this_command
+from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -17,6 +17,7 @@ def add_run(verbs: Verbs) -> None:
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     text = "methods instead of the scenario's, such as ik,best_match+ik,my_module:MyMethod[option=3]"
     verb.add_argument("--methods", metavar="A,B", help=text)
+    add_isolation_flags(verb)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
 
@@ -28,6 +29,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     from harness.experiment import engine
     from harness.experiment.scenario import check_scenario, load_scenario
     from harness.report.run.text import run_table
+    from harness.results.storage import read_summary
 
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
@@ -38,7 +40,15 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        outcome = engine.run(scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=bar)
+        outcome = engine.run(
+            scenario,
+            out,
+            folder=args.mocap,
+            jobs=args.jobs,
+            command=this_command(),
+            progress=bar,
+            isolation=read_isolation(args),
+        )
     page = None
     if args.report:
         from harness.report.run.writer import write_run_page
@@ -46,7 +56,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         print("writing the report", file=sys.stderr)
         with ProgressBar("movies") as bar:
             page = write_run_page(out, movie=args.movie, progress=bar)
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    summary = read_summary(out)
     content = {**summary, "out": str(out), "report": page and str(page)}
     return print_result(
         args, content, run_table(summary), f"report: {page}" if page else f"results: {out}", outcome=outcome

@@ -8,6 +8,7 @@ from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, sigterm_as_interrupt
+from harness.commands.isolation_flags import add_isolation_flags, isolation_words, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -23,18 +24,19 @@ def add_sweep(verbs: Verbs) -> None:
     verb.add_argument("--jobs", type=positive_int, metavar="N", help="worker processes (default 1)")
     text = "run on the workers of the Dask scheduler at ADDRESS, or on a local cluster: `local`"
     verb.add_argument("--dask", metavar="ADDRESS", help=text)
+    add_isolation_flags(verb)
     text = "run only this cell, named as `harness status` prints it, and print why it fails"
     verb.add_argument("--cell", metavar="NAME", default="", help=text)
 
 
 def run_sweep(args: argparse.Namespace) -> Outcome:
-    from harness.core.files import read_json
     from harness.experiment.engine import run_sweep as run
     from harness.experiment.executors import dask_executor, process_executor
     from harness.experiment.sweep_config import expand_sweep, load_sweep
     from harness.report.sweep.page import write_sweep_page
     from harness.report.sweep.reader import read_sweep
     from harness.report.sweep.text import text
+    from harness.results.integrity import read_summary_json
 
     if args.dask and args.jobs and args.dask != "local":
         raise BadInput("--jobs with --dask.", "The scheduler has workers of its own: leave --jobs out.")
@@ -57,8 +59,9 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
             command=_resume_command(args, out),
             only=args.cell,
             progress=bar,
+            isolation=read_isolation(args),
         )
-    summary = read_json(out / "summary.json", "the summary of a sweep")
+    summary = read_summary_json(out)
     if args.cell in summary["failures"]:
         print(summary["failures"][args.cell], file=sys.stderr)
     page = write_sweep_page(out)
@@ -70,4 +73,5 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
 def _resume_command(args: argparse.Namespace, out: Path) -> str:
     """The command that resumes the sweep, also in a folder whose cells were computed elsewhere."""
     parts = ["harness", "sweep", args.sweep, "--out", str(out), *mocap_words(args.mocap)]
+    parts += isolation_words(args)
     return shlex.join(parts if args.seed is None else [*parts, "--seed", str(args.seed)])

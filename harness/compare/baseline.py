@@ -6,6 +6,8 @@
 - summary.json: counts and the results of each method;
 - cells.json: identity and comparable metrics of every cell, sorted, one per line, without poses and frames. Conditions
   that all cells share are stored once; other conditions once for all cells that have them in common.
+
+cells.json has the digests of the two other files, and each file has its own.
 """
 
 import json
@@ -19,18 +21,19 @@ from typing import Any
 
 from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
-from harness.core.files import (
-    content_key,
-    move_into_place,
-    read_json,
-    temporary_path,
-    to_json,
-    to_json_types,
-    write_json,
-    write_text,
-)
+from harness.core.files import content_key, move_into_place, temporary_path, to_json, to_json_types, write_text
 from harness.errors import BadInput
-from harness.results.reader import BASELINES, CELLS_FILE, COUNT_METRICS, SCHEMA, ResultSet, load_results
+from harness.results.digests import file_digest, insert_digest, write_result_json
+from harness.results.integrity import read_summary_json
+from harness.results.reader import (
+    BASELINE_FILES,
+    BASELINES,
+    CELLS_FILE,
+    COUNT_METRICS,
+    SCHEMA,
+    ResultSet,
+    load_results,
+)
 from harness.score.metrics import DEFINITIONS
 
 _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "methods", "groups")
@@ -59,10 +62,11 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
     temporary = temporary_path(target)
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
-    summary = read_json(run / "summary.json", "the summary of a run or sweep")
-    write_json(temporary / "manifest.json", results.manifest.as_dict())
-    write_json(temporary / "summary.json", {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary})
-    write_text(temporary / CELLS_FILE, _cells_json(results))
+    summary = read_summary_json(run)
+    write_result_json(temporary / "manifest.json", results.manifest.as_dict())
+    write_result_json(temporary / "summary.json", {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary})
+    digests = {file: file_digest(temporary / file, "a file of a baseline", "Save it again.") for file in BASELINE_FILES}
+    write_text(temporary / CELLS_FILE, insert_digest(_cells_json(results, digests)))
     previous = temporary.with_name(f"{temporary.name}-before")
     if target.exists():
         os.rename(target, previous)
@@ -71,8 +75,8 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
     return target
 
 
-def _cells_json(results: ResultSet) -> str:
-    """The text of cells.json, which `load_results` reads."""
+def _cells_json(results: ResultSet, digests: Mapping[str, str]) -> str:
+    """The text of cells.json, which `load_results` reads; `digests` are those of the other files."""
     cells = sorted(results.cells, key=lambda cell: [str(to_json_types(getattr(cell, name))) for name in PAIRING_KEYS])
     definitions = [to_json_types(cell.defined_by) for cell in cells]
     first, *others = definitions
@@ -87,7 +91,14 @@ def _cells_json(results: ResultSet) -> str:
         parts[part] = rest
         line = {f.name: getattr(cell, f.name) for f in fields(cell) if f.name not in ("defined_by", "metrics")}
         lines.append({**line, "part": part, "metrics": [cell.metrics.get(name) for name in metrics]})
-    head = {"schema": SCHEMA, "planned": results.planned, "shared": shared, "parts": parts, "metrics": metrics}
+    head = {
+        "schema": SCHEMA,
+        "digests": digests,
+        "planned": results.planned,
+        "shared": shared,
+        "parts": parts,
+        "metrics": metrics,
+    }
     rows = ",\n  ".join(json.dumps(to_json_types(line), allow_nan=False, ensure_ascii=False) for line in lines)
     return f'{to_json(head).rstrip().removesuffix("}").rstrip()},\n "cells": [\n  {rows}\n ]\n}}\n'
 

@@ -33,7 +33,7 @@ class Difference:
     difference: float
     """Mean of b - a."""
     low: float | None
-    """Lower end of its 95 % interval (see `bootstrap_interval`); None with too few clips."""
+    """Lower end of its 95 % interval (see `mean_interval`); None with one clip that differs."""
     high: float | None
     p: float | None
     """Probability of a difference at least as large if A and B were equally good (see `significance.sign_flip_p`);

@@ -21,7 +21,7 @@ from harness.errors import BadInput
 from harness.results.findings import ClaimVerdict
 
 MIN_CLIPS = 6
-"""Least number of clips for an interval."""
+"""Least number of clips that can show a difference: with five, sign flips give a p of 2/32 or more."""
 CONFIDENCE_LEVEL = 0.95
 _RESAMPLES = 9999
 
@@ -76,6 +76,18 @@ def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None])
     if len(clips) < MIN_CLIPS:
         return PairedDifference(clips, mean)
     return PairedDifference(clips, mean, *bootstrap_interval(difference))
+
+
+def mean_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:
+    """Interval of the mean of (n,) independent values, n >= 2: `bootstrap_interval` from `MIN_CLIPS` values on.
+
+    Fewer values have too few resamples. They get Student's t interval, which is exact for normal values.
+    """
+    if len(values) >= MIN_CLIPS:
+        return bootstrap_interval(values, level)
+    mean = float(values.mean())
+    width = float(special.stdtrit(len(values) - 1, 0.5 + 0.5 * level) * values.std(ddof=1) / np.sqrt(len(values)))
+    return mean - width, mean + width
 
 
 def bootstrap_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:

@@ -4,22 +4,26 @@ If A and B were equally good, the difference of each clip could equally have the
 share of all sign flips whose mean is at least as far from zero as the observed mean (Fisher's randomisation test). It
 is exact for up to 16 clips; for more it uses 20,000 draws of a named generator. Holm 1979 corrects for the number of
 gated lines. A line whose sides agree on every clip can never differ significantly and is not counted (Tarone 1990).
+Nor is a line of fewer than `MIN_CLIPS` clips. Such a line can still be shown to be *same*, since equivalence needs an
+interval within the margin and no p.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, round_to_grid
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, round_to_grid
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
 Verdict = Literal["better", "same", "worse", "cannot tell"]
 SIGNIFICANCE = 0.05
 _EXACT_CLIPS, _DRAWS = 16, 20_000
+_MAX_CACHED_CLIPS, _DRAWS_AT_ONCE = 64, 500
+"""Flips of more clips are drawn anew, a part at a time, so that thousands of clips fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -29,33 +33,48 @@ class SignificanceResult:
     verdict: Verdict
     why: str
     low: float | None = None
-    """Lower end of the 95 % interval of the mean; this and the following are None with fewer than `MIN_CLIPS` clips."""
+    """Lower end of the 95 % interval of the mean; None with fewer than two clips, unless they have no difference."""
     high: float | None = None
     p: float | None = None
+    """None, as `p_holm`, with fewer than `MIN_CLIPS` clips."""
     p_holm: float | None = None
     """`p` corrected for the number of lines."""
 
 
-def decide_verdicts(lines: Sequence[Floats], margins: Sequence[float]) -> list[SignificanceResult]:
+def decide_verdicts(
+    lines: Sequence[Floats], margins: Sequence[float], decided: Collection[int] | None = None
+) -> list[SignificanceResult]:
     """Decide on lines that are tested together; each has (clips,) differences and a margin; an increase is worse.
 
     *Worse* and *better*: p after Holm is at most 0.05, the interval excludes zero, and the mean exceeds the margin.
-    *Same*: the whole interval lies within the margin. Anything else is undecided ("cannot tell").
+    *Same*: the whole interval lies within the margin, or no clip differs. Anything else is undecided ("cannot tell").
+    `decided` names the lines whose results are needed, by default all; the others count in the correction alone.
     """
     tested = [at for at, line in enumerate(lines) if len(line) >= MIN_CLIPS]
     p = {at: sign_flip_p(lines[at]) for at in tested}
     counted = [at for at in tested if np.any(lines[at])]
     corrected = dict(zip(counted, holm([p[at] for at in counted]), strict=True))
     results = []
-    for at, (line, margin) in enumerate(zip(lines, margins, strict=True)):
+    for at in range(len(lines)) if decided is None else decided:
+        line, margin = lines[at], margins[at]
         if at not in p:
-            results.append(SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}"))
+            results.append(_decide_on_few_clips(line, margin))
             continue
-        low, high = bootstrap_interval(line)
+        low, high = mean_interval(line)
         p_holm = corrected.get(at, 1.0)
         verdict = _verdict(line, low, high, p_holm, margin, len(counted))
         results.append(SignificanceResult(*verdict, low, high, p[at], p_holm))
     return results
+
+
+def _decide_on_few_clips(line: Floats, margin: float) -> SignificanceResult:
+    """*Same* or undecided: no p of fewer than `MIN_CLIPS` clips is small enough for a difference."""
+    if len(line) and not np.any(line):
+        return SignificanceResult("same", "no clip differs", 0.0, 0.0)
+    low, high = mean_interval(line) if len(line) > 1 else (None, None)
+    if low is not None and high is not None and -margin <= low and high <= margin:
+        return SignificanceResult("same", "the whole interval lies within the margin", low, high)
+    return SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}", low, high)
 
 
 def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lines: int) -> tuple[Verdict, str]:
@@ -78,7 +97,8 @@ def sign_flip_p(difference: Floats) -> float:
     if not np.any(difference):
         return 1.0
     values = round_to_grid(difference)
-    extreme = int(np.count_nonzero(np.abs(_sign_flips(len(values)) @ values) >= abs(values.sum())))
+    least = abs(values.sum())
+    extreme = sum(int(np.count_nonzero(np.abs(flips @ values) >= least)) for flips in _sign_flips(len(values)))
     if len(values) <= _EXACT_CLIPS:
         return extreme / float(2 ** (len(values) - 1))
     return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips
@@ -89,14 +109,24 @@ def smallest_possible_p(difference: Floats) -> float:
     return sign_flip_p(np.abs(difference))
 
 
+def _sign_flips(count: int) -> Iterable[Floats]:
+    """All flips or `_DRAWS` of them, as arrays (F, count) of signs -1 and 1."""
+    return (_cached_sign_flips(count),) if count <= _MAX_CACHED_CLIPS else _drawn_sign_flips(count)
+
+
 @lru_cache(maxsize=32)
-def _sign_flips(count: int) -> Floats:
-    """(F, count) signs -1 and 1. Where all are enumerated, the last is never flipped; the other half is symmetric."""
-    if count <= _EXACT_CLIPS:
-        flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
-    else:
-        flips = generator(0, "sign flips", count).integers(0, 2, (_DRAWS, count))
+def _cached_sign_flips(count: int) -> Floats:
+    """(F, count) signs. Where all are enumerated, the last is never flipped; the other half is symmetric."""
+    if count > _EXACT_CLIPS:
+        return np.concatenate(list(_drawn_sign_flips(count)))
+    flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
     return 1.0 - 2.0 * flips.astype(float)
+
+
+def _drawn_sign_flips(count: int) -> Iterator[Floats]:
+    rng = generator(0, "sign flips", count)
+    for _ in range(_DRAWS // _DRAWS_AT_ONCE):
+        yield 1.0 - 2.0 * rng.integers(0, 2, (_DRAWS_AT_ONCE, count)).astype(float)
 
 
 def holm(p: Sequence[float]) -> list[float]:

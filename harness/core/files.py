@@ -18,6 +18,7 @@ from harness.errors import BadFile
 
 TEMPORARY = ".unfinished-"
 """Prefix of the names of files and folders that are still being written; a killed process leaves them behind."""
+JSON_ADVICE = "Is this a folder written by `harness run`?"
 MAX_TOML_BYTES = 4_000_000
 """Larger files are refused before they are parsed [choice]: the largest that the harness writes has some 10 kB."""
 
@@ -137,13 +138,23 @@ def to_json(content: Any) -> str:
     return json.dumps(to_json_types(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def read_json(path: Path, expected: str) -> dict[str, Any]:
-    """Read a JSON object; BadFile, which says what was expected, when the file holds none."""
-    advice = "Is this a folder written by `harness run`?"
+def read_json(path: Path, expected: str, advice: str = JSON_ADVICE) -> dict[str, Any]:
+    """Read a JSON object; BadFile, which says what was expected and what to try, when the file holds none."""
+    return parse_json(path, read_bytes(path, expected, advice), expected, advice)
+
+
+def read_bytes(path: Path, expected: str, advice: str) -> bytes:
+    """Content of a file; BadFile, which says what was expected and what to try, when it cannot be read."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        return path.read_bytes()
     except OSError as error:
         raise BadFile(path, f"cannot be read ({error.strerror})", expected, advice) from error
+
+
+def parse_json(path: Path, data: bytes, expected: str, advice: str) -> dict[str, Any]:
+    """The JSON object in the content of a file; BadFile when there is none."""
+    try:
+        content = json.loads(data.decode("utf-8"))
     except ValueError as error:
         raise BadFile(path, f"not JSON: {error}", expected, advice) from error
     if not isinstance(content, dict):

@@ -7,34 +7,33 @@ stopped at any moment and resumed.
 
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from platform import node
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from harness.body.mounts import locate_mount
-from harness.core.arrays import Floats, Ints
-from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
-from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
+from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
+from harness.experiment.method_process import MethodFailure
+from harness.experiment.remote_method import close_methods, resolve_method, run_over_frames, start_methods
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor
+from harness.reconstruct.contract import Method
 from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row, varied_text
 from harness.score.score import score_estimate
-from harness.simulate.simulation import Simulation
 from harness.stream.codec.reader import WireFormat
-from harness.stream.inputs import Inputs, make_inputs
+from harness.stream.inputs import make_inputs
 
 ProgressCallback = Callable[[str, int, int], None]
 """Called with the name of the last cell, the number of cells that ended and the number that were planned."""
@@ -77,6 +76,7 @@ class ClipTask:
     """Indices of the scenario's variants, () for all: several workers may share the variants of one clip."""
     label: str = ""
     """See `PlannedCell.label`."""
+    isolation: Isolation = DEFAULT_ISOLATION
 
     def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
@@ -118,7 +118,7 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             return
         start = time.perf_counter()
         try:
-            evaluation, method = _clip_evaluation(task, cell.scenario), _resolve_method(cell.method)
+            evaluation, method = _clip_evaluation(task, cell.scenario), _cached_method(cell.method, task.isolation)
             key = evaluation.key(method, cell.method, cell.inputs, cell.varied)
             if storage.has_cell(out, key):
                 yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
@@ -126,6 +126,8 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             evaluated = evaluate_cell(evaluation, method, cell, key, task.command)
             storage.write_cell(out, evaluated)
             yield CellOutcome(str(cell), key, row=as_row(evaluated), seconds=time.perf_counter() - start)
+        except MethodFailure as error:
+            yield CellOutcome(str(cell), failure=str(error))
         except HarnessError as error:
             yield CellOutcome(str(cell), failure=str(error), refused=True)
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
@@ -155,9 +157,9 @@ def _clip_evaluation(task: ClipTask, scenario: Scenario) -> ClipEvaluation:
 
 
 @cache
-def _resolve_method(name: str) -> Method:
+def _cached_method(name: str, isolation: Isolation) -> Method:
     """The method of that name. Searching the installed packages takes longer than writing a cell, hence the cache."""
-    return registry.resolve(name)
+    return resolve_method(name, isolation)
 
 
 def evaluate_cell(
@@ -167,7 +169,8 @@ def evaluate_cell(
     scenario, simulation = evaluation.scenario, evaluation.simulation
     inputs = make_inputs(planned.inputs, simulation.stations)
     calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
-    answers = run_method(fitted, calibration.calibration, calibration.map_stream(simulation), inputs)
+    shown = [inputs.mask(replace(frame)) for frame in calibration.map_stream(simulation).frames]
+    answers = run_over_frames(fitted, replace(calibration.calibration), shown)
     frames = simulation.frames
     position_valid = np.array([f.position_valid for f in frames])
     orientation_valid = np.array([f.orientation_valid for f in frames])
@@ -226,57 +229,16 @@ def evaluate_cell(
     )
 
 
-class MethodAnswers(NamedTuple):
-    """The answers of a session to F frames, and the times of its steps."""
-
-    qpos: Floats
-    """(F, 55) estimates."""
-    status: Ints
-    """(F,) values of `core.estimate.Status`."""
-    origin: Ints
-    """(F,) values of `core.estimate.Origin`."""
-    step_ms: Floats
-    """(F,) wall time of each step [ms]."""
-    step_cpu_ms: Floats
-    """(F,) CPU time of each step [ms]."""
-    reference_cpu_ms: Floats
-    """(F,) CPU time of the reference work after each step [ms]."""
-
-
-def run_method(
-    reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
-) -> MethodAnswers:
-    """Run a reconstructor over a stream. It never sees the truth.
-
-    Reference work follows every `FRAMES_PER_TIMING` steps, and its time is NaN elsewhere. It evicts the method's data
-    from the processor's caches, so the step after it is not timed (NaN).
-    """
-    session, work = reconstructor.begin(calibration), ReferenceWorkload()
-    qpos, status, origin, step_ms, cpu_ms, reference_ms = [], [], [], [], [], []
-    for index, frame in enumerate(simulation.frames):
-        shown = inputs.mask(frame)
-        start_cpu, start = time.process_time(), time.perf_counter()
-        estimate = session.step(shown)
-        step_ms.append(1e3 * (time.perf_counter() - start))
-        cpu_ms.append(1e3 * (time.process_time() - start_cpu))
-        qpos.append(estimate.qpos)
-        status.append(estimate.status)
-        origin.append(estimate.origin)
-        reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
-    times_ms = np.array([step_ms, cpu_ms, reference_ms])
-    times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
-    return MethodAnswers(np.array(qpos), np.array(status), np.array(origin), *times_ms)
-
-
 def open_scenario_motion(motion: ScenarioMotion, folder: LibraryFolders | None, seed: int) -> MotionSource:
     """The motion that a scenario names; BadInput when it needs a library and none is named."""
     return _cached_source(motion.source, folder, seed, motion.rate_hz or None)
 
 
 def clear_caches() -> None:
-    """Forget motion, methods and evaluations: files may have changed since the last run."""
+    """Forget motion, methods and evaluations, and end the processes of methods: files may have changed since."""
     _cached_source.cache_clear()
-    _resolve_method.cache_clear()
+    _cached_method.cache_clear()
+    close_methods()
     _recent_evaluations.clear()
 
 
@@ -286,22 +248,27 @@ def _cached_source(kind: str, folder: LibraryFolders | None, seed: int, rate_hz:
     return open_motion_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
-def check_names(scenarios: Iterable[Scenario], folder: LibraryFolders | None) -> None:
+def check_names(
+    scenarios: Collection[Scenario], folder: LibraryFolders | None, isolation: Isolation = DEFAULT_ISOLATION
+) -> None:
     """Check that everything exists which the scenarios and their variants name, before hours of work begin.
 
     These are clips, methods, inputs, bones and components. UnknownName, BadInput.
     """
     for scenario in scenarios:
+        start_methods(scenario.methods, isolation)
+    for scenario in scenarios:
         for _, variant in variants(scenario):
-            _check_variant_names(variant, open_scenario_motion(variant.motion, folder, variant.seed))
+            _check_variant_names(variant, open_scenario_motion(variant.motion, folder, variant.seed), isolation)
 
 
-def _check_variant_names(scenario: Scenario, source: MotionSource) -> None:
+def _check_variant_names(scenario: Scenario, source: MotionSource, isolation: Isolation) -> None:
     parts = {ClipPart.parse(text).clip for text in (*scenario.motion.test, *scenario.motion.withheld)}
     for name in parts | set(scenario.motion.examples):
         source.check(name)
     for name in scenario.methods:
-        _resolve_method(name)
+        with suppress(MethodFailure):  # its cells fail, those of other methods are run
+            _cached_method(name, isolation)
     for name in scenario.inputs:
         make_inputs(name, tuple(scenario.worn_stations))
     WireFormat(tuple(scenario.worn_stations), scenario.tracker.rate_hz, scenario.tracker.items)

@@ -22,6 +22,7 @@ from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, allowed_frames, refuse_leak, select_examples
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
+from harness.experiment.remote_method import hash_method
 from harness.experiment.scenario import Scenario, ScenarioMotion
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
@@ -211,7 +212,8 @@ class Training:
         """The method of that name, fitted once to the examples."""
         if name not in self._fits:
             rng = generator(self.subject.seed, "method", registry.without_options(name))
-            self._fits[name] = method.fit(self.body, self.examples if method.needs_examples else [], rng)
+            examples = [replace(take) for take in self.examples] if method.needs_examples else []
+            self._fits[name] = method.fit(self.body, examples, rng)
         return self._fits[name]
 
 
@@ -409,7 +411,7 @@ class ClipEvaluation:
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
         """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
         if name not in self._method_hashes:
-            self._method_hashes[name] = registry.source_hash(method)
+            self._method_hashes[name] = hash_method(method)
         described = {"name": name, "options": repr(method), "source": self._method_hashes[name]}
         content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return storage.cell_key(content, described, manifest.source_hash())

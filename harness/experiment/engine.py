@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -29,11 +29,13 @@ from harness.experiment.cells import (
 )
 from harness.experiment.executors import TaskExecutor, process_executor
 from harness.experiment.interruption import graceful_stop
+from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
+from harness.experiment.method_process import MethodFailure
 from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
+from harness.experiment.remote_method import close_methods, hash_method, resolve_method
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
 from harness.mocap.library import LibraryFolders
-from harness.reconstruct import registry
 from harness.results import storage
 from harness.results.index import CellIndex
 from harness.results.lock import folder_lock
@@ -62,11 +64,13 @@ def run(
     jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
+    isolation: Isolation = DEFAULT_ISOLATION,
 ) -> Outcome:
     """Run the cells of a scenario that are not finished yet, with `jobs` processes, and write the summary.
 
     The folder `out` is created, or resumed if it holds this scenario, else refused (BadInput). `folder` is the library
-    of real motion. A cell that fails is listed with its traceback and stops no other cell. Names that do not exist are
+    of real motion. Methods from outside the package run in processes of their own, within the limits of `isolation`. A
+    cell that fails is listed with its traceback and stops no other cell. Names that do not exist are
     refused before anything is written. If every cell is refused, the first refusal is raised (BadInput). The first
     Ctrl-C lets running cells finish before KeyboardInterrupt is raised, the second one stops at once.
 
@@ -76,7 +80,9 @@ def run(
     content = asdict(scenario)
     del content["fault"]  # faults concern the emulator alone, a run does not depend on them
     with process_executor(jobs) as executor:
-        return _run_folder("run", scenario.name, content, [scenario], out, folder, executor, jobs, command, progress)
+        return _run_folder(
+            "run", scenario.name, content, [scenario], out, folder, executor, jobs, command, progress, isolation
+        )
 
 
 def run_sweep(
@@ -90,6 +96,7 @@ def run_sweep(
     command: str,
     only: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
+    isolation: Isolation = DEFAULT_ISOLATION,
 ) -> Outcome:
     """Run the cells of a sweep's scenarios that are not finished yet, or `only` the cell of that name; see `run`.
 
@@ -103,7 +110,9 @@ def run_sweep(
         },
         "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),
     }
-    return _run_folder("sweep", sweep.name, content, scenarios, out, folder, executor, workers, command, progress, only)
+    return _run_folder(
+        "sweep", sweep.name, content, scenarios, out, folder, executor, workers, command, progress, isolation, only
+    )
 
 
 def run_cells(
@@ -127,6 +136,7 @@ def run_cells(
         outcomes = _run_tasks(index, names, tasks, out, executor, progress)
         keys = [outcomes[name].key for name in names if name in outcomes and not outcomes[name].failure]
         failures = {name: outcomes[name].failure for name in names if name in outcomes and outcomes[name].failure}
+        index.write_digest({})
         return CellResults(tuple(index.rows_of(keys)), failures, len(names))
 
 
@@ -141,21 +151,23 @@ def _run_folder(
     workers: int,
     command: str,
     progress: ProgressCallback,
+    isolation: Isolation,
     only: str = "",
 ) -> Outcome:
     """Run scenarios into a folder of their own; `content` is what the manifest says of them."""
     clear_caches()
-    check_names(scenarios, folder)
+    isolation = replace(isolation, workers=min(workers, os.cpu_count() or 1))
+    check_names(scenarios, folder, isolation)
     labelled = kind == "sweep"
     names = [cell for scenario in scenarios for cell in cell_names(scenario, labelled=labelled)]
-    tasks = plan_tasks(scenarios, folder, command, workers, labelled=labelled)
+    tasks = plan_tasks(scenarios, folder, command, workers, labelled=labelled, isolation=isolation)
     if only:
         tasks = [single for task in tasks for single in split_task(task) if str(single.cells()[0]) == only]
         if not tasks:
             near = difflib.get_close_matches(only, names, n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise BadInput(f"No cell is called {only!r}.{hint}", f"`harness status {out}` names those that failed.")
-    storage.open_run(out, _describe(content, scenarios, folder, command))
+    storage.open_run(out, _describe(content, scenarios, folder, command, isolation))
     with folder_lock(out), CellIndex(out) as index:
         index.add_from_folders()
         index.plan(names)
@@ -163,6 +175,7 @@ def _run_folder(
         try:
             outcomes = _run_tasks(index, [only] if only else names, tasks, out, executor, progress)
         finally:
+            close_methods()
             summary = storage.write_summary(
                 index,
                 out,
@@ -179,10 +192,17 @@ def _run_folder(
 
 
 def _describe(
-    content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: LibraryFolders | None, command: str
+    content: Mapping[str, Any],
+    scenarios: Sequence[Scenario],
+    folder: LibraryFolders | None,
+    command: str,
+    isolation: Isolation,
 ) -> Manifest:
     sources = list(dict.fromkeys(open_scenario_motion(s.motion, folder, s.seed).title for s in scenarios))
-    constants = {name: repr(registry.resolve(name)) for name in content["methods"]}
+    constants = {}
+    for name in content["methods"]:
+        with suppress(MethodFailure):  # its cells fail and say why
+            constants[name] = repr(resolve_method(name, isolation))
     source = sources if "sweep" in content else sources[0]
     return describe_run(content, motion_source=source, command=command, constants=constants)
 
@@ -256,5 +276,10 @@ def _session_id() -> str:
 
 def _source_hash(tasks: Sequence[ClipTask]) -> str:
     """Hash of the source of the package and of all methods."""
-    names = sorted({name for task in tasks for name in task.scenario.methods})
-    return content_key([source_hash(), [registry.source_hash(registry.resolve(name)) for name in names]])
+    hashes: dict[str, str] = {}
+    for name, isolation in sorted(
+        {(name, task.isolation) for task in tasks for name in task.scenario.methods}, key=str
+    ):
+        with suppress(MethodFailure):
+            hashes[name] = hash_method(resolve_method(name, isolation))
+    return content_key([source_hash(), hashes])

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from harness.core.split import ClipPart
 from harness.experiment.cells import ClipTask, PlannedCell
+from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.scenario import Scenario, variants
 from harness.mocap.library import LibraryFolders, absolute_folders
 
@@ -40,14 +41,20 @@ def cell_names(scenario: Scenario, *, labelled: bool = True) -> list[str]:
 
 
 def plan_tasks(
-    scenarios: Iterable[Scenario], folder: LibraryFolders | None, command: str, workers: int, *, labelled: bool = True
+    scenarios: Iterable[Scenario],
+    folder: LibraryFolders | None,
+    command: str,
+    workers: int,
+    *,
+    labelled: bool = True,
+    isolation: Isolation = DEFAULT_ISOLATION,
 ) -> list[ClipTask]:
     """Tasks that together hold every cell of the scenarios once.
 
     A task is a whole clip where possible, because its cells share motion and training. The last clips are cut into
     parts, so that all workers end at nearly the same time.
     """
-    clips = [task for scenario in scenarios for task in _clip_tasks(scenario, folder, command, labelled)]
+    clips = [task for scenario in scenarios for task in _clip_tasks(scenario, folder, command, labelled, isolation)]
     shared = max(min(len(clips), workers), 1)
     tasks = []
     for place, task in enumerate(clips):
@@ -76,13 +83,16 @@ def split_task(task: ClipTask) -> list[ClipTask]:
     ]
 
 
-def _clip_tasks(scenario: Scenario, folder: LibraryFolders | None, command: str, labelled: bool) -> list[ClipTask]:
+def _clip_tasks(
+    scenario: Scenario, folder: LibraryFolders | None, command: str, labelled: bool, isolation: Isolation
+) -> list[ClipTask]:
     label = scenario_label(scenario) if labelled else ""
     parts = [ClipPart.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     library = None if folder is None else absolute_folders(folder)  # a worker may have another working directory
     return [
-        ClipTask(scenario, part, b, library, command, label=label) for part, b in zip(parts, behaviours, strict=True)
+        ClipTask(scenario, part, b, library, command, label=label, isolation=isolation)
+        for part, b in zip(parts, behaviours, strict=True)
     ]
 
 

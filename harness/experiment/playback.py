@@ -94,6 +94,11 @@ class Playback:
         return self.clip_evaluation.session.observe(self.take) if self.posing else self.clip_evaluation.simulation
 
     @cached_property
+    def reach_m(self) -> float:
+        """Largest coordinate of any station in the tracker's frame during the motion [m]."""
+        return float(np.abs(self.samples.position_m).max())
+
+    @cached_property
     def samples(self) -> DeviceSamples:
         """Samples of the device, loop after loop. The first loop equals `simulation` until the motion turns back."""
         session, scenario = self.clip_evaluation.session, self.scenario

@@ -7,21 +7,21 @@ no truth and is not scored. Neither is a frame whose readings differ from those 
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.estimate import Estimate
 from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
 from harness.errors import BadInput
+from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.playback import Playback, prepare_playback, select_stations
+from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import load_scenario
 from harness.mocap.library import LibraryFolders
-from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
@@ -145,7 +145,9 @@ class _MethodOutput:
 def score_methods(stream: RecordingStream, playback: Playback, methods: Sequence[str]) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     sessions = {
-        name: playback.clip_evaluation.fit_method(registry.resolve(name), name).begin(playback.calibration)
+        name: playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name).begin(
+            playback.calibration
+        )
         for name in methods
     }
     frames, zero_s, made = _run_methods(stream, sessions)
@@ -158,19 +160,20 @@ def _run_methods(
 ) -> tuple[list[TrackerFrame], Floats, dict[str, _MethodOutput]]:
     """The frames, the device time at which the device's clock was zero for each (F,) [s], and the methods' output."""
     frames, zero_s = [], []
-    steps: dict[str, list[tuple[Estimate, float]]] = {name: [] for name in sessions}
+    steps: dict[str, list[tuple[Floats, int, float]]] = {name: [] for name in sessions}
     for frame in stream:
         frames.append(frame)
         zero_s.append(stream.device_zero_s)
         for name, session in sessions.items():
-            start = time.perf_counter()
-            estimate = session.step(frame)
-            steps[name].append((estimate, 1e3 * (time.perf_counter() - start)))
+            seen, start = replace(frame), time.perf_counter()
+            estimate = session.step(seen)
+            step_ms = 1e3 * (time.perf_counter() - start)
+            steps[name].append((np.array(estimate.qpos), int(estimate.status), step_ms))
     made = {
         name: _MethodOutput(
-            np.array([estimate.qpos for estimate, _ in pairs]),
-            np.array([estimate.status for estimate, _ in pairs], dtype=np.int64),
-            np.array([step_ms for _, step_ms in pairs]),
+            np.array([qpos for qpos, _, _ in pairs]),
+            np.array([status for _, status, _ in pairs], dtype=np.int64),
+            np.array([step_ms for _, _, step_ms in pairs]),
         )
         for name, pairs in steps.items()
     }

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from harness.errors import BadFile
 from harness.results.index import INDEX_FILE, CellIndex
+from harness.results.integrity import check_folder, check_index
 from harness.results.lock import is_running
 
 
@@ -35,7 +36,10 @@ class RunStatus:
 
 
 def read_status(out: Path) -> RunStatus:
-    """Progress of a folder, also while a process works there; BadFile for a folder that the harness did not write."""
+    """Progress of a folder, also while a process works there.
+
+    BadFile for a folder that the harness did not write, and for one whose files are damaged or edited.
+    """
     if (out / INDEX_FILE).is_file() or (out / "manifest.json").is_file():
         return _read_index_status(out)
     runs = [_read_index_status(file.parent) for file in sorted(out.glob(f"*/{INDEX_FILE}"))]
@@ -48,6 +52,7 @@ def read_status(out: Path) -> RunStatus:
 
 
 def _read_index_status(out: Path) -> RunStatus:
+    (check_folder if (out / "manifest.json").is_file() else check_index)(out)
     now, running = time.time(), is_running(out)
     with CellIndex(out, read_only=True) as index:
         counts, facts, failures, unwritten = index.counts(), index.facts(), index.failures(), index.unwritten()

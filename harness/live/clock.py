@@ -14,16 +14,23 @@ class HostClockEstimator:
     """Maps device time stamps to the host's clock by the frames with the least delay so far.
 
     A frame may be delayed but never comes early, so the least difference of the two clocks is the best estimate. The
-    estimate increases at the largest drift of the clocks. The least delay from sample to last byte remains in it.
+    estimate increases at the largest drift of the clocks. The least delay from sample to last byte remains in it. Times
+    strictly increase: where a frame with less delay corrects the estimate, they wait.
     """
 
     def __init__(self) -> None:
         self._difference_s = np.inf
         """Least difference of host minus device clock."""
         self._received_s = 0.0
+        self._measured_s = -np.inf
+        """Time of the latest frame [s]."""
 
     def measured_s(self, frame: TrackerFrame) -> float:
         """Mean time of measurement of stations on the host's monotonic clock [s]; that of reception without stamps."""
+        self._measured_s = max(self._estimate_s(frame), float(np.nextafter(self._measured_s, np.inf)))
+        return self._measured_s
+
+    def _estimate_s(self, frame: TrackerFrame) -> float:
         stamps_s = frame.measured_s[~np.isnan(frame.measured_s)]
         if len(stamps_s) == 0:
             return frame.received_s

@@ -4,17 +4,13 @@ A package registers methods in the entry-point group `harness.methods`: name -> 
 `+ik` after a name adds final inverse kinematics (`clean_up`). Options follow in brackets (`harness.core.options`).
 """
 
-import ast
 import dataclasses
-import hashlib
 import importlib
 import importlib.util
 import inspect
-import sys
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache
-from importlib.metadata import entry_points
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, cast
 
 from harness.core.fields import replace_fields
@@ -30,30 +26,40 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 GROUP = "harness.methods"
 """Entry-point group of installed packages."""
 _REQUIRED_ATTRIBUTES = ("name", "summary", "needs_examples", "fit")
-"""Attributes that every method has; none of them is an option."""
+"""Attributes that every method has."""
+_NO_OPTIONS = (*_REQUIRED_ATTRIBUTES, "files", "source")
+"""Attributes of a method that are no options."""
+
+
+_BUILT_IN: dict[str, Callable[[], Method]] = {
+    "ik": ik.Ik,
+    "ik:previous": lambda: ik.PREVIOUS,
+    "ik:mean": lambda: ik.MEAN,
+    "ik:gaussian": lambda: ik.GAUSSIAN,
+    "mean_pose": MeanPose,
+    "kernel_ridge": KernelRidge,
+    "best_match": BestMatch,
+    "local_pca": local_pca.LocalPca,
+    "local_pca:chai2005": lambda: local_pca.CHAI2005,
+    "dynamic_map": dynamic_map.DynamicMap,
+    "dynamic_map:window": lambda: dynamic_map.WINDOW,
+    "dynamic_map:literal": lambda: dynamic_map.LITERAL,
+    "weighted_blend": weighted_blend.WeightedBlend,
+    "weighted_blend:literal": lambda: weighted_blend.LITERAL,
+    "kernel_cca": kernel_cca.KernelCca,
+    "kernel_cca:literal": lambda: kernel_cca.LITERAL,
+}
 
 
 def methods() -> dict[str, Callable[[], Method]]:
     """Name -> factory of all registered methods. Installed packages cannot replace a built-in name."""
-    installed: dict[str, Callable[[], Method]] = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
-    return installed | {
-        "ik": ik.Ik,
-        "ik:previous": lambda: ik.PREVIOUS,
-        "ik:mean": lambda: ik.MEAN,
-        "ik:gaussian": lambda: ik.GAUSSIAN,
-        "mean_pose": MeanPose,
-        "kernel_ridge": KernelRidge,
-        "best_match": BestMatch,
-        "local_pca": local_pca.LocalPca,
-        "local_pca:chai2005": lambda: local_pca.CHAI2005,
-        "dynamic_map": dynamic_map.DynamicMap,
-        "dynamic_map:window": lambda: dynamic_map.WINDOW,
-        "dynamic_map:literal": lambda: dynamic_map.LITERAL,
-        "weighted_blend": weighted_blend.WeightedBlend,
-        "weighted_blend:literal": lambda: weighted_blend.LITERAL,
-        "kernel_cca": kernel_cca.KernelCca,
-        "kernel_cca:literal": lambda: kernel_cca.LITERAL,
-    }
+    return {entry.name: partial(_make_installed, entry) for entry in entry_points(group=GROUP)} | _BUILT_IN
+
+
+def is_built_in(name: str) -> bool:
+    """Whether a name with options stands for code of this package alone; nothing is imported to tell."""
+    plain = without_options(name).partition("+")[0]
+    return plain in _BUILT_IN or plain.partition(":")[0].partition(".")[0] == "harness"
 
 
 _ORIGINS = {
@@ -100,7 +106,7 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
     if not dataclasses.is_dataclass(method) or isinstance(method, type):
         raise BadInput(f"{method.name} takes no options.", "Options are the fields of a method's dataclass.")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
-    option_names = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
+    option_names = [field for field in fields if field not in _NO_OPTIONS]
     renamed: Mapping[str, str] = getattr(method, "RENAMED_KEYS", {})
     for option in options:
         if option in renamed:
@@ -114,6 +120,20 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
         raise
     except Exception as error:  # code from outside may raise anything
         raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(option_names)}.") from error
+
+
+def _make_installed(entry: EntryPoint) -> Method:
+    """The method of an installed package, which is imported only now; BadInput when that fails."""
+    try:
+        method: Method = entry.load()()
+    except HarnessError:
+        raise
+    except (Exception, SystemExit) as error:  # code from outside may raise anything
+        raise BadInput(
+            f"{entry.name} ({entry.value}) cannot be made: {type(error).__name__}: {error}.",
+            "Repair or remove the package that registers it.",
+        ) from error
+    return method
 
 
 def _base_method(name: str) -> Method:
@@ -147,50 +167,6 @@ def _base_method(name: str) -> Method:
 def summary(name: str) -> str:
     """Description of a method in one line."""
     return resolve(name).summary
-
-
-def source_hash(method: Method) -> str:
-    """Digest of the source files of a method and of the methods it wraps; BadInput when a file cannot be read."""
-    digest = hashlib.blake2b(digest_size=16)
-    inner: object = method
-    while inner is not None:
-        file = inspect.getsourcefile(type(inner))
-        if file is None or not Path(file).is_file():
-            raise BadInput(f"The source of {method.name} cannot be found.", "Define the method in a file.")
-        top = sys.modules.get(type(inner).__module__.partition(".")[0])
-        package = tuple(top.__path__) if top is not None and hasattr(top, "__path__") else ()
-        digest.update(
-            Path(file).name.encode() + b"\0" + (_package_hash(package) if package else _file_hash(Path(file)))
-        )
-        inner = getattr(inner, "method", None)
-    return digest.hexdigest()
-
-
-@cache
-def _package_hash(folders: tuple[str, ...]) -> bytes:
-    """Digest of all source files of a package; cached."""
-    return _hash_files(part for folder in folders for part in Path(folder).rglob("*.py"))
-
-
-def _file_hash(file: Path) -> bytes:
-    """Digest of a method's file and of the modules in its folder that it imports, recursively."""
-    files, waiting = set(), [file]
-    while waiting:
-        if (part := waiting.pop()) not in files:
-            files.add(part)
-            nodes = list(ast.walk(ast.parse(part.read_bytes())))
-            names = [a.name for node in nodes if isinstance(node, ast.Import) for a in node.names]
-            names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
-            siblings = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
-            waiting += [other for other in siblings if other.is_file()]
-    return _hash_files(files)
-
-
-def _hash_files(files: Iterable[Path]) -> bytes:
-    digest = hashlib.blake2b(digest_size=16)
-    for file in sorted(files):
-        digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    return digest.digest()
 
 
 def _module_exists(module: str) -> bool:

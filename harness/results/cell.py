@@ -1,9 +1,10 @@
 """One cell: one method on one clip with one choice of inputs, as a record and as a folder.
 
 On disk a cell is `cells/<key>/cell.json` and `frames.npz`. The folder is written under a temporary name and renamed
-when it is complete, so that a folder that exists is finished.
+when it is complete, so that a folder that exists is finished. cell.json has its own digest and that of frames.npz.
 """
 
+import hashlib
 import io
 import json
 import shutil
@@ -16,8 +17,10 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import flush, move_into_place, read_json, temporary_path, to_json, to_json_types
+from harness.core.files import flush, move_into_place, temporary_path, to_json, to_json_types
 from harness.errors import BadFile, ShapeError
+from harness.results.digests import check_file, insert_digest, read_result_json
+from harness.results.plausibility import find_impossible_frames, find_impossible_metric
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -168,9 +171,13 @@ def write_cell(out: Path, cell: Cell) -> Path:
     content = {name: getattr(cell, name) for name in _TEXTS}
     content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
-    columns |= {_ERROR_PREFIX + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
+    largest = np.finfo(np.float32).max
+    per_frame = {name: np.minimum(values, largest).astype(np.float32) for name, values in cell.scores.per_frame.items()}
+    columns |= {_ERROR_PREFIX + name: values for name, values in per_frame.items()}
     columns["scored"] = cell.scores.scored
-    files = {"cell.json": to_json(content).encode(), "frames.npz": _npz_bytes(columns)}
+    frames = _npz_bytes(columns)
+    content["frames_sha256"] = hashlib.sha256(frames).hexdigest()
+    files = {"cell.json": insert_digest(to_json(content)).encode(), "frames.npz": frames}
     for name, data in files.items():
         (beside / name).write_bytes(data)
     for name in files:  # after both writes, so that most data reach the disk in one flush
@@ -199,10 +206,28 @@ def _npz_bytes(columns: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
     return packed.getvalue()
 
 
+def read_content(folder: Path) -> dict[str, Any]:
+    """Read cell.json of a finished cell, and check both files of the cell against their digests.
+
+    BadFile when a file is missing or does not fit its digest, when the cell belongs into another folder, and when a
+    metric has an impossible value.
+    """
+    text, expected = folder / "cell.json", "a cell of a run"
+    content = read_result_json(text, expected, _ADVICE)
+    check_file(folder / "frames.npz", content.get("frames_sha256"), "the frames of a cell", _ADVICE)
+    if content.get("key") != folder.name:
+        raise BadFile(text, f"the cell {content.get('key')}", "the cell that its folder is named after", _ADVICE)
+    metrics = content.get("metrics")
+    if not isinstance(metrics, dict):
+        raise BadFile(text, "no metrics", f"{expected} of this version of the harness", _ADVICE)
+    if found := find_impossible_metric(metrics):
+        raise BadFile(text, found, "possible values", _ADVICE)
+    return content
+
+
 def read_cell(folder: Path) -> Cell:
-    """Read a finished cell; BadFile when one of its files is missing, truncated or malformed."""
-    text, frames = folder / "cell.json", folder / "frames.npz"
-    content = read_json(text, "a cell of a run")
+    """Read a finished cell; BadFile when one of its files is missing, damaged, edited or malformed."""
+    frames, content = folder / "frames.npz", read_content(folder)
     try:
         with open(frames, "rb") as file, np.load(file, allow_pickle=False) as columns:
             arrays = {name: columns[name] for name in columns.files}
@@ -210,6 +235,8 @@ def read_cell(folder: Path) -> Cell:
         raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", _ADVICE) from error
     try:
         per_frame = {name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS}
+        if found := find_impossible_frames(per_frame):
+            raise BadFile(frames, found, "possible values", _ADVICE)
         scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"])
         return Cell(
             scores=scores,
@@ -224,14 +251,18 @@ def read_cell(folder: Path) -> Cell:
 
 
 def read_row(folder: Path) -> dict[str, Any]:
-    """Read the row of a finished cell, without its frames; BadFile."""
-    text = folder / "cell.json"
-    content = read_json(text, "a cell of a run")
+    """Read the row of a finished cell, without its frames; BadFile as for `read_content`."""
+    return row_of_content(folder, read_content(folder))
+
+
+def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
+    """The row of a cell from the content of its cell.json; BadFile when columns are missing."""
     try:
         first, rest = ({name: content[name] for name in names} for names in (IDENTITY, TRAILING_COLUMNS))
         return {**first, **content["metrics"], **rest}
     except (KeyError, TypeError) as error:
-        raise BadFile(text, f"no {error}", "a cell of this version of the harness", _ADVICE) from error
+        expected = "a cell of this version of the harness"
+        raise BadFile(folder / "cell.json", f"no {error}", expected, _ADVICE) from error
 
 
 def as_row(cell: Cell) -> dict[str, Any]:

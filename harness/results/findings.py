@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.core.files import read_json, to_json_types, write_json
+from harness.core.files import to_json_types
 from harness.errors import BadFile, UnknownName
+from harness.results.digests import read_result_json, write_result_json
 
 SCHEMA = 1
 ClaimVerdict = Literal["reproduced", "same", "not reproduced", "cannot tell", "not comparable", "not run"]
@@ -149,15 +150,15 @@ class PaperFindings:
 
 
 def write_findings(path: Path, findings: PaperFindings) -> None:
-    """Write findings as JSON."""
-    write_json(path, to_json_types(dataclasses.asdict(findings)))
+    """Write findings as JSON with a digest."""
+    write_result_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
 def read_findings(path: Path) -> PaperFindings:
-    """Read the findings of a paper study; BadFile when the file is missing or malformed."""
-    expected = "the findings of a paper's study"
-    content = read_json(path, expected)
+    """Read the findings of a paper study; BadFile when the file is missing, damaged, edited or malformed."""
+    expected, advice = "the findings of a paper's study", "Give the command of the study again."
+    content = read_result_json(path, expected, advice)
     try:
         return build(PaperFindings, content, "findings")
     except (TypeError, UnknownName) as error:
-        raise BadFile(path, str(error), expected, "Give the command of the study again.") from error
+        raise BadFile(path, str(error), expected, advice) from error

@@ -2,9 +2,11 @@
 
 The cells' own folders are authoritative: an index that is missing, damaged or of another version is rebuilt from them.
 Besides the cells it holds the plan (the planned cells in the order of the table, and the outcome of each) and facts
-about the work. One process writes, any number may read meanwhile.
+about the work. One process writes, any number may read meanwhile. A process that has finished leaves a digest of the
+whole content; there is none while a process writes, and after one was killed.
 """
 
+import hashlib
 import json
 import os
 import sqlite3
@@ -28,8 +30,11 @@ TEXTS = (
 _JSON_COLUMNS = ("varied", "stations")
 _COLUMNS = ("key", *TEXTS, "seed", "rate_hz", *_JSON_COLUMNS, "seconds", *DEFINITIONS, "rest")
 _ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS, "seconds")
-_VERSION = int(content_key(_COLUMNS)[:7], 16)
-"""Version number in the file. An index with other columns is rebuilt."""
+_TABLES = {"plan": "place", "cells": "key", "facts": "name", "digests": "file"}
+"""Table -> the column that it is sorted by for the digest."""
+_VERSION = int(content_key([_COLUMNS, list(_TABLES)])[:7], 16)
+"""Version number in the file. An index with other columns or tables is rebuilt."""
+_ADVICE = "Give its command again; finished cells are kept."
 _PLAN_COLUMNS = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
 _KEYS_PER_QUERY = 500
 """Number of keys in one SQL query."""
@@ -55,7 +60,7 @@ class CellIndex:
         else:
             try:
                 self._db = self._open()
-            except sqlite3.DatabaseError:  # damaged or of another version: it is rebuilt
+            except sqlite3.DatabaseError:  # damaged, edited or of another version: it is rebuilt
                 self._remove()
                 self._db = self._open()
 
@@ -66,13 +71,19 @@ class CellIndex:
         self._db.close()
 
     def add(self, rows: Iterable[Mapping[str, Any]], seconds: Iterable[float | None] | None = None) -> None:
-        """Add rows as `cell.as_row` gives them, and the wall time of each [s]. A row that exists stays as it is."""
+        """Add rows as `cell.as_row` gives them, and the wall time of each [s].
+
+        A row that exists is replaced. Its time stays where no other is given.
+        """
         rows = list(rows)
         took = [None] * len(rows) if seconds is None else list(seconds)
         holes = ", ".join("?" * len(_COLUMNS))
         columns = (_as_columns(row, took_s) for row, took_s in zip(rows, took, strict=True))
+        replaced = ", ".join(f"{name} = excluded.{name}" for name in _COLUMNS if name not in ("key", "seconds"))
+        replaced += ", seconds = coalesce(excluded.seconds, seconds)"
+        statement = f"INSERT INTO cells VALUES ({holes}) ON CONFLICT (key) DO UPDATE SET {replaced}"  # noqa: S608  # known names
         with self._db:
-            self._db.executemany(f"INSERT OR IGNORE INTO cells VALUES ({holes})", columns)  # noqa: S608  # holes alone
+            self._db.executemany(statement, columns)
 
     def add_from_folders(self) -> int:
         """Add the finished cells of the folder that the index lacks; returns their number.
@@ -174,6 +185,29 @@ class CellIndex:
                 ((name, json.dumps(to_json_types(value))) for name, value in facts.items()),
             )
 
+    def write_digest(self, files: Mapping[str, str]) -> None:
+        """Store the digests of other files of the folder, and then that of the whole index."""
+        with self._db:
+            self._db.executemany("INSERT OR REPLACE INTO digests VALUES (?, ?)", files.items())
+            self._db.execute("INSERT OR REPLACE INTO digests VALUES (?, ?)", (INDEX_FILE, _content_digest(self._db)))
+
+    def check_digest(self) -> dict[str, str] | None:
+        """The digests of other files of the folder; None while a process writes and after one was killed.
+
+        BadFile when the content of the index does not fit its digest.
+        """
+        expected = "the index of a run or sweep"
+        try:
+            self._db.execute("BEGIN")  # another process may write between two statements
+            digests = dict(self._db.execute("SELECT file, sha256 FROM digests").fetchall())
+            fits = digests.get(INDEX_FILE) in (None, _content_digest(self._db))
+            self._db.rollback()
+        except sqlite3.DatabaseError as error:
+            raise BadFile(self.path, f"damaged: {error}", expected, _ADVICE) from error
+        if not fits:
+            raise BadFile(self.path, "damaged or edited: its content does not fit its digest", expected, _ADVICE)
+        return digests if digests.pop(INDEX_FILE, None) else None
+
     def facts(self) -> dict[str, Any]:
         return {name: json.loads(value) for name, value in self._db.execute("SELECT name, value FROM facts")}
 
@@ -188,30 +222,45 @@ class CellIndex:
                 db.execute(f"CREATE TABLE IF NOT EXISTS cells ({', '.join(map(_column_declaration, _COLUMNS))})")
                 db.execute(f"CREATE TABLE IF NOT EXISTS plan ({_PLAN_COLUMNS})")
                 db.execute("CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value TEXT)")
+                db.execute("CREATE TABLE IF NOT EXISTS digests (file TEXT PRIMARY KEY, sha256 TEXT)")
                 db.execute(f"PRAGMA user_version = {_VERSION}")
+                own = db.execute("SELECT sha256 FROM digests WHERE file = ?", (INDEX_FILE,)).fetchone()
+                if own and own[0] != _content_digest(db):
+                    raise sqlite3.DatabaseError("edited")
+                db.execute("DELETE FROM digests")
         except sqlite3.DatabaseError:
             db.close()
             raise
         return db
 
     def _open_read_only(self) -> sqlite3.Connection:
-        expected, advice = "the index of a run or sweep", "Give its command again; finished cells are kept."
+        expected = "the index of a run or sweep of this version of the harness"
         if not self.path.is_file():
-            raise BadFile(self.path, "no such file", expected, advice)
+            raise BadFile(self.path, "no such file", expected, _ADVICE)
         db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
         try:
             version = db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.DatabaseError as error:
             db.close()
-            raise BadFile(self.path, str(error), expected, advice) from error
+            raise BadFile(self.path, str(error), expected, _ADVICE) from error
         if version != _VERSION:
             db.close()
-            raise BadFile(self.path, "another version", expected, advice)
+            raise BadFile(self.path, "another version", expected, _ADVICE)
         return db
 
     def _remove(self) -> None:
         for path in self.path.parent.glob(f"{INDEX_FILE}*"):
             path.unlink()
+
+
+def _content_digest(db: sqlite3.Connection) -> str:
+    """SHA-256 of all rows of all tables but this digest."""
+    state = hashlib.sha256()
+    for table, order in _TABLES.items():
+        for row in db.execute(f"SELECT * FROM {table} ORDER BY {order}"):  # noqa: S608  # known names
+            if row[0] != INDEX_FILE:
+                state.update(repr(row).encode())
+    return state.hexdigest()
 
 
 def _column_declaration(column: str) -> str:

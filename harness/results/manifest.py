@@ -15,9 +15,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from harness.core.files import read_json, to_json_types
+from harness.core.files import to_json_types
 from harness.core.package_data import PACKAGE_FOLDER, VERSION
 from harness.errors import BadFile
+from harness.results.digests import read_result_json
 from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "plotly", "ezc3d", "mink")
@@ -40,8 +41,9 @@ class Manifest:
 
     @classmethod
     def read(cls, path: Path) -> "Manifest":
-        """Read manifest.json; BadFile when it is missing or malformed."""
-        content = read_json(path, "the manifest of a run")
+        """Read manifest.json; BadFile when it is missing, damaged, edited or malformed."""
+        advice = "Is this a folder written by `harness run`? If so, restore it, or run again with another --out."
+        content = read_result_json(path, "the manifest of a run", advice)
         try:
             return cls(*(dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")))
         except (KeyError, TypeError, ValueError) as error:

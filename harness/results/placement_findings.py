@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.core.files import read_json, to_json_types, write_json
+from harness.core.files import read_json, to_json_types
 from harness.errors import BadFile, UnknownName
+from harness.results.digests import read_result_json, write_result_json
 from harness.results.findings import Claim
 
 SCHEMA = 1
@@ -248,17 +249,17 @@ class PlacementFindings:
 
 
 def write_placement(path: Path, findings: PlacementFindings) -> None:
-    """Write findings as JSON."""
-    write_json(path, to_json_types(dataclasses.asdict(findings)))
+    """Write findings as JSON with a digest."""
+    write_result_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
 def read_placement(path: Path) -> PlacementFindings:
     """Read the findings of a placement study.
 
-    BadFile when the file is missing, malformed, of another version, or names unknown candidates.
+    BadFile when the file is missing, damaged, edited, malformed, of another version, or names unknown candidates.
     """
     expected, advice = "the findings of a placement study", "Give the command of the study again."
-    content = read_json(path, expected)
+    content = read_result_json(path, expected, advice)
     if content.get("schema") != SCHEMA:
         raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
     try:

@@ -6,21 +6,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.core.files import read_json
 from harness.errors import BadFile, UnknownName
-from harness.results.cell import cell_folder
-from harness.results.index import CellIndex
+from harness.results.cell import cell_folder, read_content, row_of_content
+from harness.results.digests import check_file, read_result_json
+from harness.results.index import INDEX_FILE, CellIndex
+from harness.results.integrity import check_folder, check_row
 from harness.results.manifest import Manifest
+from harness.results.plausibility import find_impossible_metric
 from harness.score.metrics import DEFINITIONS
 
 BASELINES = Path("results/baselines")
 CELLS_FILE = "cells.json"
 """File of a baseline (see `compare.baseline.write_baseline`)."""
-SCHEMA = 1
+BASELINE_FILES = ("manifest.json", "summary.json")
+"""Files of a baseline whose digests stand in `CELLS_FILE`."""
+SCHEMA = 2
+"""Version of the format of `CELLS_FILE`; since 2 its files have digests."""
 _TEXTS = ("scenario", "clip", "method", "inputs", "split", "noise", "behaviour", "performer")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
 COUNT_METRICS = ("frames_matched", "frames_expected")
 _ADVICE = "Run, or save, it again."
+_BASELINE_ADVICE = "Restore it from version control, or save the baseline again with this version of the harness."
 
 
 @dataclass(frozen=True)
@@ -62,8 +68,8 @@ class ResultSet:
 def load_results(where: Path | str) -> ResultSet:
     """Load the folder of a run, sweep or baseline, or the baseline of that name below `BASELINES`.
 
-    A folder takes precedence over a name. BadFile for any other folder and for one that is damaged or was written by
-    another version; UnknownName for an unknown name.
+    A folder takes precedence over a name. BadFile for any other folder and for one that is damaged, edited or was
+    written by another version; UnknownName for an unknown name.
     """
     folder = Path(where)
     if not folder.is_dir():
@@ -75,6 +81,7 @@ def load_results(where: Path | str) -> ResultSet:
         folder = BASELINES / folder
     if (folder / CELLS_FILE).is_file():
         return _load_baseline(folder)
+    check_folder(folder)
     manifest = Manifest.read(folder / "manifest.json")
     with CellIndex(folder, read_only=True) as index:
         cells = tuple(_cell_from_row(folder, row) for row in index.rows())
@@ -86,18 +93,20 @@ def _cell_from_row(folder: Path, row: Mapping[str, Any]) -> CellResult:
         advice = "An older version wrote it: run again with another --out."
         raise BadFile(folder, "cells that name no scenario", "a run of this version of the harness", advice)
     path = cell_folder(folder, row["key"]) / "cell.json"
-    defined_by = read_json(path, "a cell of a run").get("defined_by")
+    content = read_content(path.parent)
+    check_row(folder / INDEX_FILE, row, row_of_content(path.parent, content))
     metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
-    return _check_cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
+    return _check_cell(path, {**row, "defined_by": content.get("defined_by"), "metrics": metrics})
 
 
 def _load_baseline(folder: Path) -> ResultSet:
     path, expected = folder / CELLS_FILE, "the cells of a baseline"
-    content = read_json(path, expected)
+    content = read_result_json(path, expected, _BASELINE_ADVICE)
     if content.get("schema") != SCHEMA:
-        advice = "Another version of the harness saved it: use that one, or save the baseline again."
-        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
+        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", _BASELINE_ADVICE)
     try:
+        for name in BASELINE_FILES:
+            check_file(folder / name, content["digests"][name], f"the {name} that {CELLS_FILE} names", _BASELINE_ADVICE)
         shared, parts, planned = content["shared"], content["parts"], int(content["planned"])
         names, complete = content["metrics"], []
         for cell in content["cells"]:
@@ -122,4 +131,6 @@ def _check_cell(path: Path, content: Mapping[str, Any]) -> CellResult:
             value is not None or name in COUNT_METRICS
         ):
             raise BadFile(path, f"{name} is {value!r}", "a cell with a number there", _ADVICE)
+    if found := find_impossible_metric(content["metrics"]):
+        raise BadFile(path, found, "possible values", _ADVICE)
     return CellResult(**{name: content[name] for name in _KINDS})

@@ -10,12 +10,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.core.files import TEMPORARY, content_key, digest, read_json, write_json
+from harness.core.files import TEMPORARY, content_key, digest
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
+from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.index import CellIndex
+from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.manifest import Manifest
+from harness.results.plausibility import find_impossible_metric, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
 from harness.results.summary import GROUP_KEYS, SummaryStatistics
 from harness.results.table import compute_group_statistics, write_table
@@ -64,7 +67,7 @@ def open_folder(
         raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_json(out / identity_file, identity)  # first: it tells later that the folder is ours
+        write_result_json(out / identity_file, identity)  # first: it tells later that the folder is ours
     except OSError as error:
         raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
 
@@ -81,27 +84,40 @@ def open_run(out: Path, manifest: Manifest) -> None:
 
 
 def read_summary(out: Path) -> dict[str, Any]:
-    """The summary of a run; BadFile when it is damaged, is a sweep's, or names cells outside the folder."""
-    path, expected = out / "summary.json", "the summary of a run"
-    content = read_json(path, expected)
+    """The summary of a run.
+
+    BadFile when it is damaged or edited, is a sweep's, names cells outside the folder, or has impossible values.
+    """
+    path, expected = out / SUMMARY, "the summary of a run"
+    content = read_summary_json(out)
     advice = "Give the command of the run again."
     if missing := [name for name in _SUMMARY_KEYS if name not in content]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
     for row in content["cells"]:
         if not re.fullmatch(r"\w+", str(row.get("key"))):
             raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)
+        if found := find_impossible_metric(row):
+            raise BadFile(path, found, "possible values", advice)
+    if found := find_impossible_statistic([*content["methods"], *content["behaviours"]]):
+        raise BadFile(path, found, "possible values", advice)
     return content
 
 
 def read_cells(out: Path) -> Iterator[Cell]:
     """The finished cells of a run or sweep in planned order, read one at a time.
 
-    BadFile for a folder that holds no run, at once and not when the first cell is read.
+    BadFile for a folder that holds no run or a damaged one, at once and not when the first cell is read.
     """
-    Manifest.read(out / "manifest.json")
+    check_folder(out)
+    return _indexed_cells(out)
+
+
+def _indexed_cells(out: Path) -> Iterator[Cell]:
     with CellIndex(out, read_only=True) as index:
-        keys = [key for (key,) in index.columns("key")]
-    return (read_cell(cell_folder(out, key)) for key in keys)
+        for row in index.rows():
+            cell = read_cell(cell_folder(out, row["key"]))
+            check_row(index.path, row, as_row(cell))
+            yield cell
 
 
 def read_kind(out: Path) -> str:
@@ -119,7 +135,7 @@ def write_summary(
     (see `table.compute_group_statistics`). With `orders`, as a run has them, it also has statistics over frames, for
     which every cell is read: methods and behaviours (see `SummaryStatistics.rows`), recovery (see
     `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
-    and cells (the rows).
+    and cells (the rows). The index then gets the digests of the files and its own.
     """
     counts = index.counts()
     measured = any(value is not None for (value,) in index.columns("joint_angle_mean_deg"))
@@ -135,7 +151,8 @@ def write_summary(
     if orders is not None:
         content |= _frame_statistics(index, out, orders)
     write_table(index, out / "summary.csv")
-    write_json(out / "summary.json", content)
+    write_result_json(out / SUMMARY, content)
+    index.write_digest(compute_digests(out))
     return content
 
 

@@ -18,6 +18,7 @@ from harness.simulate.noise import Noise
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 from harness.simulate.trajectory import StationMotion, Trajectory
 from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.items import position_range_m
 from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
@@ -96,7 +97,7 @@ def simulate_tracker(
         truth_s=truth_s,
         truth_qpos=trajectory.qpos(truth_s),
         calibration=calibration,
-        health=_health(readings, sent, wire, frames),
+        health=_health(readings, sent, wire, frames, tracker.items, int(reader.out_of_range.sum())),
     )
 
 
@@ -201,7 +202,12 @@ def _match_frames(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
 
 
 def _health(
-    readings: SimulatedReadings, sent: Bools, wire: ByteCapture, frames: Sequence[TrackerFrame]
+    readings: SimulatedReadings,
+    sent: Bools,
+    wire: ByteCapture,
+    frames: Sequence[TrackerFrame],
+    items: tuple[int, ...],
+    out_of_range: int,
 ) -> dict[str, float]:
     delay_s = wire.received_s - readings.time_s.ravel()[sent]
     counts = {f"{name}_share": float(np.mean(hit)) for name, hit in readings.affected.items()}
@@ -215,4 +221,5 @@ def _health(
         "latency_p50_ms": 1e3 * float(np.quantile(delay_s, 0.5)),
         "latency_p99_ms": 1e3 * float(np.quantile(delay_s, 0.99)),
         **counts,
+        **({"readings_out_of_range": float(out_of_range)} if position_range_m(items) else {}),
     }

@@ -16,6 +16,8 @@ LineEventKind = Literal[
     "wrong list",  # the records are not of the configured output list
     "garbage",  # bytes that belong to no record and no reply
     "missing",  # a station that was present is no longer present
+    "out of range",  # a station is farther away than the output list can report
+    "settings",  # another program left settings in the device, or they are put back
     "refused",  # the device that came back cannot be used as it is
 ]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
-from harness.testing.contract_case import make_case
+from harness.testing.contract_case import ContractCase, make_case
 from harness.testing.rules import RULES
 from harness.testing.rules.assertions import RuleViolation
 
@@ -45,12 +45,17 @@ def check_method(method: Method) -> None:
 def check_rules(method: Method) -> Iterator[RuleResult]:
     """Check all rules in turn; an exception in the method counts as a violation."""
     case = make_case(method)
-    for rule, check in RULES.items():
-        try:
-            yield RuleResult(rule, True, check(case))
-        except RuleViolation as violation:
-            yield RuleResult(rule, False, str(violation))
-        except (Exception, SystemExit) as error:  # a method may raise anything
-            if was_interrupted(error):
-                raise
-            yield RuleResult(rule, False, f"raised {type(error).__name__}: {error}")
+    for rule in RULES:
+        yield check_rule(case, rule)
+
+
+def check_rule(case: ContractCase, rule: str) -> RuleResult:
+    """Check one rule; an exception in the method counts as a violation."""
+    try:
+        return RuleResult(rule, True, RULES[rule](case))
+    except RuleViolation as violation:
+        return RuleResult(rule, False, str(violation))
+    except (Exception, SystemExit) as error:  # a method may raise anything
+        if was_interrupted(error):
+            raise
+        return RuleResult(rule, False, f"raised {type(error).__name__}: {error}")

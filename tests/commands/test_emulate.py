@@ -56,7 +56,8 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
     [
         (["builtin_walking", "--rate", "120"], "18240 bytes/s; a line of 115200 baud carries 11520. Try --stations 2"),
         (["builtin_walking", "--baud", "9600"], "carries 960"),
-        (["builtin_walking", "--rate", "131", "--items", "40,18,19,21,1"], "11528 bytes/s"),
+        (["demo", "--clip", "boxing_p1_01", "--rate", "131", "--items", "40,18,19,21,1"], "11528 bytes/s"),
+        (["builtin_walking", "--items", "40,18,19,21,1"], "list 40,18,19,21,1 (22 bytes, range 3 m) carries less"),
         (["builtin_walking", "--stations", "7"], "7 stations of 6"),
         (["builtin_walking", "--stations", "head,tail"], "no station called 'tail'"),
         (["builtin_walking", "--clip", "nobody_01"], "nobody_01"),

@@ -1,16 +1,17 @@
 """Sides of comparisons made up in memory and as folders; no figure in here was ever measured."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from harness.core.files import content_key, to_json_types
+from harness.core.files import content_key, to_json
 from harness.core.seeds import generator
 from harness.results.cell import IDENTITY, TRAILING_COLUMNS
+from harness.results.digests import file_digest, insert_digest
 from harness.results.index import CellIndex
+from harness.results.integrity import compute_digests
 from harness.results.manifest import Manifest
 from harness.results.reader import CellResult, ResultSet
 from harness.score.metrics import DEFINITIONS, VERSIONS
@@ -76,18 +77,36 @@ def write_run(out: Path, judged: ResultSet) -> Path:
     for cell in judged.cells:
         identity = {name: value for name, value in vars(cell).items() if name not in ("metrics", "defined_by")}
         key = content_key(identity)
-        (out / "cells" / key).mkdir(parents=True)
-        _write(out / "cells" / key / "cell.json", {"defined_by": cell.defined_by})
-        rows.append({**identity, **cell.metrics, "key": key})
+        rows.append({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **identity, **cell.metrics, "key": key})
+        write_cell_files(out / "cells" / key, rows[-1], cell)
     names = [f"{row['method']} on {row['clip']} of {row['key']}" for row in rows]
     with CellIndex(out) as index:
         index.plan([*names, *judged.failed])
-        index.add({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **row} for row in rows)
+        index.add(rows)
         index.record_outcomes((name, row["key"], "") for name, row in zip(names, rows, strict=True))
         index.record_outcomes((name, "", "Traceback: no pose") for name in judged.failed)
         index.note(kind="run")
-    _write(out / "manifest.json", judged.manifest.as_dict())
-    summary = {
+        _write(out / "manifest.json", judged.manifest.as_dict())
+        (out / "summary.csv").write_text("")
+        _write(out / "summary.json", _summary(judged, rows))
+        index.write_digest(compute_digests(out))
+    return out
+
+
+def write_cell_files(folder: Path, row: Mapping[str, Any], cell: CellResult) -> None:
+    """The files of a cell, without frames."""
+    folder.mkdir(parents=True)
+    (folder / "frames.npz").write_bytes(b"no frames")
+    content = {name: row[name] for name in (*IDENTITY, *TRAILING_COLUMNS)}
+    digest = file_digest(folder / "frames.npz", "", "")
+    _write(
+        folder / "cell.json",
+        {**content, "metrics": cell.metrics, "defined_by": cell.defined_by, "frames_sha256": digest},
+    )
+
+
+def _summary(judged: ResultSet, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    return {
         "outcome": "incomplete" if judged.failed else "pass",
         "cells_finished": len(rows),
         "cells_planned": judged.planned,
@@ -96,10 +115,8 @@ def write_run(out: Path, judged: ResultSet) -> Path:
         "behaviours": [],
         "cells": rows,
     }
-    _write(out / "summary.json", summary)
-    return out
 
 
 def _write(path: Path, content: Mapping[str, Any]) -> None:
     """Without the flush to the disk that a run waits for."""
-    path.write_text(json.dumps(to_json_types(content)))
+    path.write_text(insert_digest(to_json(content)))

@@ -17,6 +17,7 @@ from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
 from tests.results.finish import finish_run
+from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
 
@@ -81,7 +82,8 @@ def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> N
         names = {f"demo seed 1: {row['method']} on {row['clip']}": row["key"] for row in index.rows()}
         index.plan(list(names))
         index.record_outcomes((name, key, "") for name, key in names.items())
-    changed(run / "summary.json", cells=None, groups=[{"method": "ik"}])
+    rewrite_json(run / "summary.json", cells=None, groups=[{"method": "ik"}])
+    rewrite_digests(run)
     assert kept(load_results(run)) == kept(side(methods=METHODS))
     summary = json.loads((write_baseline(run, "main") / "summary.json").read_text())
     assert (summary["groups"], kept(load_results("main"))) == ([{"method": "ik"}], kept(load_results(run)))
@@ -137,10 +139,6 @@ def test_what_is_no_side_is_told(run: Path, baselines: Path, tmp_path: Path) -> 
         load_results("empty")
 
 
-def changed(path: Path, **content: Any) -> None:
-    path.write_text(json.dumps({**json.loads(path.read_text()), **content}))
-
-
 def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
     with CellIndex(run) as index, index._db as db:
         db.execute("UPDATE cells SET scenario = NULL")
@@ -151,7 +149,7 @@ def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "why"),
     [
-        ({"schema": 2}, "schema 2; expected schema 1"),
+        ({"schema": 1}, "schema 1; expected schema 2"),
         ({"schema": None}, "schema None"),
         ({"parts": {}}, "damaged"),
         ({"cells": [1]}, "damaged"),
@@ -162,7 +160,7 @@ def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
     ],
 )
 def test_damaged_baselines_are_refused(run: Path, baselines: Path, damage: dict[str, Any], why: str) -> None:
-    changed(write_baseline(run, "main") / "cells.json", **damage)
+    rewrite_json(write_baseline(run, "main") / "cells.json", **damage)
     with pytest.raises(BadFile, match=why):
         load_results("main")
 
@@ -171,17 +169,19 @@ def test_damaged_baselines_are_refused(run: Path, baselines: Path, damage: dict[
 def test_damaged_cells_are_refused(run: Path, baselines: Path, field: str, value: object) -> None:
     path = write_baseline(run, "main") / "cells.json"
     cells = json.loads(path.read_text())["cells"]
-    changed(path, cells=[{**cells[0], field: value}, *cells[1:]])
+    rewrite_json(path, cells=[{**cells[0], field: value}, *cells[1:]])
     with pytest.raises(BadFile, match=f"{field} is"):
         load_results("main")
 
 
-@pytest.mark.parametrize(("metric", "value"), [("mpjpe_mm", float("nan")), ("frames_matched", None), ("fps", "fast")])
+@pytest.mark.parametrize(
+    ("metric", "value"), [("mpjpe_mm", float("nan")), ("frames_matched", None), ("fps", "fast"), ("mpjpe_mm", -3.0)]
+)
 def test_damaged_figures_are_refused(run: Path, baselines: Path, metric: str, value: object) -> None:
     path = write_baseline(run, "main") / "cells.json"
-    content = json.loads(path.read_text())
+    content = read_json(path)
     content["cells"][0]["metrics"][content["metrics"].index(metric)] = value
-    changed(path, **content)
+    rewrite_json(path, **content)
     with pytest.raises(BadFile, match=f"{metric} is"):
         load_results("main")
 

@@ -78,10 +78,27 @@ def test_a_result_beside_itself_differs_by_exactly_nothing() -> None:
     assert comparison.circumstances == ()
 
 
-def test_six_clips_tell_and_five_do_not() -> None:
-    for clips, outcome in ((6, Outcome.PASS), (5, Outcome.NOT_COMPARABLE)):
-        assert found(side(clips=clips), side(clips=clips)).outcome == outcome
-    assert "too few clips: 5, of at least 6" in found(side(clips=5), side(clips=5)).why
+def test_six_clips_show_a_difference_and_five_do_not() -> None:
+    for clips, outcome in ((6, Outcome.REGRESSED), (5, Outcome.NOT_COMPARABLE)):
+        assert found(side(methods={"ik": 2.0}, clips=clips), side(clips=clips)).outcome == outcome
+    assert "too few clips: 5, of at least 6" in found(side(methods={"ik": 2.0}, clips=5), side(clips=5)).why
+
+
+@pytest.mark.parametrize("clips", [1, 2, 5])
+def test_identical_results_are_the_same_on_few_clips(clips: int) -> None:
+    comparison = found(side(clips=clips), side(clips=clips))
+    assert comparison.outcome == Outcome.PASS
+    (line,) = [line for line in comparison.differences if line.gated]
+    assert (line.verdict, line.low, line.high, line.p) == ("same", 0.0, 0.0, None)
+
+
+def test_nearly_equal_results_are_the_same_on_five_clips_and_not_on_one() -> None:
+    """The margin is 2 %; errors differ by up to 0.3 %, with either sign."""
+    times = [1.003, 0.998, 1.001, 0.999, 1.002]
+    assert found(side(methods={"ik": times}, clips=5), side(clips=5)).outcome == Outcome.PASS
+    assert found(side(methods={"ik": times[:1]}, clips=1), side(clips=1)).outcome == Outcome.NOT_COMPARABLE
+    times[0] = 1.1
+    assert found(side(methods={"ik": times}, clips=5), side(clips=5)).outcome == Outcome.NOT_COMPARABLE
 
 
 def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:

@@ -53,11 +53,21 @@ def test_many_clips_are_drawn_as_exactly_as_few_are_counted(
     lines = [rng.normal(shift, 1.0, 15) for shift in (0.1, 0.4, 0.7)]
     exact = [sign_flip_p(line) for line in lines]
     monkeypatch.setattr(significance, "_EXACT_CLIPS", 10)
-    significance._sign_flips.cache_clear()
+    significance._cached_sign_flips.cache_clear()
     drawn = [sign_flip_p(line) for line in lines]
-    significance._sign_flips.cache_clear()
+    significance._cached_sign_flips.cache_clear()
     np.testing.assert_allclose(drawn, exact, atol=4.0 * np.sqrt(0.25 / 20_000))
     assert sign_flip_p(np.ones(40)) == 1 / 20_001
+
+
+def test_flips_that_are_drawn_in_parts_are_those_that_are_drawn_at_once(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = rng.normal(0.2, 1.0, 80)
+    flips = 1.0 - 2.0 * generator(0, "sign flips", 80).integers(0, 2, (20_000, 80))
+    at_least = np.count_nonzero(np.abs(flips @ line) >= abs(line.sum()))
+    assert sign_flip_p(line) == pytest.approx((1 + at_least) / 20_001, abs=1e-12)
+    np.testing.assert_array_equal(np.concatenate(list(significance._sign_flips(80))), flips)
 
 
 def test_least_p_is_that_of_all_on_one_side(rng: np.random.Generator) -> None:
@@ -103,12 +113,62 @@ def told(difference: Floats, margin: float, beside: int = 0) -> SignificanceResu
         (0.5 * SCATTER, "cannot tell", "contains zero"),
         (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few clips: 5, of at least 6"),
         (np.zeros(0), "cannot tell", "too few clips: 0"),
+        (np.zeros(5), "same", "no clip differs"),
+        (np.zeros(1), "same", "no clip differs"),
+        (np.array([1e-9]), "cannot tell", "too few clips: 1"),
+        (0.02 * SCATTER[:5], "same", "within the margin"),
+        (0.1 + 0.01 * SCATTER[:3], "same", "within the margin"),
+        (0.5 * SCATTER[:5], "cannot tell", "too few clips: 5"),
+        (np.array([0.1999, 0.1998]), "cannot tell", "too few clips: 2"),
     ],
 )
 def test_verdicts(difference: Floats, verdict: str, why: str) -> None:
     found = told(difference, margin=0.2)
     assert (found.verdict, found.p is None) == (verdict, len(difference) < 6)
     assert why in found.why
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_few_clips_are_seldom_called_the_same_when_the_true_difference_is_the_margin(count: int) -> None:
+    """The interval is exact for normal differences, so that 2.5 % of them lie below a true mean at the margin."""
+    draws = generator(1, "few clips", count).normal(1.0, 0.2, (4_000, count))
+    same = [result.verdict == "same" for result in decide_verdicts(list(draws), [1.0] * len(draws))]
+    assert np.mean(same) == pytest.approx(0.025, abs=4.0 * np.sqrt(0.025 * 0.975 / len(draws)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "least", "most"),
+    [("normal", 0.02, 0.03), ("t3", 0.01, 0.03), ("worse tail", 0.06, 0.13), ("better tail", 0.0, 0.02)],
+)
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_how_often_few_clips_are_called_the_same_at_the_margin(
+    name: str, least: float, most: float, count: int
+) -> None:
+    """The table of docs/studies.md; the standard deviation is a tenth of the margin."""
+    rng, shape = generator(1, "at the margin", name, count), (20_000, count)
+    draws = {
+        "normal": rng.normal(size=shape),
+        "t3": rng.standard_t(3, size=shape) / np.sqrt(3.0),
+        "worse tail": rng.exponential(size=shape) - 1.0,
+        "better tail": 1.0 - rng.exponential(size=shape),
+    }[name]
+    results = decide_verdicts(list(1.0 + 0.1 * draws), [1.0] * len(draws))
+    assert least <= np.mean([result.verdict == "same" for result in results]) <= most
+
+
+def test_the_interval_of_few_clips_by_hand() -> None:
+    """Mean 2, standard deviation 1, three values: t = 4.302653 (tables), so 2 -+ 4.302653 / sqrt(3)."""
+    found = told(np.array([1.0, 2.0, 3.0]), 9.0)
+    assert (found.low, found.high) == pytest.approx((2.0 - 2.484138, 2.0 + 2.484138), abs=1e-5)
+
+
+def test_lines_that_are_not_decided_count_in_the_correction() -> None:
+    clear: Floats = 1.0 + 0.01 * np.arange(8.0)
+    lines = [clear, *[np.array([1.0, -1.0] * 4)] * 9]
+    (alone,), (among,) = decide_verdicts([clear], [0.1]), decide_verdicts(lines, [0.1] * 10, [0])
+    assert (alone.verdict, among.verdict) == ("worse", "cannot tell")
+    assert among == decide_verdicts(lines, [0.1] * 10)[0]
 
 
 def test_six_clips_can_show_nothing_among_many_lines() -> None:

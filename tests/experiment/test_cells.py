@@ -14,6 +14,7 @@ from harness.experiment.cells import CellOutcome, ClipTask, clear_caches, run_ta
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario, variants
 from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
 from harness.results.storage import Cell
+from tests.results.rewrite import read_json, write_json
 
 SMALL = Scenario(
     name="small",
@@ -107,8 +108,8 @@ def test_cells_of_an_older_version_are_refused(
 ) -> None:
     _, found = whole
     folder = write_cell(tmp_path, next(iter(found.values())))
-    content = json.loads((folder / "cell.json").read_text())
+    content = read_json(folder / "cell.json")
     del content["scenario"]
-    (folder / "cell.json").write_text(json.dumps(content))
+    write_json(folder / "cell.json", content)
     with pytest.raises(BadFile, match=r"'scenario'.*expected a cell of this version.*Delete the cell's folder"):
         read(folder)

@@ -12,8 +12,8 @@ from harness.core.humanoid24 import BONES, standard_skeleton, unpack
 from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import run_method
 from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.method_run import run_method
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
@@ -22,7 +22,6 @@ from harness.reconstruct.methods.ik import PREVIOUS
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
 from harness.simulate.components.white_noise import WhiteNoise
-from harness.stream.inputs import make_inputs
 
 SCENARIO = Scenario(
     name="small",
@@ -171,6 +170,5 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
 
 
 def _estimated(setting: ClipEvaluation, method: Method) -> Floats:
-    seen = make_inputs("pos+ori", setting.simulation.stations)
     fitted = setting.fit_method(method, "dynamic_map")
-    return run_method(fitted, setting.performer_calibration.calibration, setting.simulation, seen).qpos
+    return run_method(fitted, setting.performer_calibration.calibration, setting.simulation.frames).qpos

@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
-from harness.experiment.cells import run_method
+from harness.experiment.method_run import run_method
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenario import find_scenario
 from harness.experiment.score_recording import RecordingScore, find_playback, format_score_table, score_methods
@@ -18,7 +18,6 @@ from harness.score.score import score_estimate
 from harness.stream.codec import commands
 from harness.stream.codec.reader import WireFormat
 from harness.stream.emulator.device import Device
-from harness.stream.inputs import make_inputs
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.stream.wire import frames_equal
@@ -87,9 +86,7 @@ def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: 
     simulation = played.simulation
     for one in judged:
         fitted = played.clip_evaluation.fit_method(registry.resolve(one.method), one.method)
-        qpos, status, _, step_ms, *_ = run_method(
-            fitted, simulation.calibration, simulation, make_inputs("pos+ori", simulation.stations)
-        )
+        qpos, status, _, step_ms, *_ = run_method(fitted, simulation.calibration, simulation.frames)
         assert not (status == Status.LOST).all()
         truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
         scores = score_estimate(played.body.skeleton, played.tracker.rate_hz, *truth)

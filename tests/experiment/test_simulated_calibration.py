@@ -15,8 +15,8 @@ from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
-from harness.experiment.cells import run_method
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
+from harness.experiment.method_run import run_method
 from harness.experiment.scenario import CalibrationSettings, Scenario, ScenarioMotion, load_scenario
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
@@ -33,7 +33,6 @@ from harness.report.run.text import run_table
 from harness.results.storage import read_cells, read_summary
 from harness.simulate.simulation import Simulation, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame
-from harness.stream.inputs import make_inputs
 from tests.joint_centres import joint_centres_m
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
@@ -124,7 +123,7 @@ def test_exact_knows_where_trackers_really_sit() -> None:
     off_m = np.linalg.norm(known.mount_m - setting().performer_calibration.calibration.mount_m, axis=1)
     assert off_m.min() > 0.002
     fitted = made.fit_method(PREVIOUS, "ik:previous")
-    qpos, *_ = run_method(fitted, known, made.simulation, make_inputs("pos+ori", known.stations))
+    qpos, *_ = run_method(fitted, known, made.simulation.frames)
     there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
     assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
 

@@ -5,21 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from harness.experiment.cells import run_method
+from harness.experiment.method_run import run_method
 from harness.experiment.reference_workload import FRAMES_PER_TIMING
 
 
 class Diary:
-    """A method, its session and the inputs, who write down what is asked of them."""
+    """A method and its session, who write down what is asked of them."""
 
     def __init__(self) -> None:
         self.seen: list[int] = []
 
     def begin(self, calibration: Any) -> "Diary":
         return self
-
-    def mask(self, frame: int) -> int:
-        return frame
 
     def step(self, frame: int) -> SimpleNamespace:
         self.seen.append(frame)
@@ -29,8 +26,8 @@ class Diary:
 def test_reference_work_lies_between_steps_and_the_step_after_it_is_not_timed() -> None:
     frames = 3 * FRAMES_PER_TIMING + 2
     diary: Any = Diary()
-    made: Any = SimpleNamespace(frames=range(frames))
-    qpos, status, _, step_ms, cpu_ms, reference_ms = run_method(diary, diary, made, diary)
+    shown: Any = range(frames)
+    qpos, status, _, step_ms, cpu_ms, reference_ms = run_method(diary, diary, shown)
     assert diary.seen == list(range(frames))
     np.testing.assert_array_equal(qpos[:, 0], np.arange(frames))
     assert len(status) == len(step_ms) == len(cpu_ms) == len(reference_ms) == frames

@@ -59,3 +59,12 @@ def test_a_device_that_sets_its_clock_anew_is_followed() -> None:
     assert clock.measured_s(frame(100.1, 50.1)) == pytest.approx(100.1)
     assert clock.measured_s(frame(100.2, 0.0)) == pytest.approx(100.2)
     assert clock.measured_s(frame(100.3, float("nan"))) == 100.3
+
+
+def test_the_host_time_never_steps_back_when_the_delay_shrinks() -> None:
+    """The first frames wait 180 ms in the host; then the wait ends at once."""
+    clock = HostClockEstimator()
+    delays_s = [0.180] * 5 + [0.005] * 20
+    found_s = [clock.measured_s(frame(100.0 + k / 75.0 + late, 50.0 + k / 75.0)) for k, late in enumerate(delays_s)]
+    assert (np.diff(found_s) > 0.0).all()
+    assert found_s[-1] == pytest.approx(100.0 + 24 / 75.0 + 0.005, abs=1e-3)

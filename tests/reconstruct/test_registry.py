@@ -110,34 +110,6 @@ def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPa
     assert registry.resolve("ik") == Ik()
 
 
-def test_the_source_hash_follows_a_method_into_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The hash covers a file and the modules in its folder that it imports, recursively; no other files."""
-    monkeypatch.syspath_prepend(tmp_path)
-    for name, text in {
-        "split_method": (
-            "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n"
-        ),
-        "split_options": "from split_numbers import *\n",
-        "split_numbers": "SIGMA = 1.0\n",
-        "split_stranger": "",
-    }.items():
-        (tmp_path / f"{name}.py").write_text(text)
-    mine = registry.resolve("split_method:Mine")
-    before = registry.source_hash(mine)
-    (tmp_path / "split_stranger.py").write_text("OTHER = 2.0\n")
-    assert registry.source_hash(mine) == before
-    (tmp_path / "split_numbers.py").write_text("SIGMA = 2.0\n")
-    assert registry.source_hash(mine) != before
-
-
-def test_the_source_hash_tells_methods_and_what_they_wrap_apart() -> None:
-    hashes = {
-        registry.source_hash(registry.resolve(n)) for n in ("ik", "mean_pose", "best_match", "mean_pose+ik", "ik+ik")
-    }
-    assert len(hashes) == 5
-    assert registry.source_hash(Ik()) == registry.source_hash(GAUSSIAN)
-
-
 def test_options_are_the_fields_of_a_method() -> None:
     method = registry.resolve("ik[loss.robust=false]")
     assert method == replace(Ik(), loss=replace(Ik().loss, robust=False), name="ik[loss.robust=false]")
@@ -197,6 +169,28 @@ class Plain:
     """A method without options."""
 
     name, summary, needs_examples, fit = "plain", "nothing", False, None
+
+
+def test_an_installed_package_is_imported_only_when_its_method_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = EntryPoint("theirs", "no_such_package.methods:Theirs", "harness.methods")
+    monkeypatch.setattr(registry, "entry_points", lambda group: [broken])
+    assert registry.resolve("ik") == Ik()
+    with pytest.raises(BadInput, match=r"theirs \(no_such_package.methods:Theirs\) cannot be made"):
+        registry.resolve("theirs")
+
+
+@pytest.mark.parametrize(
+    ("name", "inside"),
+    [
+        ("ik:previous[jump_m=1.0]+ik", True),
+        ("harness.reconstruct.methods.ik:Ik", True),
+        ("upright:Upright", False),
+        ("harness2:Ik+ik", False),
+        ("no_such_name", False),
+    ],
+)
+def test_built_in_methods_are_told_by_name(name: str, inside: bool) -> None:
+    assert registry.is_built_in(name) is inside
 
 
 def test_the_same_draws_whatever_the_options() -> None:

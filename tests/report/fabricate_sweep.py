@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from harness.core.files import content_key
 from harness.core.seeds import generator
+from harness.results.digests import write_result_json
 from harness.results.index import CellIndex
+from harness.results.manifest import Manifest
 
 COMMAND = "harness sweep made_up.toml --out results/made_up"
 FAILURE = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b> pose & no plan"
@@ -59,6 +62,10 @@ def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
         index.record_outcomes([(name, row["key"], "") for name, row in zip(finished, rows, strict=True)])
         index.record_outcomes(failed)
         index.note(kind="sweep", name="made_up", command=COMMAND)
+        index.write_digest({})
+    for row in rows:
+        (out / "cells" / str(row["key"])).mkdir(parents=True)
+    write_result_json(out / "manifest.json", Manifest({}, {}, {}).as_dict())
     return out
 
 
@@ -69,7 +76,7 @@ def _row(
     error = plan.methods[method] * worse * float(np.exp(0.2 * rng.normal()))
     known = method not in plan.unmeasured
     return {
-        "key": f"{scenario}_{seed}_{method}_{clip}_{len(str(varied))}_{worse:.3f}_{hash_free(varied)}",
+        "key": content_key([scenario, seed, method, clip, varied]),
         "scenario": scenario,
         "clip": f"{scenario}_p1_{clip + 1:02}",
         "behaviour": scenario,
@@ -87,8 +94,3 @@ def _row(
         "step_p50_ms": 0.5,
         "coverage": 1.0 if known else 0.2,
     }
-
-
-def hash_free(varied: Mapping[str, Any]) -> str:
-    """A cell key that is the same in every process."""
-    return "".join(character for character in str(varied) if character.isalnum())

@@ -1,6 +1,5 @@
 """A placement study's findings survive their file, and a damaged file is refused with the reason."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import pytest
 from harness.errors import BadFile
 from harness.results.placement_findings import is_placement_findings, read_placement, write_placement
 from tests.report.fabricate_placement import made_up
+from tests.results.rewrite import read_json, write_json
 
 Damage = Callable[[dict[str, Any]], Any]
 
@@ -26,7 +26,7 @@ def test_findings_come_back_as_they_were_written(tmp_path: Path) -> None:
 
 def test_a_paper_is_no_placement(tmp_path: Path) -> None:
     path = tmp_path / "findings.json"
-    path.write_text('{"paper": "liu2011", "schema": 1}')
+    write_json(path, {"paper": "liu2011", "schema": 1})
     assert not is_placement_findings(path)
     with pytest.raises(BadFile, match="no key in findings called 'paper'"):
         read_placement(path)
@@ -47,8 +47,8 @@ def test_a_paper_is_no_placement(tmp_path: Path) -> None:
 def test_damage_is_named(tmp_path: Path, damage: Damage, said: str) -> None:
     path = tmp_path / "findings.json"
     write_placement(path, made_up(at_most=2))
-    content = json.loads(path.read_text())
+    content = read_json(path)
     damage(content)
-    path.write_text(json.dumps(content))
+    write_json(path, content)
     with pytest.raises(BadFile, match=said):
         read_placement(path)

@@ -1,7 +1,6 @@
 """The folder of a run: whole cells or none, the same run goes on, another is refused."""
 
 import csv
-import json
 import os
 import subprocess
 import sys
@@ -17,7 +16,9 @@ from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
 from harness.results.cell import as_row
+from harness.results.digests import file_digest
 from tests.results.finish import finish_run
+from tests.results.rewrite import read_json, rewrite_json, write_json
 
 MakeCell = Callable[..., storage.Cell]
 ISSUE_COLUMNS = (
@@ -96,7 +97,7 @@ def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: P
     assert mpjpe["frame_weighted"] == pytest.approx((300 * 10.0 + 100 * 50.0) / 400, rel=1e-5)
     assert method["metrics"]["step_p50_ms"]["frame_weighted"] == pytest.approx(2.0)
     assert (method["frames_matched"], method["frames_expected"]) == (400, 800)
-    assert json.loads((run_folder / "summary.json").read_text()) == to_json_types(content)
+    assert read_json(run_folder / "summary.json") == to_json_types(content)
 
 
 def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, make_cell: MakeCell) -> None:
@@ -191,12 +192,12 @@ def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
     run_folder: Path, make_cell: MakeCell, field: str, value: object
 ) -> None:
     folder = storage.write_cell(run_folder, make_cell())
-    content = json.loads((folder / "cell.json").read_text())
+    content = read_json(folder / "cell.json")
     if value is None:
         del content[field]
     else:
         content[field] = value
-    (folder / "cell.json").write_text(json.dumps(content))
+    write_json(folder / "cell.json", content)
     with pytest.raises(BadFile, match=folder.name):
         storage.read_cell(folder)
 
@@ -205,6 +206,7 @@ WRITE_FOR_EVER = """
 import dataclasses, itertools, pathlib, sys
 from harness.results import storage
 from harness.results.cell import as_row
+from harness.results.digests import file_digest
 run, key = pathlib.Path(sys.argv[1]), sys.argv[2]
 cell = storage.read_cell(run / "cells" / key)
 for n in itertools.count():
@@ -233,6 +235,7 @@ def test_a_kill_at_any_moment_leaves_whole_cells_only(run_folder: Path, make_cel
 def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
     folder = storage.write_cell(run_folder, make_cell())
     np.savez(folder / "frames.npz", time_s=np.array([{"a": 1}], dtype=object))
+    rewrite_json(folder / "cell.json", frames_sha256=file_digest(folder / "frames.npz", "", ""))
     with pytest.raises(BadFile, match="pickle"):
         storage.read_cell(folder)
 
@@ -246,8 +249,7 @@ def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
     key = make_cell().key
     storage.write_cell(run_folder, make_cell())
     content = finish_run(run_folder, keys=[key], planned=1) | change
-    text = json.dumps({name: value for name, value in content.items() if value is not None})
-    (run_folder / "summary.json").write_text(text)
+    write_json(run_folder / "summary.json", {name: value for name, value in content.items() if value is not None})
     with pytest.raises(BadFile, match=message):
         storage.read_summary(run_folder)
 
@@ -262,7 +264,7 @@ def test_a_run_without_an_index_is_refused_with_advice(run_folder: Path, make_ce
 def test_no_run_in_a_folder_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="harness run"):
         storage.read_cells(tmp_path)
-    with pytest.raises(BadFile, match="harness run"):
+    with pytest.raises(BadFile, match="the summary of a run"):
         storage.read_summary(tmp_path)
 
 
@@ -286,7 +288,7 @@ def test_a_manifest_survives_its_file_and_names_the_machine(run_folder: Path) ->
     assert back.circumstances["source_hash"] == manifests.source_hash()
     assert back.circumstances["packages"]["numpy"] == np.__version__
     assert back.circumstances["methods"] == ["ik"]
-    (run_folder / "manifest.json").write_text("{}")
+    write_json(run_folder / "manifest.json", {"seed": 1})
     with pytest.raises(BadFile, match="inputs"):
         manifests.Manifest.read(run_folder / "manifest.json")
 

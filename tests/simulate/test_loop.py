@@ -1,5 +1,7 @@
 """Endless takes: the first round equals the simulation, and the return ends where the take began."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,10 @@ from harness.core.motion import BodyMotion
 from harness.simulate.loop import simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.items import SHORT_LIST
+from harness.stream.codec.reader import FrameReader
+from harness.stream.emulator.device import Device
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)
@@ -24,6 +30,33 @@ def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, BodyMotion
         np.testing.assert_allclose(frame.measured_s, played.device_s[row], atol=1e-6)
         sound = frame.position_valid
         np.testing.assert_allclose(frame.position_m[sound], played.position_m[row][sound], atol=1e-6)
+
+
+def test_beyond_the_16_bit_range_device_and_simulation_agree(boxer: tuple[Body, BodyMotion]) -> None:
+    """The tracker hangs so high that the ankles are out of range: both give the same frames, and no wrong position."""
+    body, take = boxer
+    tracker = replace(TRACKER, items=SHORT_LIST, origin_m=(0.0, 0.0, 3.2))
+    played = simulate_loop(body, take, worn(), tracker, noise_preset("clean"), seed=3)
+    seen = simulate_tracker(body, take, worn(), tracker, noise_preset("clean"), seed=3)
+    device, reader = Device(played, now_s=0.0), FrameReader(seen.wire_format)
+    for station in seen.wire_format.characters.decode():
+        device.receive(f"O{station},{','.join(map(str, SHORT_LIST))}\r".encode(), 0.0)
+    device.receive(b"fuMZ\rC", 0.0)
+    sent = [message.data for message in device.messages(played.taken_s[played.take_frames - 1, -1]) if message.station]
+    frames = reader.feed_all(ByteCapture(b"".join(sent), np.array([sum(map(len, sent))]), np.array([0.0])))
+    assert len(frames) >= len(seen.frames) - 1
+    for row, (frame, simulated) in enumerate(zip(frames, seen.frames, strict=False)):
+        for name in ("measured_s", "position_m", "tracker_from_station", "position_valid", "orientation_valid"):
+            np.testing.assert_array_equal(getattr(frame, name), getattr(simulated, name))
+        inside = (np.abs(played.position_m[row]) < 3.0 - 3.0 / 8192).all(axis=1)
+        outside = (np.abs(played.position_m[row]) >= 3.0).any(axis=1)
+        assert frame.position_valid[inside].all()
+        assert not frame.position_valid[outside].any()
+        assert frame.orientation_valid.all()
+        valid = frame.position_valid
+        assert np.abs(frame.position_m[valid] - played.position_m[row][valid]).max(initial=0.0) < 3.0 / 8192
+    beyond = int((np.abs(played.position_m[: len(seen.frames)]) >= 3.0).any(axis=2).sum())
+    assert 0 < beyond <= seen.health["readings_out_of_range"] < 4 * len(seen.frames)
 
 
 def test_the_way_back_goes_on_from_the_end_to_the_beginning(boxer: tuple[Body, BodyMotion]) -> None:

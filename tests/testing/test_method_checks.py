@@ -236,8 +236,7 @@ class ModifiesExamples(Standing):
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> FittedTPose:
         for take in examples:
-            take.qpos.flags.writeable = True
-            take.qpos[:, :3] = 0.0
+            object.__setattr__(take, "qpos", np.zeros_like(take.qpos))
         return FittedTPose(self.session, body)
 
 

@@ -139,7 +139,8 @@ def _verdict_section(comparison: Comparison) -> Markup:
         "The interval is the bias-corrected and accelerated bootstrap over clips; its level is expanded for small "
         "numbers of clips. p comes from a permutation test that flips the signs of the clips' differences. Holm's "
         "method corrects it for all gated lines that differ in any clip. Fewer than "
-        f"{MIN_CLIPS} clips give the verdict cannot tell.",
+        f"{MIN_CLIPS} clips cannot show a difference. They can still show that the sides are the same; the interval is "
+        "then that of Student's t.",
         "If inputs differ, nothing is compared. The outcome is regressed if one gated line is worse. Otherwise it is "
         "incomplete if cells failed. Otherwise it is not comparable if cells have no partner, coverage differs or a "
         "gated line cannot be decided. Otherwise it is pass.",

@@ -21,7 +21,7 @@ MEANINGS: Mapping[Verdict, str] = {
     "the margin",
     "cannot tell": "none of the others: there are too few clips, or they vary too much for the margin",
     "better": "the conditions of worse hold in the other direction",
-    "same": "the 95 % interval lies within the margin",
+    "same": "the 95 % interval lies within the margin, or no clip differs",
 }
 OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",

@@ -30,3 +30,8 @@ def shorten(text: str, most: int) -> str:
 def describe_motion_source(source: str) -> str:
     """The name of a motion source, with a note if the motion is synthetic."""
     return source + (_SYNTHETIC_NOTE if "built-in" in source else "")
+
+
+def name_motion(source: str) -> str:
+    """A motion source in a sentence, such as "built-in motion" or "motion from cmu"."""
+    return "built-in motion" if "built-in" in source else f"motion from {source}"

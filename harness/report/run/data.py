@@ -11,7 +11,8 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.style import STYLES
-from harness.results.cell import Cell, cell_folder, varied_text
+from harness.results.cell import Cell, as_row, cell_folder, varied_text
+from harness.results.integrity import SUMMARY, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.results.summary import GROUP_KEYS
@@ -110,29 +111,40 @@ class RunData:
 
     def series_of(self, row: Row) -> str:
         """The series that a row of the summary belongs to."""
-        rows = self.full_summary["methods"]
-        parts = []
-        if len({r["inputs"] for r in rows}) > 1:
-            parts.append(str(row["inputs"]))
-        if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
-            parts.append(f"split {row['split']}")
-        if len({r["performer"] for r in rows}) > 1:
-            parts.append(f"{row['performer'] or 'no'} performer")
-        return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+        return series_name(row, self.full_summary["methods"])
 
     def cell(self, key: str) -> Cell:
         return read_cell(cell_folder(self.out, key))
 
 
 def read_run(out: Path) -> RunData:
-    """Read the run in `out` one cell at a time; BadFile if the folder holds no run or a damaged one."""
+    """Read the run in `out` one cell at a time; BadFile if the folder holds no run, or a damaged or edited one."""
+    check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
-    run = RunData(out, manifest, _last_varied(summary), (), summary)
-    keys = [str(row["key"]) for row in run.cells]
-    return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
+    run = RunData(out, manifest, last_varied(summary), (), summary)
+    return replace(run, traces=tuple(_trace(run, _cell_of_row(run, row)) for row in run.cells))
 
 
-def _last_varied(summary: Row) -> Row:
+def _cell_of_row(run: RunData, row: Row) -> Cell:
+    """The cell of a row of the summary; BadFile when they differ."""
+    cell = run.cell(str(row["key"]))
+    check_row(run.out / SUMMARY, row, as_row(cell))
+    return cell
+
+
+def series_name(row: Row, rows: Sequence[Row]) -> str:
+    """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary."""
+    parts = []
+    if len({r["inputs"] for r in rows}) > 1:
+        parts.append(str(row["inputs"]))
+    if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
+        parts.append(f"split {row['split']}")
+    if len({r["performer"] for r in rows}) > 1:
+        parts.append(f"{row['performer'] or 'no'} performer")
+    return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+
+
+def last_varied(summary: Row) -> Row:
     """The part of a summary with the last combination of varied values."""
     if not summary["cells"]:
         return summary

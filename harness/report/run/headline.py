@@ -1,21 +1,20 @@
 """The sentences that open the page of a run, and the facts below them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core.number_format import count_noun, format_share
-from harness.report.kit.text import describe_motion_source
+from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
+from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.results.reported_metrics import SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
 SequenceKey = tuple[str, str, int]
 """Behaviour, clip and seed."""
-_Errors = Mapping[str, Mapping[SequenceKey, float]]
-"""Series -> sequence -> error."""
 _MOST_UNMEASURED = 8
 """Metrics without a value that are listed one by one."""
 
@@ -25,7 +24,7 @@ class Headline:
     """What a run found, as plain text; the page escapes it."""
 
     sentence: str
-    best: str | None
+    lowest: str | None
     """The series with the lowest error; None when no series leads."""
     facts: Mapping[str, str]
     """Title -> text: motion, coverage, what was not measured."""
@@ -43,64 +42,26 @@ def build_headline(run: RunData) -> Headline:
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
-    measured = {name: errors for name in run.series if (errors := _by_sequence(run, name, PRIMARY_METRIC))}
-    if not measured:
+    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
+    rankings = describe_rankings(run.full_summary, name_motion(source))
+    if not rankings:
         return Headline(f"Nothing was measured: {_progress(run)}.", None, facts)
-    by_performer: dict[str, dict[str, dict[SequenceKey, float]]] = {}
-    for name, errors in measured.items():
-        by_performer.setdefault(_performer(run, name), {})[name] = errors
-    rankings = [_ranking(run, performer, errors) for performer, errors in by_performer.items()]
-    return Headline(" ".join(sentence for sentence, _ in rankings), rankings[0][1], facts)
+    sentences = [text for ranking, lowest in rankings for text in (ranking, *_positions(run, lowest))]
+    return Headline(" ".join(sentences), rankings[0][1], facts)
 
 
-def _ranking(run: RunData, performer: str, measured: _Errors) -> tuple[str, str | None]:
-    """The sentences about series with the same kind of performer, and which of them is best."""
-    shared = sorted(set.intersection(*(set(errors) for errors in measured.values())))
-    if not shared:
-        return f"{', '.join(measured)} share no measured sequence, so they are not ranked.", None
-    means = {name: float(np.mean([errors[k] for k in shared])) for name, errors in measured.items()}
-    order = sorted(means, key=lambda name: means[name])
-    best = order[0]
-    sequences = count_noun(len(shared), "sequence")
-    if len(shared) < max(map(len, measured.values())):
-        sequences = f"the {sequences} that all methods were measured on"
-    several = len({_performer(run, name) for name in run.series}) > 1
-    motion = _source(run) + (f" by {performer} performers" if several and performer else "")
-    setting = f", with {run.varied_label}" if run.varied_label else ""
-    start = f"{best} is best" if len(order) > 1 else best
-    sentences = [f"{start}: {means[best]:.2f}° mean joint-angle error on {sequences} of {motion}{setting}."]
-    sentences.append(_lead(measured, best, order[1], shared) if len(order) > 1 else "No other method was measured.")
-    return " ".join([*sentences, *_positions(run, order, shared)]), best
-
-
-def _performer(run: RunData, series: str) -> str:
-    """Whether the examples know the performers of a series, see `Cell.performer`."""
-    return next(str(row["performer"]) for row in run.summary["methods"] if run.series_of(row) == series)
-
-
-def _lead(measured: _Errors, best: str, second: str, shared: Sequence[SequenceKey]) -> str:
-    """The sentence on how much lower the best error is than the second."""
-    lowest, next_lowest = (np.array([measured[name][k] for k in shared]) for name in (best, second))
-    difference, wins = float(np.mean(next_lowest - lowest)), int(np.sum(lowest < next_lowest))
-    if difference < 0.005:
-        return f"{second}, the next, has the same error."
-    how_often = "" if len(shared) == 1 else f", and lower on {wins} of {len(shared)} sequences"
-    share = format_share(difference / next_lowest.mean())
-    return f"That is {difference:.2f}° ({share}) less than {second}, the next{how_often}."
-
-
-def _positions(run: RunData, order: Sequence[str], shared: Sequence[SequenceKey]) -> list[str]:
-    """The sentence on joint positions; none where they were not measured."""
-    errors = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in order}
-    means = {name: np.mean([e[k] for k in shared]) for name, e in errors.items() if set(shared) <= set(e)}
-    best = order[0]
-    if best not in means:
+def _positions(run: RunData, series: str | None) -> list[str]:
+    """The sentence on joint positions, of the series that have the same sequences; none where not measured."""
+    errors = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in run.series}
+    shared = set(errors.get(series or "", {}))
+    means = {name: np.mean([e[k] for k in shared]) for name, e in errors.items() if shared and shared <= set(e)}
+    if series not in means:
         return []
     lowest = min(means, key=lambda name: means[name])
-    if lowest == best:
+    if lowest == series:
         also = ", also the lowest" if len(means) > 1 else ""
-        return [f"Its mean joint position error is {means[best]:.0f} mm{also}."]
-    return [f"{lowest} has the lowest joint position error: {means[lowest]:.0f} mm ({best}: {means[best]:.0f} mm)."]
+        return [f"Its mean joint position error is {means[series]:.0f} mm{also}."]
+    return [f"{lowest} has the lowest joint position error: {means[lowest]:.0f} mm ({series}: {means[series]:.0f} mm)."]
 
 
 def _by_sequence(run: RunData, series: str, metric: str) -> dict[SequenceKey, float]:
@@ -110,11 +71,6 @@ def _by_sequence(run: RunData, series: str, metric: str) -> dict[SequenceKey, fl
         for row in run.cells
         if run.series_of(row) == series and row[metric] is not None
     }
-
-
-def _source(run: RunData) -> str:
-    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
-    return "built-in motion" if "built-in" in source else f"motion from {source}"
 
 
 def _motion(run: RunData) -> str:

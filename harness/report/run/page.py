@@ -119,7 +119,7 @@ def _worst_section(content: RunContent) -> Markup:
     head = ["method", *metrics]
     caption = "The two seconds with the largest mean of each metric: mean, clip and time."
     summary = html_table(Table(head, rows), caption, label="worst two seconds")
-    key = tag("p", "The best method in its worst two seconds. ", _colour_key())
+    key = tag("p", "The method with the lowest error, in its worst two seconds. ", _colour_key())
     strips = [_film_strip(strip) for strip in content.strips if strip.picture.is_file()]
     links = bullet_list([tag("a", path.name, href=path.name) for path in content.movies], class_=None)
     movies = join(tag("h3", "Movies"), links) if links else None

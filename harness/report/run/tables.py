@@ -8,9 +8,11 @@ import numpy as np
 from harness.core.number_format import count_noun, format_number, format_share
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
+from harness.report.kit.ranking import BOLD_NOTE
 from harness.report.kit.table import NOT_MEASURED_CELL, count_note, html_table, stacked_cell, statistic_cell
 from harness.report.kit.text import last_line
 from harness.report.run.data import Row, RunData, Trace
+from harness.report.run.ranking import ValuesByPerformer, best_series, values_by_performer
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -27,8 +29,6 @@ FOLDED_METRICS = (
 )
 """Metrics whose table by behaviour is folded."""
 _FRAME_COUNTS = ("matched", "expected", "held", "lost", "fallback", "bridged", "not_finite")
-_UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
-"""Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
 
 
 def summary_cell(statistics: Mapping[str, Any] | None, unit: str, *, column_n: int = 0) -> Markup:
@@ -40,39 +40,43 @@ def summary_cell(statistics: Mapping[str, Any] | None, unit: str, *, column_n: i
 
 def results_tables(run: RunData) -> Markup:
     """Methods by behaviour: a table for each metric, most of them folded."""
-    further = [behaviour_table(run, metric) for metric in FOLDED_METRICS]
+    columns = [*run.behaviours, *([None] if len(run.behaviours) > 1 else [])]
+    methods = run.full_summary["methods"]
+    values = {column: values_by_performer(run.cells, methods, column) for column in columns}
+    further = [behaviour_table(run, metric, values) for metric in FOLDED_METRICS]
     return join(
-        *(behaviour_table(run, metric) for metric in OPEN_METRICS), details("More metrics by behaviour", *further)
+        *(behaviour_table(run, metric, values) for metric in OPEN_METRICS),
+        details("More metrics by behaviour", *further),
     )
 
 
-def behaviour_table(run: RunData, metric: str) -> Markup:
-    """One metric: a row for each method, a column for each behaviour and, if there are several, one for all."""
+def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, ValuesByPerformer]) -> Markup:
+    """One metric: a row for each method, a column for each key of `values`: a behaviour, or None for all of them."""
     statistics: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
         statistics[run.series_of(row), str(row["behaviour"])] = row["metrics"][metric]
     for row in run.summary["methods"]:
         statistics[run.series_of(row), None] = row["metrics"][metric]
     unit = DEFINITIONS[metric].unit
-    columns = [*run.behaviours, *([None] if len(run.behaviours) > 1 else [])]
     counts, best = {}, {}
-    for column in columns:
+    for column in values:
         by_name = {name: statistics[name, column] for name in run.series if (name, column) in statistics}
         counts[column] = max((s["sequences"] for s in by_name.values()), default=0)
-        means = {name: s["mean"] for name, s in by_name.items() if s["mean"] is not None}
-        ranked = len(means) > 1 and metric not in _UNRANKED_METRICS
-        best[column] = min(means, key=lambda name: means[name]) if ranked else None
+        best[column] = best_series(values[column], metric)
 
     def cell(name: str, column: str | None) -> Markup:
         text = summary_cell(statistics.get((name, column)), unit, column_n=counts[column])
-        return tag("strong", text) if name == best[column] else text
+        return tag("strong", text) if name in best[column] else text
 
-    numbers = [count_note(counts[column]) for column in columns]
-    names = [(column or "all").replace("_", " ") for column in columns]
+    numbers = [count_note(counts[column]) for column in values]
+    names = [(column or "all").replace("_", " ") for column in values]
     titles = [join(name, n) for name, n in zip(names, numbers, strict=True)]
     notes = {run.series_of(row): _fallback_note(row) for row in run.summary["methods"]}
-    rows = [[join(name, notes.get(name)), *(cell(name, column) for column in columns)] for name in run.series]
-    caption = join(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
+    rows = [[join(name, notes.get(name)), *(cell(name, column) for column in values)] for name in run.series]
+    caption = join(
+        tag("b", f"{metric} [{unit}]"),
+        f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.{BOLD_NOTE if any(best.values()) else ''}",
+    )
     return html_table(Table(["method", *titles], rows), caption, label=metric)
 
 

@@ -5,8 +5,9 @@ from typing import Any
 
 from harness.core.number_format import format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
-from harness.report.kit.text import last_line
+from harness.report.kit.text import last_line, name_motion
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
+from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE, TABLE_COLUMNS
 
@@ -46,6 +47,7 @@ def run_table(summary: Mapping[str, Any]) -> str:
             *calibration_cost.text(summary),
             *recovery.text(summary),
             *expected_orders.text(summary),
+            *(text for text, _ in describe_rankings(summary, name_motion(str(cells[0]["motion_source"])))),
             finished,
             *failed,
         ]

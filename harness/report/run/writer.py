@@ -46,22 +46,22 @@ def write_run_page(
     headline = build_headline(run)
     windows = _windows(run)
     reader = cache(run.cell)
-    leading = [window for (series, _), window in windows.items() if series == headline.best]
+    leading = [window for (series, _), window in windows.items() if series == headline.lowest]
     strips = [_strip(run, group, plots) for group in group_overlapping(leading)]
     rendering = RenderProcess([_strip_job(reader(s.windows[0].key), run, s) for s in strips] if rendered else [])
     try:
         measured = [name for name in run.behaviours if any(t.scored.any() for t in run.traces if t.behaviour == name)]
         curves = parameter_effects.effect_charts(run)
         over_time = [charts.error_over_time(run, behaviour) for behaviour in measured]
-        per_joint = charts.error_per_joint(run, headline.best) if headline.best else None
+        per_joint = charts.error_per_joint(run, headline.lowest) if headline.lowest else None
         distribution = charts.error_distribution(run) if measured else None
-        player, no_player = _player(run, windows, headline.best, reader)
+        player, no_player = _player(run, windows, headline.lowest, reader)
         reason = rendering.finish() if rendered else "rendering was turned off"
     finally:
         rendering.close()
     missing = []
     if windows and not strips:
-        missing.append("Rendered pictures of the worst two seconds: there is no best method")
+        missing.append("Rendered pictures of the worst two seconds: no method has the lowest error")
     if strips and reason:
         missing.append(f"Rendered pictures of the worst two seconds: {reason}")
     if no_player:
@@ -127,11 +127,11 @@ def _job(output: Path, cell: Cell, rows: Ints, fps: float = 0.0, title: str = ""
 
 
 def _player(
-    run: RunData, windows: Mapping[tuple[str, str], WorstWindow], best: str | None, reader: Callable[[str], Cell]
+    run: RunData, windows: Mapping[tuple[str, str], WorstWindow], first: str | None, reader: Callable[[str], Cell]
 ) -> tuple[Markup, str]:
-    """The interactive view of every method's worst seconds, those of the best one first; or nothing and why."""
+    """The interactive view of every method's worst seconds, those of `first` before others; or nothing and why."""
     segments = []
-    for name in sorted(run.series, key=lambda name: name != best):
+    for name in sorted(run.series, key=lambda name: name != first):
         groups = group_overlapping(window for (series, _), window in windows.items() if series == name)
         segments += [_segment(run, name, group, reader(group[0].key)) for group in groups]
     return skeleton_player(standard_skeleton(), segments) if segments else (Markup(), "")

@@ -1,17 +1,21 @@
 """The finished cells of a sweep as columns, so that statistics of 100,000 cells are fast."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from harness.compare.margins import GATED_METRICS
 from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval
+from harness.compare.ranking import ClipValues
 from harness.core.arrays import Bools, Floats, Ints
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
 METRICS = (PRIMARY_METRIC, SECONDARY_METRIC, "mpjre_deg", "mpjpe_root_mm", "jitter_m_s3", "step_p50_ms", "coverage")
-"""Metrics that the page reads of each cell; summary.csv has all metrics."""
+"""Metrics that the page shows; summary.csv has all metrics."""
+READ_METRICS = tuple(dict.fromkeys((*METRICS, *GATED_METRICS)))
+"""Metrics that are read of each cell."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,14 @@ class SweepData:
         with np.errstate(invalid="ignore"):
             means: Floats = sums / counts
         return means
+
+    def clip_values(self, selected: Bools, metrics: Iterable[str]) -> ClipValues:
+        """Metric -> clip -> mean over the selected cells."""
+        means = {name: self.by_clip(name, selected) for name in metrics}
+        return {
+            name: {self.clips[n]: float(values[n]) for n in np.flatnonzero(np.isfinite(values))}
+            for name, values in means.items()
+        }
 
     def statistic(self, metric: str, selected: Bools, *, with_interval: bool = False) -> Statistic:
         """Statistic over clips; `with_interval` adds the 95 % interval if there are at least `MIN_CLIPS` clips."""

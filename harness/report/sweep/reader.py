@@ -8,17 +8,22 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Ints
-from harness.report.sweep.data import METRICS, SweepData, VariedKey
+from harness.report.sweep.data import READ_METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
+from harness.results.integrity import check_folder
 
 _GROUP_COLUMNS = ("inputs", "split", "performer")
 """Columns that are never pooled: each combination of them is a series of its own. The performer must be last."""
-_COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *METRICS)
+_COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *READ_METRICS)
 
 
 def read_sweep(out: Path) -> SweepData:
-    """The finished cells of the sweep in `out`, also while it runs; BadFile if `out` holds no sweep."""
+    """The finished cells of the sweep in `out`, also while it runs.
+
+    BadFile if `out` holds no sweep, or a damaged or edited one.
+    """
+    check_folder(out)
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
@@ -44,7 +49,7 @@ def collect_cells(
         codes.append((scenarios.code(scenario), clip_code, groups.code(group), values.code(varied)))
         figures.append(metrics)
     scenario_of, clip_of, series_of, varied_of = np.array(codes, dtype=np.int64).reshape(-1, 4).T
-    table = np.array(figures, dtype=np.float64).reshape(-1, len(METRICS))  # None becomes NaN
+    table = np.array(figures, dtype=np.float64).reshape(-1, len(READ_METRICS))  # None becomes NaN
     keys, value_of = _varied_keys([json.loads(text) for text in values.names], varied_of)
     return SweepData(
         name=name,
@@ -60,7 +65,7 @@ def collect_cells(
         series_of=series_of,
         clip_of=clip_of,
         value_of=value_of,
-        metrics=dict(zip(METRICS, table.T, strict=True)),
+        metrics=dict(zip(READ_METRICS, table.T, strict=True)),
     )
 
 

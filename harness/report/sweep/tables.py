@@ -1,11 +1,15 @@
 """Tables of a sweep's page: methods by scenario, methods by the values of a key, and failed cells."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from harness.compare.margins import GATED_METRICS
+from harness.compare.ranking import find_best
+from harness.core.arrays import Bools
 from harness.core.number_format import count_noun, format_number
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
+from harness.report.kit.ranking import BOLD_NOTE
 from harness.report.kit.table import count_note, html_table, statistic_cell
 from harness.report.sweep.charts import Curve
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
@@ -20,34 +24,49 @@ _LOWER_IS_BETTER = ("deg", "mm", "ms")
 def scenario_table(sweep: SweepData, metric: str) -> Markup:
     """A row for each series, a column for each scenario and, if there are several, one for all of them."""
     columns: list[int | None] = [*range(len(sweep.scenarios)), *([None] if len(sweep.scenarios) > 1 else [])]
-    rows = [[sweep.statistic(metric, sweep.select(c, s)) for c in columns] for s in range(len(sweep.series))]
+    series = range(len(sweep.series))
+    rows = [[sweep.statistic(metric, sweep.select(c, s)) for c in columns] for s in series]
     titles = ["all" if c is None else sweep.scenarios[c].replace("_", " ") for c in columns]
-    return _grid(
-        metric, "± standard deviation over clips, each averaged over varied values", titles, sweep.series, rows
-    )
+    over = "± standard deviation over clips, each averaged over varied values"
+    best = [_best_rows(sweep, metric, ((s, sweep.select(c, s)) for s in series)) for c in columns]
+    return _grid(metric, over, titles, sweep.series, rows, best)
 
 
 def value_table(sweep: SweepData, key: VariedKey, scenario: int, curves: Sequence[Curve], metric: str) -> Markup:
     """The numbers of a chart: a row for each curve, a column for each value of the key."""
     titles = [f"{key.name}={text}" for text in key.labels]
     over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or with its 95 % interval"
-    return _grid(metric, over, titles, [c.name for c in curves], [c.points for c in curves])
+    series = [curve.colour_index for curve in curves]
+    best = [
+        _best_rows(sweep, metric, ((s, sweep.select(scenario, s, **{key.name: value})) for s in series))
+        for value in range(len(titles))
+    ]
+    return _grid(metric, over, titles, [c.name for c in curves], [c.points for c in curves], best)
 
 
 def _grid(
-    metric: str, over: str, titles: Sequence[str], names: Sequence[str], statistics: Sequence[Sequence[Statistic]]
+    metric: str,
+    over: str,
+    titles: Sequence[str],
+    names: Sequence[str],
+    statistics: Sequence[Sequence[Statistic]],
+    best: Sequence[Collection[int]],
 ) -> Markup:
-    """A row for each name. A column's head has its number of clips; cells with fewer clips have their own."""
+    """A row for each name. A column's head has its number of clips; cells with fewer clips have their own.
+
+    `best` has the rows that are bold, for each column.
+    """
     columns = [[row[n] for row in statistics] for n in range(len(titles))]
     clips = [max((statistic.clips for statistic in column), default=0) for column in columns]
-    best = [_best_statistic(column, metric) for column in columns]
     head = ["method", *(join(title, count_note(n)) for title, n in zip(titles, clips, strict=True))]
     rows = [
-        [name, *(_cell(item, metric, best[n] is item, clips[n]) for n, item in enumerate(row))]
-        for name, row in zip(names, statistics, strict=True)
+        [name, *(_cell(item, metric, at in best[n], clips[n]) for n, item in enumerate(row))]
+        for at, (name, row) in enumerate(zip(names, statistics, strict=True))
     ]
     definition = DEFINITIONS[metric]
-    caption = join(tag("b", f"{metric} [{definition.unit}]"), f": {definition.text}. Mean {over}.")
+    caption = join(
+        tag("b", f"{metric} [{definition.unit}]"), f": {definition.text}. Mean {over}.{BOLD_NOTE if any(best) else ''}"
+    )
     return html_table(Table(head, rows), caption, label=metric)
 
 
@@ -74,11 +93,20 @@ def _failure_item(group: FailureGroup, command: str) -> Markup:
     return details(title, bullet_list(cells, class_=None), first, tag("pre", group.traceback), alone)
 
 
-def _best_statistic(column: Sequence[Statistic], metric: str) -> Statistic | None:
-    """The lowest of several means, for metrics whose lower values are better."""
-    means = {n: statistic.mean for n, statistic in enumerate(column) if statistic.mean is not None}
-    ranked = len(means) > 1 and DEFINITIONS[metric].unit in _LOWER_IS_BETTER
-    return column[min(means, key=lambda n: means[n])] if ranked else None
+def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]]) -> set[int]:
+    """The rows that are better than every other one, for each kind of performer; a row is a series and its cells."""
+    if DEFINITIONS[metric].unit not in _LOWER_IS_BETTER:
+        return set()
+    groups: dict[str, dict[int, Bools]] = {}
+    for n, (series, selected) in enumerate(rows):
+        groups.setdefault(sweep.performers[series], {})[n] = selected
+
+    def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
+        return find_best({str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}, metric)
+
+    # The gated metrics are read only where the lines of this metric alone leave a best row.
+    candidates = [cells for cells in groups.values() if best(cells, (metric,))]
+    return {int(row) for cells in candidates if (row := best(cells, (metric, *GATED_METRICS)))}
 
 
 def _cell(statistic: Statistic, metric: str, best: bool, column_clips: int) -> Markup:

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval
+from harness.compare.margins import GATED_METRICS
+from harness.compare.ranking import ClipValues, rank_methods
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_change_percent, format_number
+from harness.report.kit.ranking import describe_ranking
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -40,42 +42,21 @@ def progress_sentence(sweep: SweepData) -> str:
 
 def _best(sweep: SweepData) -> str:
     """The sentences on the best series, separately for known and new performers, which have different clips."""
-    measured = {name: sweep.by_clip(PRIMARY_METRIC, sweep.select(series=n)) for n, name in enumerate(sweep.series)}
-    measured = {name: means for name, means in measured.items() if np.isfinite(means).any()}
-    if not measured:
+    groups: dict[str, dict[str, ClipValues]] = {}
+    for n, (name, performer) in enumerate(zip(sweep.series, sweep.performers, strict=True)):
+        values = sweep.clip_values(sweep.select(series=n), GATED_METRICS)
+        if values[PRIMARY_METRIC]:
+            groups.setdefault(performer, {})[name] = values
+    if not groups:
         return "Nothing was measured." if len(sweep) else ""
-    groups: dict[str, dict[str, Floats]] = {}
-    for name, performer in zip(sweep.series, sweep.performers, strict=True):
-        if name in measured:
-            groups.setdefault(performer, {})[name] = measured[name]
     return " ".join(map(_best_of, groups.values()))
 
 
-def _best_of(by_clip: Mapping[str, Floats]) -> str:
-    """The series with the lowest mean on the clips that all were measured on; `by_clip` has (C,) errors of each."""
-    shared = np.all([np.isfinite(means) for means in by_clip.values()], axis=0)
-    clips = int(shared.sum())
-    if not clips:
-        return f"{list_first(list(by_clip))} share no measured clip, so they are not ranked."
-    errors = {name: float(means[shared].mean()) for name, means in by_clip.items()}
-    best, *others = sorted(errors, key=lambda name: errors[name])
-    start = f"{best}{' has the lowest error' if others else ''}: {_format_error(errors[best])} mean joint-angle error"
-    start += f" over {count_noun(clips, 'clip')}"
-    if not others:
-        return f"{start}."
-    second = others[0]
-    verdict = _describe_difference(by_clip[second][shared] - by_clip[best][shared])
-    return f"{start}. The next is {second} with {_format_error(errors[second])}; {verdict}."
-
-
-def _describe_difference(difference: Floats) -> str:
-    """Whether the difference (C,) between two series is established over clips."""
-    if len(difference) < MIN_CLIPS:
-        return "there are too few clips to establish a difference"
-    low, high = bootstrap_interval(difference)
-    if low <= 0.0 <= high:
-        return "the 95 % interval of the difference contains zero"
-    return f"it is worse by {format_number(low, unit_of(PRIMARY_METRIC))} to {_format_error(high)} (95 % interval)"
+def _best_of(values: Mapping[str, ClipValues]) -> str:
+    ranking = rank_methods(values, PRIMARY_METRIC)
+    if ranking is None:
+        return f"{list_first(list(values))} share no measured clip, so they are not ranked."
+    return describe_ranking(ranking, count_noun(len(ranking.clips), "clip"), _format_error)
 
 
 def describe_effect(sweep: SweepData, key: VariedKey) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.stream.codec.clock import TimeOrder
 from harness.stream.codec.readings import Readings, concatenate_readings
 from harness.stream.frame import TrackerFrame
 
@@ -39,8 +40,8 @@ class FrameAssembler:
     By the device's clock, a reading a period or more after the first of its frame belongs to the next frame. Where
     stamps are missing, the host's clock and 1.5 periods serve instead. A station number that does not increase in the
     middle of a period, or a stamp that steps back, shows a damaged record. The readings on both sides are then suspect,
-    since either may be the wrong one. Where stamps are missing, a station that is silent in round after round is no
-    sign of damage. A reading that is already `suspect` stays so.
+    since either may be the wrong one. A time that does not advance is removed. Where stamps are missing, a station that
+    is silent in round after round is no sign of damage. A reading that is already `suspect` stays so.
     """
 
     def __init__(self, stations: int, period_s: float) -> None:
@@ -50,6 +51,7 @@ class FrameAssembler:
         """Readings of the unfinished frame."""
         self._round, self._round_after = _RoundState(), _RoundState()
         """State before and after those readings."""
+        self._order = TimeOrder()
         self._received_s = _NEVER
         """When the latest closed frame was complete (host clock) [s]."""
 
@@ -157,6 +159,8 @@ class FrameAssembler:
             out[index] = column
             return out
 
+        measured_s = self._order.enforce(readings.measured_s, readings.station)
+        suspect = readings.suspect | (np.isnan(measured_s) & ~np.isnan(readings.measured_s))
         usable = readings.quality > 0.0
         position_valid = usable & np.isfinite(readings.position_m).all(axis=1)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -165,13 +169,13 @@ class FrameAssembler:
             quaternion = readings.tracker_from_station / length[:, None]
         columns = (
             self._received_times_s(readings, frame).tolist(),
-            to_frames(readings.measured_s),
+            to_frames(measured_s),
             to_frames(np.where(position_valid[:, None], readings.position_m, np.nan), 3),
             to_frames(np.where(orientation_valid[:, None], quaternion, np.nan), 4),
             to_frames(position_valid, missing=0.0) > 0.0,
             to_frames(orientation_valid, missing=0.0) > 0.0,
             to_frames(readings.quality, missing=0.0),
-            to_frames(readings.suspect, missing=0.0) > 0.0,
+            to_frames(suspect, missing=0.0) > 0.0,
         )
         return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 

@@ -16,6 +16,8 @@ SAVE, RESUME, SUSPEND, RESTART = b"\x0b", b"\x11", b"\x13", b"\x19"
 MILLISECONDS, MICROSECONDS, ZERO_CLOCK = b"MT\r\n", b"Mt\r\n", b"MZ\r\n"
 STATION_STATES, TRACKING, SYSTEM, GENLOCK, EMITTERS = b"l*\r\n", b"MP\r\n", b"MS\r\n", b"MG\r\n", b"MCF\r\n"
 
+BORESIGHT_AS_INTERSENSE, BORESIGHT_AS_FASTRAK = b"MBI\r\n", b"MBF\r\n"
+
 IMMEDIATE_LETTERS = b"PCcFfSUuW"
 """Letters that act at once at the start of a line."""
 CONTROL_CHARACTERS = SAVE + RESUME + SUSPEND + RESTART
@@ -63,6 +65,31 @@ def alignment(station: str, origin_cm: Sequence[float], on_x_cm: Sequence[float]
 def undo_alignment(station: str) -> bytes:
     """Command that resets the frame of a station."""
     return _line(f"R{station}")
+
+
+def query_geometry(station: str, letter: str) -> bytes:
+    """Command that queries alignment (`A`), mounting angles (`G`), boresight reference (`H`) or tip offset (`N`)."""
+    return _line(f"{letter}{station}")
+
+
+def set_geometry(station: str, letter: str, values: Sequence[float]) -> bytes:
+    """Command that sets mounting angles or boresight reference (`G`, `H`) [deg], or the tip offset (`N`) [cm]."""
+    return _line(f"{letter}{station}," + ",".join(f"{value:.3f}" for value in values))
+
+
+def query_prediction(station: str) -> bytes:
+    """Command that queries the prediction interval."""
+    return _line(f"Mp{station}")
+
+
+def query_sensitivity(station: str) -> bytes:
+    """Command that queries the sensitivity to rotation."""
+    return _line(f"MQ{station}")
+
+
+def query_station(station: str) -> bytes:
+    """Command that queries the station record: filter and compass."""
+    return _line(f"Ms{station}")
 
 
 def prediction(station: str, ahead_ms: int) -> bytes:

@@ -33,15 +33,16 @@ class ContinuousFrameReader:
         """True until the first bytes after a configuration."""
         self._device_s = 0.0
         """Latest device time of any frame [s]."""
-        self._totals = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets"), 0)
+        self._totals = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets", "out_of_range"), 0)
         """Counts of the earlier sessions."""
         self._frames = 0
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of sessions, frames, records, garbage bytes and clock resets."""
+        """Numbers of sessions, frames, records, garbage bytes, clock resets and positions beyond the list's range."""
         reader = self._reader
-        current = {} if reader is None else {name: getattr(reader, name) for name in self._totals if name != "sessions"}
+        names = [name for name in self._totals if name != "sessions"]
+        current = {} if reader is None else {name: int(np.sum(getattr(reader, name))) for name in names}
         return {"frames": self._frames} | {name: n + current.get(name, 0) for name, n in self._totals.items()}
 
     @property
@@ -55,13 +56,13 @@ class ContinuousFrameReader:
         return self._last_byte_s + SILENCE_PERIODS * self._period_s
 
     def begin_session(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
-        """Start a session: later bytes have this format, and the device's clock starts at zero.
+        """Start a session: later bytes have this format, and the device's clock starts at zero if `wire` says so.
 
         Returns the unfinished frame of the session before.
         """
         frames = self.finish()
         self._totals["sessions"] += 1
-        self._reader, self._period_s = FrameReader(wire), 1.0 / wire.rate_hz
+        self._reader, self._period_s = FrameReader(wire, now_s if wire.zeroed else None), 1.0 / wire.rate_hz
         self._last_byte_s, self._is_new = now_s, True
         return frames
 

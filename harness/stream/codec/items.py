@@ -22,7 +22,9 @@ STATION_CHARACTERS = b"123456789ABC"
 STANDARD_LIST = (40, 2, 11, 21, 1)
 """Quality, position, quaternion, time, CR LF: 38 bytes."""
 SHORT_LIST = (40, 18, 19, 21, 1)
-"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
+"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes. Positions have a range of 3 m."""
+FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
+"""Full scale of the 16-bit format (docs/is900.md 5.2) [m, deg]."""
 SINCE_FIRMWARE = {40: 4.13, 76: 4.26}
 """Firmware version that introduced an item (docs/is900.md 5.1)."""
 BITS_PER_BYTE = 10
@@ -138,3 +140,14 @@ def record_size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int =
 def terminator(items: tuple[int, ...]) -> bytes:
     """Return the fixed bytes at the end of a record: CR LF, a space, or b"" when the last item is not fixed."""
     return ITEMS[items[-1]].fixed if items else b""
+
+
+def position_range_m(items: tuple[int, ...]) -> float | None:
+    """Return the largest coordinate that a list can carry [m]; None where nothing limits it but the tracker."""
+    return FULL_SCALE_M if 18 in items and 2 not in items else None
+
+
+def describe_list(items: tuple[int, ...]) -> str:
+    """Return a list with its length, and with its range where it has one: `22 bytes, range 3 m`."""
+    range_m = position_range_m(items)
+    return f"{record_size(items)} bytes" + (f", range {range_m:g} m" if range_m else "")

@@ -13,7 +13,7 @@ from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.clock import ClockUnwrapper
 from harness.stream.codec.datagram_decoder import DatagramDecoder
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
-from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, position_range_m
 from harness.stream.codec.plausibility import PlausibilityCheck
 from harness.stream.codec.readings import Readings, decode_readings, has_quality
 from harness.stream.codec.records import RecordFormat, Table
@@ -34,6 +34,8 @@ class WireFormat:
     settings: RecordFormat = field(default_factory=RecordFormat)
     characters: bytes = b""
     """Characters of the stations on the wire, ascending; by default `1` for the first, and so on."""
+    zeroed: bool = True
+    """Whether the device's clock was set to zero when these records began."""
     datagrams: bool = False
     """Whether UDP packets carry the records, and not a serial line or TCP (docs/is900.md 9)."""
 
@@ -61,14 +63,17 @@ class FrameReader:
     does not.
     """
 
-    def __init__(self, wire: WireFormat) -> None:
+    def __init__(self, wire: WireFormat, zeroed_s: float | None = None) -> None:
+        """`zeroed_s` is the host time at which the device's clock was set to zero, if known [s]."""
         self.wire = wire
         self.records = 0
+        self.out_of_range: Ints = np.zeros(len(wire.stations), dtype=np.int64)
+        """(S,) number of records of each station whose position is beyond the range of the list."""
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
         self._decoder = _make_decoder(wire)
-        self._clock = ClockUnwrapper()
+        self._clock = ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
         self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
         self._has_stamps, self._has_quality = 21 in wire.items, has_quality(wire.items)
@@ -169,10 +174,13 @@ class FrameReader:
 
     def _readings(self, table: Table, received_s: Floats) -> Readings:
         raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
-        measured_s = self._clock.unwrap(raw.measured_s, received_s)
+        measured_s = self._clock.unwrap(raw.measured_s, received_s, raw.station)
         suspect = raw.suspect | np.isnan(measured_s) if self._has_stamps else raw.suspect
         quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
         position_m, quaternion = raw.position_m, raw.tracker_from_station
+        if position_range_m(self.wire.items):
+            beyond = np.isnan(position_m[:, 0]) & (quality > 0.0)
+            self.out_of_range += np.bincount(raw.station[beyond], minlength=len(self.wire.stations))
         return self._plausibility.mark_suspect(
             Readings(raw.station, received_s, measured_s, position_m, quaternion, quality, suspect)
         )

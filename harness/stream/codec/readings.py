@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.stream.codec.clock import MAX_STAMP_S
+from harness.stream.codec.items import FULL_SCALE_DEG, FULL_SCALE_M
 from harness.stream.codec.records import (
-    FULL_SCALE_DEG,
-    FULL_SCALE_M,
     RecordFormat,
     Table,
     from_yaw_pitch_roll_deg,
@@ -22,6 +21,8 @@ from harness.stream.codec.records import (
 
 MAX_DISTANCE_M = 20.0
 """An IS-900 tracks no farther from its origin; a larger distance is a damaged number [m]."""
+LAST_CODE = 1.0 - 4.0 / 32768.0
+"""Share of full scale of the last code of the 16-bit format; the first is -1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,8 @@ class Readings:
     measured_s: Floats
     """(N,) device clock [s]; NaN where the record has no usable stamp."""
     position_m: Floats
-    """(N, 3) in the tracker frame [m]; NaN when the list has none."""
+    """(N, 3) in the tracker frame [m]; NaN when the list has none, and where an axis is at an end of the list's range:
+    the station may be anywhere beyond."""
     tracker_from_station: Floats
     """(N, 4) as on the wire, nearly of unit length; NaN when the list has none."""
     quality: Floats
@@ -81,7 +83,8 @@ def decode_readings(table: Table, received_s: Floats, stations: bytes, settings:
     with np.errstate(invalid="ignore", over="ignore"):
         if name := next((n for n in names if n in _POSITION_DECODERS), ""):
             position_m = _POSITION_DECODERS[name](table[name], settings)
-            suspect |= ~(np.abs(position_m).max(axis=1, initial=0.0) < MAX_DISTANCE_M)
+            if name == "position":
+                suspect |= ~(np.abs(position_m).max(axis=1, initial=0.0) < MAX_DISTANCE_M)
         if convert := next((c for kind, c in _ORIENTATION_DECODERS.items() if kind in names), None):
             quaternion, sound = convert(table, settings)
             suspect |= ~sound
@@ -108,6 +111,12 @@ def _quality(table: Table, names: tuple[str, ...], count: int) -> Floats:
     if "measurement_quality" in names:
         return np.minimum(table["measurement_quality"] / 100.0, 1.0)
     return np.ones(count)
+
+
+def _positions_in_range_m(share: Floats) -> Floats:
+    """Convert shares of full scale (N, 3) to positions [m]; NaN where an axis has the first or the last code."""
+    saturated = np.any((share <= -1.0) | (share >= LAST_CODE), axis=1)
+    return np.where(saturated[:, None], np.nan, FULL_SCALE_M * share)
 
 
 def _nan_array(*shape: int) -> Floats:
@@ -161,7 +170,7 @@ _AXES = ("x_cosines", "y_cosines", "z_cosines")
 _ANGLES_DEG: Floats = np.array([180.01, 90.01, 180.01])
 _POSITION_DECODERS: dict[str, Callable[[Any, RecordFormat], Floats]] = {
     "position": lambda field, settings: field.astype(float) * settings.metres_per_unit,
-    "position_16": lambda field, settings: FULL_SCALE_M * unpack_14_bit(field),
+    "position_16": lambda field, settings: _positions_in_range_m(unpack_14_bit(field)),
 }
 _ORIENTATION_DECODERS: dict[str, Callable[[Table, RecordFormat], tuple[Floats, Bools]]] = {
     "quaternion": lambda table, settings: _check_quaternions(

@@ -11,13 +11,17 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
 from harness.stream.codec import ascii_records as text
-from harness.stream.codec.items import BLANK_STATUS, RECORD_HEAD, record_type, resolve_items
+from harness.stream.codec.items import (
+    BLANK_STATUS,
+    FULL_SCALE_DEG,
+    FULL_SCALE_M,
+    RECORD_HEAD,
+    record_type,
+    resolve_items,
+)
 
 Table = NDArray[Any]
 """Records (N,) of one output list, with a field for each item (`items.record_type`)."""
-
-FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
-"""Full scale of the 16-bit format (docs/is900.md 5.2) [m, deg]."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,10 @@ def to_bytes(items: tuple[int, ...], table: Table, settings: RecordFormat) -> by
 
 
 def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
-    """Pack values (N, k), -1 to 1 of full scale, into the two-byte form (N, 2k) (docs/is900.md 5.2)."""
+    """Pack values (N, k), -1 to 1 of full scale, into the two-byte form (N, 2k) (docs/is900.md 5.2).
+
+    Values beyond full scale become its first or last code.
+    """
     sixteen = np.clip(np.trunc(np.asarray(values) * 32768.0), -32768, 32767).astype(np.int64)
     fourteen = (sixteen >> 2) & 0x3FFF
     pairs = (

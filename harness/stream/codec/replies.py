@@ -147,6 +147,8 @@ class GeometryReply:
     @classmethod
     def parse(cls, text: str) -> "GeometryReply | None":
         count, width, _ = _GEOMETRY_COLUMNS.get(text[2:3], (0, 0, 0))
+        if text[2:3] == "N" and len(text) == 3 + 7 * count:  # the other width that the manual gives (section 14)
+            width = 7
         fields = [text[3 + k * width : 3 + (k + 1) * width] for k in range(count)]
         if not fields or len(text) != 3 + count * width or not all(_FLOAT.fullmatch(field) for field in fields):
             return None

@@ -18,6 +18,7 @@ from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import NoAnswer
 from harness.stream.driver.host import Host
+from harness.stream.driver.is900 import arrival_rate_hz
 from harness.stream.driver.rate_measurement import MIN_RECORDS, estimate_rate_hz
 from harness.stream.driver.transport import LineLost
 from harness.stream.frame import TrackerFrame
@@ -85,19 +86,28 @@ class Is900Broadcast:
         return "a broadcast"
 
     @property
+    def station_list(self) -> str:
+        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
+        return ", ".join(f"{c} {name}" for c, name in zip(self._wire.characters.decode(), self.stations, strict=True))
+
+    @property
+    def setup_note(self) -> str:
+        """What a person at the device should know of its set-up, in one line."""
+        return "a broadcast takes no commands: settings of other programs are as they were, and cannot be read"
+
+    @property
     def counts(self) -> dict[str, int]:
         """Numbers of `sessions`, `reconnects`, `frames`, `records`, `garbage_bytes` and `clock_resets` so far."""
         return self._reader.counts | {"reconnects": 0}
 
     def health(self) -> dict[str, float]:
-        """Return the counts, the present frame rate [Hz] and the time since the last packet [s]."""
-        recent_s = list(self._recent_s)
-        span_s = recent_s[-1] - recent_s[0] if len(recent_s) > 1 else 0.0
-        return {
-            **self.counts,
-            "rate_hz": (len(recent_s) - 1) / span_s if span_s > 0.0 else 0.0,
-            "silent_s": self._host.monotonic_s() - self._last_byte_s,
-        }
+        """Return the counts, the present frame rate [Hz] and the time since the last packet [s].
+
+        `rate_hz` is absent until enough frames have arrived to tell it.
+        """
+        rate_hz = arrival_rate_hz(list(self._recent_s))
+        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
+        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
 
     def wall_s(self, received_s: float) -> float:
         """Convert a time on the host's monotonic clock to seconds since 1970."""
@@ -192,6 +202,15 @@ class Is900Broadcast:
                 f"Port {self.port}: no packet of an IS-900 arrived in {self._timing.silent_s:g} s.",
                 "Switch the broadcast on (MEthUdp1), and listen at its port: udp://0.0.0.0:5001 hears the network.",
             )
+        if self.config.characters is not None:
+            asked = [1 + STATION_CHARACTERS.index(c) for c in self.config.characters.encode()]
+            if missing := sorted(set(asked) - set(numbers)):
+                raise BadInput(
+                    f"Port {self.port}: no packets of station {', '.join(map(str, missing))} arrive; "
+                    f"they are of {', '.join(map(str, numbers))}.",
+                    "Name one of these, or switch the missing one on.",
+                )
+            numbers = asked
         names = self.config.stations or tuple(chr(STATION_CHARACTERS[number - 1]) for number in numbers)
         if len(names) > len(numbers):
             raise BadInput(
@@ -207,6 +226,7 @@ class Is900Broadcast:
             items=DATAGRAM_LIST if has_time else tuple(code for code in DATAGRAM_LIST if code != 21),
             settings=DATAGRAM_FORMAT,
             characters=bytes(STATION_CHARACTERS[number - 1] for number in numbers[: len(names)]),
+            zeroed=False,
             datagrams=True,
         )
 

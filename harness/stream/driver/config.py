@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, record_type
+from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, position_range_m, record_type
+from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.records import RecordFormat
 
 QUALITY_ITEMS = (40, 76)
@@ -29,6 +30,10 @@ class DriverConfig:
     """Station names: the first is the first active station of the device, and so on. None takes all, named by their
     characters.
     """
+    characters: str | None = None
+    """Characters of the device's stations that these names belong to, ascending, such as "13". None takes the first
+    active ones.
+    """
     rate_hz: float | None = None
     """Rounds per second of the device, if known. None takes the rate that the device reports, or else measures it."""
     baud: int | None = None
@@ -37,6 +42,12 @@ class DriverConfig:
     """Whether the heading of every station is set to zero at its present direction during configuration."""
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
+    keep_settings: bool = False
+    """Whether the device keeps what other programs have set: tip offsets, alignments, mounting angles, filters and
+    boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
+    """
+    reach_m: float | None = None
+    """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
     quality: Literal["record", "mp"] = "record"
     """Where lost stations show: "record" in items 40 and 76, "mp" in the replies to `MP`, polled once a second."""
 
@@ -49,12 +60,23 @@ class DriverConfig:
                 f"The output list {_join_commas(self.items)} has no item 40, so a lost station would not show.",
                 "Add 40 to it, or use quality 'mp' (--quality mp).",
             )
+        range_m = position_range_m(self.items)
+        if range_m is not None and self.reach_m is not None and self.reach_m >= range_m:
+            raise BadInput(
+                f"The output list {_join_commas(self.items)} carries positions up to {range_m:g} m from the tracker's "
+                f"origin on each axis, but the stations reach {self.reach_m:.2f} m.",
+                f"Use a list with item 2, such as --items {_join_commas(STANDARD_LIST)} (the default). "
+                "If the line is then too slow, use fewer stations or a lower rate.",
+            )
         if self.rate_hz is not None and not 0.0 < self.rate_hz <= 1000.0:
             raise BadInput(f"A rate of {self.rate_hz} Hz is not possible.", "An IS-900 runs at up to 180 Hz.")
         if self.baud is not None and self.baud <= 0:
             raise BadInput(f"{self.baud} baud is not possible.", f"An IS-900 uses {_join_commas(BAUD_RATES)}.")
         if self.stations is not None and len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {_join_commas(self.stations)}: a name occurs twice.", "Give each its own name.")
+
+        if self.characters is not None:
+            WireFormat(self.stations or (), 1.0, self.items, characters=self.characters.encode("ascii", "replace"))
 
     @property
     def settings(self) -> RecordFormat:

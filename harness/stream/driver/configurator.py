@@ -113,7 +113,8 @@ class DeviceConfigurator:
 
     def _check_capacity(self, stations: int, rate_hz: float) -> None:
         """Raise BadInput when the line cannot carry this many stations at this rate."""
-        check_capacity(self._port, self._baud, stations, self._items, rate_hz, self._poll_hz)
+        reach_m = self._config.reach_m
+        check_capacity(self._port, self._baud, stations, self._items, rate_hz, self._poll_hz, reach_m)
 
     def _is_saturated(self, stations: int, rate_hz: float) -> bool:
         """Whether the line has almost no capacity left at this rate."""

@@ -82,7 +82,7 @@ class DeviceConnection:
             data += self.receive(left_s)
         return data
 
-    def collect(self) -> bytes:
+    def listen_until_silence(self) -> bytes:
         """Return what arrives until `quiet_s` of silence: the first byte within `answer_s`, all within twice that."""
         began_s, data = self._host.monotonic_s(), b""
         silent_from_s = began_s
@@ -112,6 +112,15 @@ class DeviceConnection:
                     return reply
         last, self._partial = parse_reply(self._partial), b""  # very old firmware omits CR LF (docs/is900.md 6.2)
         return last if isinstance(last, reply_type) else None
+
+    def collect(self, queries: bytes, count: int) -> list[ParsedReply]:
+        """Send queries and return the next `count` replies, or fewer when no more arrive in time."""
+        self.send(queries)
+        replies: list[ParsedReply] = []
+        until_s = self._host.monotonic_s() + self.timing.answer_s
+        while len(replies) < count and (left_s := until_s - self._host.monotonic_s()) > 0.0:
+            replies += self._replies(self.receive(left_s))
+        return replies
 
     def _replies(self, data: bytes) -> list[ParsedReply]:
         *lines, partial = (self._partial + data).split(b"\n")

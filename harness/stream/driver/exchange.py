@@ -58,7 +58,7 @@ def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exch
     command = parse_command(text)
     sent = command.line if command.immediate else command.line + b"\r\n"
     line.send(sent)
-    received = b"" if sent == commands.STREAM else line.collect()
+    received = b"" if sent == commands.STREAM else line.listen_until_silence()
     return Exchange(text, sent, received, decode_answers(received, wire))
 
 
@@ -89,7 +89,8 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
         seconds_per_tick=1e-6 if system is not None and system.microseconds else 1e-3,
         binary=status.binary,
     )
-    return WireFormat(states.stations, rate_hz, items.pop(), settings, "".join(states.stations).encode())
+    characters = "".join(states.stations).encode()
+    return WireFormat(states.stations, rate_hz, items.pop(), settings, characters, zeroed=False)
 
 
 def decode_answers(data: bytes, wire: WireFormat | None) -> tuple[Answer, ...]:

@@ -9,13 +9,15 @@ from types import TracebackType
 from harness.errors import BadInput
 from harness.stream.codec import commands
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
+from harness.stream.codec.items import STANDARD_LIST, position_range_m
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.replies import OutputList, StatusRecord
+from harness.stream.codec.replies import Emitter, OutputList, StatusRecord
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.configurator import DeviceConfigurator
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
 from harness.stream.driver.host import Host
+from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
 from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
 from harness.stream.driver.transport import LineLost
 from harness.stream.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
@@ -24,6 +26,12 @@ from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, N
 
 _RATE_WINDOW_FRAMES = 50
 """Number of frames over which the present frame rate is computed."""
+MAX_EMITTERS = 200
+"""More emitters than any constellation has."""
+_TOGETHER_S = 1e-6
+"""Frames of one read get times that differ by less than this [s]."""
+_SHORTEST_RATE_WINDOW_S = 0.2
+"""Shortest time over which it is computed [s]; USB adapters deliver frames in bursts 0.016 s apart."""
 
 
 class Is900:
@@ -57,17 +65,21 @@ class Is900:
         self._frames: deque[TrackerFrame] = deque()
         self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
         self._line_lock, self._closing = threading.RLock(), threading.Event()
-        self._streaming = False
+        self._streaming = self._closed = False
         self._last_byte_s = self._tracked_s = self._zeroed_s = self._host.monotonic_s()
         self._reconnects = 0
         detected = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = detected.line, detected.baud, detected.status
         self._stations = StationSelection("", (), "")
+        self._found: SessionSettings | None = None
         try:
-            self._stations = select_stations(port, self._line, self.config.stations)
+            self._stations = select_stations(port, self._line, self.config.stations, self.config.characters)
             if self._stations.others:
                 restore_stations(port, self._line, self._stations)
+            self._found = read_settings(self._line, self._stations.characters, self._status)
+            self._report_settings(self._found)
             self._wire = self._configure(self._status, previous_hz=None)
+            self._report_room(self._wire)
         except LineLost as lost:
             self.close()
             raise NoAnswer(f"Port {port}: {lost.why} during configuration.", "Check the cable and try again.") from lost
@@ -101,19 +113,32 @@ class Is900:
         return self._status.identification
 
     @property
+    def station_list(self) -> str:
+        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
+        return ", ".join(f"{c} {name}" for c, name in zip(self._stations.characters, self.stations, strict=True))
+
+    @property
+    def setup_note(self) -> str:
+        """What a person at the device should know of its set-up, in one line."""
+        if self.config.keep_settings:
+            return "settings of other programs are kept: see the events"
+        note = f"boresight of station {', '.join(self._stations.characters)} undone: it cannot be read or put back"
+        unreadable = self._found.unreadable if self._found else ()
+        return note + (f"; nor can {', '.join(unreadable)}, now at their defaults" if unreadable else "")
+
+    @property
     def counts(self) -> dict[str, int]:
         """Numbers of `sessions`, `reconnects`, `frames`, `records`, `garbage_bytes` and `clock_resets` so far."""
         return self._reader.counts | {"reconnects": self._reconnects}
 
     def health(self) -> dict[str, float]:
-        """Return the counts, the present frame rate [Hz] and the time since the last byte [s]."""
-        recent_s = list(self._recent_s)
-        span_s = recent_s[-1] - recent_s[0] if len(recent_s) > 1 else 0.0
-        return {
-            **self.counts,
-            "rate_hz": (len(recent_s) - 1) / span_s if span_s > 0.0 else 0.0,
-            "silent_s": self._host.monotonic_s() - self._last_byte_s,
-        }
+        """Return the counts, the present frame rate [Hz] and the time since the last byte [s].
+
+        `rate_hz` is absent until enough frames have arrived to tell it.
+        """
+        rate_hz = arrival_rate_hz(list(self._recent_s))
+        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
+        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
 
     def wall_s(self, received_s: float) -> float:
         """Convert a time on the host's monotonic clock to seconds since 1970."""
@@ -137,20 +162,59 @@ class Is900:
                 raise
 
     def close(self) -> None:
-        """Stop the device and end every iteration. May be called from any thread, and more than once."""
-        if self._closing.is_set():
-            return
+        """Stop the device, put its settings back and end every iteration.
+
+        May be called from any thread, and more than once. It returns when the device has its settings.
+        """
         self._closing.set()
         with self._line_lock:
-            line = self._line
+            if self._closed:
+                return
+            self._closed, line = True, self._line
             line.closing = lambda: False
             try:
-                with contextlib.suppress(LineLost):
-                    line.stop()
-                    for station in self._stations.others:
-                        line.send(commands.switch_station(station, True))
+                try:
+                    self._leave(line)
+                except KeyboardInterrupt:  # an impatient person: the device gets its settings back all the same
+                    self._leave(line)
+                    raise
             finally:
                 line.transport.close()
+
+    def _leave(self, line: DeviceConnection) -> None:
+        """Stop the device and give it the settings and stations that it had, as far as the line still works."""
+        found, config = self._found, self.config
+        keep, aligned = config.keep_settings, config.alignment is not None
+        is_back = False
+        with contextlib.suppress(LineLost):
+            line.stop()
+            is_back = found is not None and put_back(line, found, keep, aligned, config.boresight)
+            for station in self._stations.others + self._stations.woken:
+                line.send(commands.switch_station(station, station in self._stations.others))
+            # A port that is closed may drop bytes that have not left it, so wait until the device has answered.
+            is_back = is_back and line.ask(commands.STATUS, StatusRecord, self._timing.answer_s) is not None
+        if found is not None and (text := found.describe()) and not keep:
+            self._report("settings", f"{'put back' if is_back else 'not put back, the device is gone'}: {text}")
+
+    def _report_room(self, wire: WireFormat) -> None:
+        """Report emitters that are farther away than the list can carry: stations below them will be, too."""
+        range_m = position_range_m(wire.items)
+        if range_m is None:
+            return
+        replies = self._line.collect(commands.EMITTERS, MAX_EMITTERS)
+        reach_m = max(
+            (abs(x) for reply in replies if isinstance(reply, Emitter) for x in reply.position_m), default=0.0
+        )
+        if reach_m >= range_m:
+            items = ",".join(map(str, STANDARD_LIST))
+            text = f"emitters are up to {reach_m:.2f} m from the tracker's origin, the list carries {range_m:g} m"
+            self._report("out of range", f"{text}: use a list with item 2, as {items}")
+
+    def _report_settings(self, found: SessionSettings) -> None:
+        """Report what other programs left in the device."""
+        if text := found.describe():
+            kept = "kept, as asked" if self.config.keep_settings else "at defaults for this session, then put back"
+            self._report("settings", f"settings of another program: {text}; {kept}")
 
     def __enter__(self) -> "Is900":
         return self
@@ -239,8 +303,13 @@ class Is900:
 
     def _configure(self, status: StatusRecord, previous_hz: float | None) -> WireFormat:
         """Configure the device. Boresight is set only the first time, when no rate is known yet."""
+        first = previous_hz is None
+        if not self.config.keep_settings:
+            characters = self._stations.characters
+            found = self._found if first and self._found else read_settings(self._line, characters, status)
+            set_defaults(self.port, self._line, found, undo_boresight=first or not self.config.boresight)
         configurator = DeviceConfigurator(self.port, self._baud, self._line, status, self.config)
-        return configurator.configure(self._stations, self.config.boresight and previous_hz is None, previous_hz)
+        return configurator.configure(self._stations, self.config.boresight and first, previous_hz)
 
     def _start(self) -> None:
         """Set the device's clock to zero, then send `C`: records between the two would carry the old clock."""
@@ -308,3 +377,13 @@ class Is900:
             if self._closing.is_set():
                 raise DriverClosed
             self._host.sleep(min(left_s, self._timing.poll_s))
+
+
+def arrival_rate_hz(received_s: list[float]) -> float | None:
+    """Frames per second of frames received at these times [s]; None for too short a time.
+
+    Frames that arrived together with the first are left out: nothing tells how long they waited.
+    """
+    later = sum(1 for at_s in received_s if at_s - received_s[0] > _TOGETHER_S)
+    span_s = received_s[-1] - received_s[0] if received_s else 0.0
+    return later / span_s if span_s >= _SHORTEST_RATE_WINDOW_S else None

@@ -27,6 +27,16 @@ class Tracker(TrackerStream, Protocol):
         ...
 
     @property
+    def station_list(self) -> str:
+        """Characters of the device's stations, with their names."""
+        ...
+
+    @property
+    def setup_note(self) -> str:
+        """What a person at the device should know of its set-up, in one line."""
+        ...
+
+    @property
     def counts(self) -> dict[str, int]:
         """Numbers of sessions, reconnections, frames, records, bytes of garbage and clock resets so far."""
         ...

@@ -18,13 +18,20 @@ class StationSelection:
     names: tuple[str, ...]
     others: str
     """Active stations without a name. They are switched off while the driver runs, since they would load the line."""
+    woken: str = ""
+    """Selected stations that were off. They are switched off again at the end."""
 
 
-def select_stations(port: str, line: DeviceConnection, names: tuple[str, ...] | None) -> StationSelection:
-    """Select the first active stations, as many as there are names. Raises BadInput when the device has fewer.
+def select_stations(
+    port: str, line: DeviceConnection, names: tuple[str, ...] | None, characters: str | None = None
+) -> StationSelection:
+    """Select the stations with these characters, or the first active ones, as many as there are names.
 
-    A device that does not report its stations is assumed to have the named ones.
+    Raises BadInput when the device lacks one. A device that does not report its stations is assumed to have the named
+    ones.
     """
+    if names is not None and characters is not None:
+        return _select_mapped(port, line, names, characters)
     active = _query_active(port, line, STATION_CHARACTERS.decode()[: len(names or ())])
     if not active:
         raise BadInput(f"Port {port}: no station of the device is active.", "Plug one in, or switch it on: l1,1.")
@@ -37,6 +44,24 @@ def select_stations(port: str, line: DeviceConnection, names: tuple[str, ...] | 
             "program may have switched stations off.",
         )
     return StationSelection(active[: len(names)], names, active[len(names) :])
+
+
+def _select_mapped(port: str, line: DeviceConnection, names: tuple[str, ...], characters: str) -> StationSelection:
+    """Select the stations with these characters; one that is off is switched on."""
+    before = active = _query_active(port, line, characters)
+    for character in characters:
+        if character not in before:
+            line.send(switch_station(character, True))
+    if not set(characters) <= set(before):
+        active = _query_active(port, line, characters)
+    if missing := [f"{c} ({name})" for c, name in zip(characters, names, strict=True) if c not in active]:
+        free = [c for c in active if c not in characters]
+        raise BadInput(
+            f"Port {port}: the device has no station {', '.join(missing)}; it has {', '.join(active) or 'none'}.",
+            f"Plug it in, or name another one{': free are ' + ', '.join(free) if free else ''}.",
+        )
+    others = "".join(c for c in active if c not in characters)
+    return StationSelection(characters, names, others, "".join(c for c in characters if c not in before))
 
 
 def restore_stations(port: str, line: DeviceConnection, stations: StationSelection) -> str:

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from harness.stream.codec.items import STANDARD_LIST, position_range_m
 from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.codec.replies import OutputList, ParsedReply, StatusRecord, parse_reply
 from harness.stream.driver.config import DriverTiming
@@ -48,6 +49,8 @@ class Watchdog:
         self._complaints: dict[str, float] = {}
         """Differences found in replies, and when [s]."""
         self._connected = False
+        self._beyond: set[str] = set()
+        """Stations that were reported as out of range."""
 
     def pause(self) -> None:
         """Data stop flowing."""
@@ -93,7 +96,7 @@ class Watchdog:
             return []
         if bytes_arrived:
             self._last_byte_s = now_s
-        diagnoses = self._check_garbage(now_s, reader)
+        diagnoses = self._check_garbage(now_s, reader) + self._check_range(reader)
         diagnoses += self._check_silence(now_s)
         while reader.replies:
             diagnoses += self._check_reply(self._wire, parse_reply(reader.replies.popleft().line), now_s)
@@ -117,6 +120,18 @@ class Watchdog:
         if min(now_s - self._garbage_began_s, now_s - self._asked_s) > self._timing.stalled_s:
             diagnoses.append(self._ask(now_s))  # garbage continues: check the output list
         return diagnoses
+
+    def _check_range(self, reader: FrameReader) -> list[Diagnosis]:
+        """Report each station once, however often its position is beyond the range of the list."""
+        names = reader.wire.stations
+        beyond = [names[row] for row in np.flatnonzero(reader.out_of_range) if names[row] not in self._beyond]
+        if not beyond:
+            return []
+        self._beyond.update(beyond)
+        range_m, items = position_range_m(reader.wire.items), ",".join(map(str, STANDARD_LIST))
+        where = f"station {', '.join(beyond)} is farther than {range_m:g} m from the tracker's origin on an axis"
+        text = f"{where}: such positions are not valid. Use a list with item 2, as {items}"
+        return [Diagnosis("none", "out of range", text)]
 
     def _check_silence(self, now_s: float) -> list[Diagnosis]:
         elapsed_s, timing = now_s - self._last_record_s, self._timing

@@ -21,19 +21,22 @@ def record_port(
     seconds: float | None = None,
     log: Callable[[str], None] = lambda line: None,
     progress: Callable[[str], None] = lambda line: None,
-) -> None:
+) -> dict[str, int]:
     """Let a device stream until Ctrl-C, or for `seconds`, and record everything that passes over its line.
 
-    `log` receives the messages that deserve a line of their own, `progress` the text of the progress line. Raises
-    BadInput when there is no device, and BadFile when the recording cannot be written; blocks written before are kept.
+    `log` receives the messages that deserve a line of their own, `progress` the text of the progress line. Returns the
+    counts of the driver; none when it ended before the device was set up. Raises BadInput when there is no device, and
+    BadFile when the recording cannot be written; blocks written before are kept.
     """
 
     def report_event(event: LineEvent) -> None:
         log(event.text)
 
+    counts: dict[str, int] = {}
     with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=report_event) as device:
-        names = ", ".join(f"{number} {name}" for number, name in enumerate(device.stations, 1))
-        log(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
+        name = device.identification or "a device"
+        log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
+        log(device.setup_note)
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:
             end.start()
@@ -46,12 +49,16 @@ def record_port(
         finally:
             end.cancel()
             progress("")
+            counts = device.counts
+    return counts
 
 
 def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
+    beyond = f", {health['out_of_range']:.0f} positions out of range" if health["out_of_range"] else ""
     tracked = int((frame.position_valid | frame.orientation_valid).sum())
+    rate = f", {health['rate_hz']:.1f} Hz" if "rate_hz" in health else ""
     return (
-        f"{health['frames']:.0f} frames, {health['rate_hz']:.1f} Hz, {tracked} of {len(device.stations)} stations "
-        f"tracked, {1e-3 * writer.counts[RECEIVED]:.0f} kB"
+        f"{health['frames']:.0f} frames{rate}, {tracked} of {len(device.stations)} stations "
+        f"tracked{beyond}, {1e-3 * writer.counts[RECEIVED]:.0f} kB"
     )

@@ -199,8 +199,9 @@ class RecordingWriter:
             )
         self._stations = wire.stations
         content = asdict(wire) | {"characters": wire.characters.decode("latin-1")}
-        if not wire.datagrams:
-            del content["datagrams"]  # earlier versions refuse a key that they do not know
+        for name, usual in (("zeroed", True), ("datagrams", False)):
+            if content[name] is usual:
+                del content[name]  # earlier versions refuse a key that they do not know
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.files import read_json, to_json_types, write_json
+from harness.core.files import to_json_types
 from harness.errors import HarnessError, was_interrupted
 from harness.experiment import engine
 from harness.experiment.cells import ProgressCallback
@@ -18,6 +18,7 @@ from harness.experiment.scenario import Scenario, variants
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
+from harness.results.digests import read_result_json, write_result_json
 from harness.results.storage import open_folder, read_summary
 
 _IDENTITY_FILE = "study.json"
@@ -58,12 +59,16 @@ class PaperStudy:
         """Result of `measure` in JSON types, cached on disk until the source of the package changes."""
         path = self.out / "measured" / f"{name}.json"
         if path.is_file():
-            cached = read_json(path, "a cached measurement of a study")
+            cached = _read_measurement(path)
             if cached.get("source_hash") == manifest.source_hash() and "value" in cached:
                 return cached["value"]
         path.parent.mkdir(exist_ok=True)
-        write_json(path, {"value": measure(), "source_hash": manifest.source_hash()})
-        return read_json(path, "a cached measurement of a study")["value"]
+        write_result_json(path, {"value": measure(), "source_hash": manifest.source_hash()})
+        return _read_measurement(path)["value"]
+
+
+def _read_measurement(path: Path) -> dict[str, Any]:
+    return read_result_json(path, "a cached measurement of a study", "Delete it and give the command again.")
 
 
 @lru_cache(maxsize=16)
@@ -77,7 +82,8 @@ def open_study(out: Path, identity: Mapping[str, Any]) -> None:
     """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
 
     def difference(path: Path) -> str:
-        stored, given = read_json(path, "the identity of a study"), to_json_types(identity)
+        advice = "Restore it from a copy, or name another folder with --out."
+        stored, given = read_result_json(path, "the identity of a study", advice), to_json_types(identity)
         return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
 
     open_folder(out, _IDENTITY_FILE, identity, "study", difference)

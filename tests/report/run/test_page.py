@@ -10,12 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.compare.comparison import compare_runs
 from harness.errors import BadFile
 from harness.report.kit import render_process, skeleton_player
 from harness.report.kit.style import COLOURS
 from harness.report.run.data import WORST_METRICS, read_run
 from harness.report.run.headline import build_headline
+from harness.report.run.tables import results_tables
+from harness.report.run.text import run_table
 from harness.report.run.writer import movie_fps, write_run_page
+from harness.results.storage import read_summary
 from tests.report.fabricate import METHODS, Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$"
@@ -40,18 +44,71 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     heading = re.search(r"<h1>(.*?)</h1>", page)
     assert heading is not None
     assert page.index("<h1>") < page.index("<table")
-    assert heading[1].startswith("best_match+ik is best: ")
+    assert heading[1].startswith("best_match+ik has the lowest mean joint-angle error, ")
     assert "on 2 sequences of built-in motion" in heading[1]
-    assert "lower on 2 of 2 sequences" in heading[1]
+    others = "ik, best_match, mean_pose"
+    assert f"Cannot tell whether it is better than {others}: too few clips: 2, of at least 6." in heading[1]
+    assert "<td><strong>" not in page
+    assert "Bold: " not in page
 
 
 def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None:
     rows = json.loads((run_folder / "summary.json").read_text())["cells"]
     means = {name: np.mean([row["joint_angle_mean_deg"] for row in rows if row["method"] == name]) for name in METHODS}
-    first, second = sorted(means.values())[:2]
-    sentence = build_headline(read_run(run_folder)).sentence
-    assert f"{first:.2f}° mean" in sentence
-    assert f"{second - first:.2f}° ({100 * (second - first) / second:.0f} %) less than ik, the next" in sentence
+    assert f"error, {min(means.values()):.2f}° on" in build_headline(read_run(run_folder)).sentence
+
+
+@pytest.fixture(scope="module")
+def ten_clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run in which one method is better than two that are alike."""
+    plan = Plan(behaviours=("walking",), methods={"poor": 4.0, "good": 1.0, "other": 4.0}, takes=10, duration_s=2.0)
+    return fabricate(tmp_path_factory.mktemp("ten") / "run", plan)
+
+
+def test_headline_bold_cells_terminal_and_comparison_agree(ten_clips: Path) -> None:
+    """Where a method is best, the comparison of two says so, and its cells alone are bold."""
+    page = write_run_page(ten_clips, rendered=False).read_text(encoding="utf-8")
+    rows = json.loads((ten_clips / "summary.json").read_text())
+    errors = {row["method"]: row["metrics"]["joint_angle_mean_deg"]["mean"] for row in rows["methods"]}
+    poor = min(("poor", "other"), key=lambda name: errors[name])
+    heading = re.search(r"<h1>(.*?)</h1>", page)
+    assert heading is not None
+    less = f"That is {errors[poor] - errors['good']:.2f}° ({100 * (1 - errors['good'] / errors[poor]):.0f} %) less than"
+    assert heading[1].startswith(f"good is best: {errors['good']:.2f}° mean joint-angle error on 10 sequences of ")
+    assert f"{less} {poor}, the next, and lower on 10 of 10 sequences." in heading[1]
+    assert "good is best: " in run_table(read_summary(ten_clips))
+    for other in ("poor", "other"):
+        line = compare_runs(ten_clips, methods=(other, "good")).differences[0]
+        assert (line.metric, line.verdict) == ("joint_angle_mean_deg", "better")
+    bold = re.findall(r"<td><strong>([\d.]+)", page)
+    assert f"{errors['good']:.2f}" in bold
+    assert f"{errors['poor']:.2f}" not in bold
+    assert "Mean ± sd over n sequences. Bold: better than every other method" in page
+
+
+def test_methods_that_cannot_be_told_apart_are_not_ranked(ten_clips: Path) -> None:
+    line = compare_runs(ten_clips, methods=("poor", "other")).differences[0]
+    assert line.verdict == "cannot tell"
+    summary = read_summary(ten_clips)
+    for name in ("methods", "behaviours", "cells"):
+        summary[name] = [row for row in summary[name] if row["method"] != "good"]
+    run = replace(read_run(ten_clips), summary=summary, full_summary=summary)
+    lowest, other = run.ranked
+    sentence = build_headline(run).sentence
+    assert sentence.startswith(f"{lowest} has the lowest mean joint-angle error, ")
+    assert f"Cannot tell whether it is better than {other}: {line.why}." in sentence
+    assert "<strong>" not in results_tables(run)
+
+
+def test_identical_methods_are_the_same(tmp_path: Path) -> None:
+    """Two names of the same code on five clips."""
+    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 1.0}, takes=5, duration_s=2.0))
+    summary = read_summary(out)
+    for name in ("methods", "behaviours", "cells"):
+        summary[name] = [{**row, "method": method} for method in ("ik", "copy") for row in summary[name]]
+    sentence = build_headline(replace(read_run(out), summary=summary, full_summary=summary)).sentence
+    assert "The same within the margin: copy." in sentence
+    assert "best" not in sentence
 
 
 def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) -> None:
@@ -65,8 +122,8 @@ def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) ->
 def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> None:
     run = read_run(run_folder)
     cells = [row for row in run.cells if (row["method"] == "ik") == (row["behaviour"] == "walking")]
-    found = build_headline(replace(run, summary={**run.summary, "cells": cells}))
-    assert found.best is None
+    found = build_headline(replace(run, full_summary={**run.summary, "cells": cells}))
+    assert found.lowest is None
     assert found.sentence.endswith("share no measured sequence, so they are not ranked.")
 
 
@@ -168,8 +225,8 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
     for row in rows:
         assert f" {row['metrics']['joint_angle_mean_deg']['mean']:.2f} " in said
     last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
-    assert f"ik is best: {last:.2f}° mean joint-angle error on 1 sequence" in said
-    assert "of built-in motion, with components.echo.share=0.1. That" in said
+    assert f"ik has the lowest mean joint-angle error, {last:.2f}° on 1 sequence" in said
+    assert "of built-in motion, with components.echo.share=0.1. Cannot tell" in said
     assert {trace.key for trace in read_run(out).traces} == {
         row["key"] for row in read_run(out).full_summary["cells"][-2:]
     }
@@ -205,7 +262,7 @@ def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
         write_run_page(fabricate(tmp_path / "run", replace(plan, performers=("known", "new"))), rendered=False)
     )
     for kind in ("known", "new"):
-        assert f"ik ({kind} performer) is best: " in said
+        assert f"ik ({kind} performer) has the lowest mean joint-angle error, " in said
         assert f"on 1 sequence of built-in motion by {kind} performers" in said
 
 

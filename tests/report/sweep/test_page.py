@@ -24,7 +24,7 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     select_curves,
 )
-from harness.report.sweep.data import METRICS, Statistic, VariedKey
+from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
 from harness.report.sweep.page import write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.text import text
@@ -58,11 +58,8 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
-    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map has the lowest error: ")
-    assert re.search(
-        r"over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$",
-        said,
-    )
+    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
+    assert re.search(r"on 14 clips\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14", said)
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -144,8 +141,8 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
         (Plan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")), "6 of 6 cells finished. Nothing was measured."),
         (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to run."),
         (Plan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
-        (Plan(performers=("known", "new")), "dynamic_map (known) has the lowest error: "),
-        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest error: "),
+        (Plan(performers=("known", "new")), "dynamic_map (known) has the lowest mean joint-angle error, "),
+        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
     ],
 )
 def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
@@ -159,7 +156,7 @@ def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path)
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
-    assert sentence(sweep).count("has the lowest error") == 2
+    assert sentence(sweep).count("has the lowest mean joint-angle error") == 2
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
@@ -171,8 +168,23 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
-    assert sentence(read_sweep(few)).endswith("there are too few clips to establish a difference.")
-    assert sentence(read_sweep(alike)).endswith("the 95 % interval of the difference contains zero.")
+    assert sentence(read_sweep(few)).endswith(
+        "Cannot tell whether it is better than local_pca, ik: too few clips: 5, of at least 6."
+    )
+    assert sentence(read_sweep(alike)).endswith("the interval contains zero and exceeds the margin.")
+    for out in (few, alike):
+        assert "<td><strong>" not in write_sweep_page(out).read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Path) -> None:
+    """Six clips of each scenario are too few for 4 lines, as 4 * 2 / 2^6 is above 0.05; the 12 of both are enough."""
+    plan = Plan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=6)
+    page = write_sweep_page(fabricate_sweep(tmp_path, plan)).read_text(encoding="utf-8")
+    sweep = read_sweep(tmp_path)
+    over_all = sweep.statistic(PRIMARY_METRIC, sweep.select(series=sweep.series.index("dynamic_map"))).mean
+    table = page.split(f'aria-label="{PRIMARY_METRIC}"')[-1].split("</table>")[0]
+    assert re.findall(r"<strong>([\d.]+)", table) == [f"{over_all:.2f}"]
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
@@ -185,7 +197,7 @@ def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
 def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
     def cells() -> Any:
         for scenario, varied in (("a", '{"n":1}'), ("a", '{"n":2}'), ("b", "{}"), ("c", '{"n":1}')):
-            yield (scenario, "clip", "ik", "pos", "none", "", varied, *([1.0] * len(METRICS)))
+            yield (scenario, "clip", "ik", "pos", "none", "", varied, *([1.0] * len(READ_METRICS)))
 
     sweep = collect_cells(cells(), name="x", planned=4, failures={})
     assert scenarios_varying(sweep, sweep.keys[0]) == [0]
@@ -231,7 +243,16 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
         values = np.random.default_rng(1).uniform(1.0, 2.0, count)
         for n in range(count):
             method, clip = f"m{n % 5}", f"clip_{n // 20 % 30}"
-            yield ("walking", clip, method, "pos", "none", "", f'{{"n":{n // 5 % 4}}}', *([values[n]] * len(METRICS)))
+            yield (
+                "walking",
+                clip,
+                method,
+                "pos",
+                "none",
+                "",
+                f'{{"n":{n // 5 % 4}}}',
+                *([values[n]] * len(READ_METRICS)),
+            )
 
     failures = {f"cell {n}": "ValueError: the same" for n in range(1_000)}
     few, many = (
@@ -251,7 +272,7 @@ def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 
 def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadFile, match="index of a run or sweep"):
+    with pytest.raises(BadFile, match="the manifest of a run"):
         write_sweep_page(tmp_path)
     assert not list(tmp_path.iterdir())
 

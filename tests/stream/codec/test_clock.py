@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.stream.codec.clock import ClockUnwrapper
-from tests.stream.wire import stamps_s
+from harness.stream.codec.clock import ClockUnwrapper, TimeOrder
+from tests.stream.wire import RATE_HZ, stamps_s
 
 HOST_S: Floats = stamps_s(50) + 1000.0
 
 
 def unwrap(stamp_s: Floats, host_s: Floats = HOST_S, chunks: int = 1) -> tuple[Floats, ClockUnwrapper]:
-    clock = ClockUnwrapper()
-    parts = zip(np.array_split(stamp_s, chunks), np.array_split(host_s, chunks), strict=True)
-    return np.concatenate([clock.unwrap(stamp, host) for stamp, host in parts]), clock
+    clock = ClockUnwrapper(1.0 / RATE_HZ)
+    columns = stamp_s, host_s, np.arange(len(stamp_s)) % 4
+    parts = zip(*(np.array_split(column, chunks) for column in columns), strict=True)
+    return np.concatenate([clock.unwrap(*part) for part in parts]), clock
 
 
 def reset_at(stamp_s: Floats, at: int) -> Floats:
@@ -105,10 +106,47 @@ def test_a_stamp_near_the_tolerance_shifts_no_other(off_s: float, at: int) -> No
 def test_stamps_that_all_run_ahead_or_back_are_all_damaged(step_s: float) -> None:
     """After a steady second, two stamps that each differ from the one before by far more than the host's clock."""
     steady_s: Floats = 5.0 + 0.025 * np.arange(40, dtype=np.float64)
-    clock = ClockUnwrapper()
-    np.testing.assert_array_equal(clock.unwrap(steady_s, steady_s + 1000.0), steady_s)
+    clock, one = ClockUnwrapper(0.025), np.zeros(40, np.int64)
+    np.testing.assert_array_equal(clock.unwrap(steady_s, steady_s + 1000.0, one), steady_s)
     received_s: Floats = steady_s[-1] + 1000.0 + 0.025 * np.arange(1, 3)
     wrong_s: Floats = steady_s[-1] + step_s * np.arange(1, 3)
-    assert np.isnan(clock.unwrap(wrong_s, received_s)).all()
+    assert np.isnan(clock.unwrap(wrong_s, received_s, one[:2])).all()
     next_s: Floats = steady_s[-1] + np.array([0.075, 0.1])
-    np.testing.assert_array_equal(clock.unwrap(next_s, next_s + 1000.0), next_s)
+    np.testing.assert_array_equal(clock.unwrap(next_s, next_s + 1000.0, one[:2]), next_s)
+
+
+def test_the_first_stamp_cannot_be_ahead_of_the_time_since_the_clock_was_set_to_zero() -> None:
+    """The first record after `MZ` is damaged: it costs itself, and time is that of the device."""
+    stamp_s = stamps_s(10, begin_s=0.1)
+    received_s, station = stamp_s + 1000.0, np.arange(len(stamp_s)) % 4
+    stamp_s[0] += 4.0
+    out = ClockUnwrapper(1.0 / RATE_HZ, zeroed_s=1000.0).unwrap(stamp_s, received_s, station)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [0]
+    np.testing.assert_array_equal(out[1:], stamp_s[1:])
+
+
+@pytest.mark.parametrize("ahead_s", [0.008, 0.016, 0.032, 0.064, 0.128, 0.2])
+def test_a_stamp_that_is_ahead_by_less_than_the_hosts_delays_is_damaged(ahead_s: float) -> None:
+    stamp_s = stamps_s(50)
+    stamp_s[102] += ahead_s
+    out, _ = unwrap(stamp_s)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [102]
+
+
+def test_a_lost_record_read_early_costs_one_stamp_at_most() -> None:
+    """The round before was read 20 ms late, then a round is missing: two periods by the device, one by the host."""
+    stamp_s, late_s = stamps_s(50), np.zeros(200)
+    late_s[96:100] = 0.020
+    kept = np.delete(np.arange(200), np.arange(100, 104))
+    clock = ClockUnwrapper(1.0 / RATE_HZ)
+    out = clock.unwrap(stamp_s[kept], (stamp_s + 1000.0 + late_s)[kept], kept % 4)
+    assert int(np.isnan(out).sum()) <= 1
+    assert clock.resets == 0
+
+
+def test_times_that_do_not_advance_are_removed() -> None:
+    order, nan = TimeOrder(), float("nan")
+    times_s, station = np.array([1.0, 1.0, 1.5, 1.2, nan, 1.5]), np.array([0, 1, 2, 3, 0, 1])
+    np.testing.assert_array_equal(order.enforce(times_s, station), [1.0, 1.0, 1.5, nan, nan, nan])
+    np.testing.assert_array_equal(order.enforce(np.array([1.5, 1.6]), np.array([2, 3])), [nan, 1.6])
+    np.testing.assert_array_equal(order.enforce(np.array([1.6]), np.array([0])), [nan])

@@ -349,3 +349,20 @@ def test_deferred_records_are_returned_when_a_frame_expires() -> None:
     (frame,) = reader.expire(100.0 + 1.6 / RATE_HZ)
     assert frame.position_valid.tolist() == [True, True, True, False]
     assert frame.received_s == 100.002
+
+
+@pytest.mark.parametrize(("row", "off_s"), [(0, 0.005), (1, 0.005), (2, 0.005), (1, -0.005), (2, -0.005), (3, -0.005)])
+def test_times_of_frames_increase_after_a_stamp_that_is_a_little_wrong(row: int, off_s: float) -> None:
+    """The wrong stamp may be believed at first. It costs its record and the next one, and no time steps back."""
+    sent_s = stamps_s(ROUNDS)
+    true_s, sent_s[20 + row] = sent_s.copy(), sent_s[20 + row] + off_s
+    frames = decode_frames(in_chunks(device_bytes(sent_s), true_s))
+    assert len(frames) == ROUNDS
+    latest_s = -np.inf
+    for frame in frames:
+        stamps = frame.measured_s[~np.isnan(frame.measured_s)]
+        assert (np.diff(stamps, prepend=latest_s) > 0.0).all()
+        latest_s = float(stamps[-1])
+        assert (frame.suspect | ~np.isnan(frame.measured_s)).all()
+    assert sum(int(np.isnan(frame.measured_s).sum()) for frame in frames) == 1
+    assert sum(int(frame.suspect.sum()) for frame in frames) <= 2

@@ -157,3 +157,23 @@ def test_what_was_said_is_what_is_read(codes: tuple[int, ...], rng: np.random.Ge
         assert np.abs(readings.measured_s - values.measured_s).max() < 1e-5
     if 40 in codes:
         assert np.abs(readings.quality - values.quality).max() < 0.5 / 255 + 1e-12
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("place_m", [3.0, 3.4, 60.0, -3.001, -4.6])
+def test_a_place_beyond_the_16_bit_range_is_no_position(place_m: float, axis: int) -> None:
+    """The first and the last code of an axis say no more than that the station is there or beyond."""
+    codes, position_m = (40, 18, 19, 21, 1), np.full((2, 3), 2.99)
+    position_m[1, axis] = place_m
+    values = RecordValues(np.array([5.0, 6.0]), position_m, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
+    table = encode_records(codes, np.frombuffer(b"12", np.uint8), values, CENTIMETRES)
+    readings = decode_readings(table, np.zeros(2), b"12", CENTIMETRES)
+    assert np.abs(readings.position_m[0] - 2.99).max() < 3.0 / 8192
+    assert np.isnan(readings.position_m[1]).all()
+    assert np.isfinite(readings.tracker_from_station).all()
+    assert not readings.suspect.any()
+
+
+def test_lists_name_their_range() -> None:
+    assert items.describe_list(items.SHORT_LIST) == "22 bytes, range 3 m"
+    assert items.describe_list(items.STANDARD_LIST) == "38 bytes"

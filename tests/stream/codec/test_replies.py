@@ -146,3 +146,9 @@ def test_unprintable_characters_are_not_echoed() -> None:
         DeviceError("O\x01\xff" + "x" * 500, -99).line()
         == b"2 E*ERROR*O??" + b"x" * 77 + b"*ERROR* EC -99*PS1  *FL1 *ST0\r\n"
     )
+
+
+def test_both_widths_of_a_tip_offset_are_read() -> None:
+    """The manual's text says 7 characters a number, its byte ranges 8 (docs/is900.md 14)."""
+    for reply in (b"21N  30.00   0.00  -1.50", b"21N  30.000   0.000  -1.500"):
+        assert parse_reply(reply) == GeometryReply("1", "N", (30.0, 0.0, -1.5))

@@ -40,7 +40,10 @@ def test_the_suggested_remedies_do_fit() -> None:
         check_capacity("port", 9600, 2, STANDARD_LIST, 20.0, 0.0)
     assert "1 station," in raised.value.advice
     assert "runs at 12 Hz" in raised.value.advice
-    assert "22-byte list (--items 40,18,19,21,1)" in raised.value.advice
+    assert "--items 40,18,19,21,1 (22 bytes, range 3 m: positions farther than 3 m" in raised.value.advice
+    with pytest.raises(BadInput) as raised:
+        check_capacity("port", 9600, 2, STANDARD_LIST, 20.0, 0.0, reach_m=4.7)
+    assert "40,18,19,21,1" not in raised.value.advice
     check_capacity("port", 9600, 1, STANDARD_LIST, 20.0, 0.0)
     check_capacity("port", 9600, 2, STANDARD_LIST, 12.0, 0.0)
     check_capacity("port", 9600, 2, SHORT_LIST, 20.0, 0.0)

@@ -1,6 +1,7 @@
 """What the driver sends to a device before data flow, and what it refuses."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,10 @@ def test_the_commands_are_sent_in_the_right_sequence() -> None:
     bench = bench_of(2)
     stream = bench.driver()
     assert bytes(bench.sent) == (
-        b"\x11\rcSl*\r\nMP\r\nfuMT\r\n"
+        b"\x11\rcSl*\r\n"
+        b"O1\r\nO2\r\nMS\r\n"  # what other programs have set
+        b"A1\r\nN1\r\nG1\r\nH1\r\nMp1\r\nMQ1\r\nMs1\r\nA2\r\nN2\r\nG2\r\nH2\r\nMp2\r\nMQ2\r\nMs2\r\n"
+        b"b1\r\nb2\r\nMP\r\nfuMT\r\n"
         b"O1,40,2,11,21,1\r\nO1\r\nO2,40,2,11,21,1\r\nO2\r\n"  # set, with a query to wait for the device
         b"SMS\r\nO1\r\nO2\r\n"  # checked
         b"Cc"  # rate measured
@@ -47,7 +51,7 @@ def test_the_commands_are_sent_in_the_right_sequence() -> None:
     assert len(frames_for(stream, bench, 1.0)) > 40
     assert bytes(bench.sent) == b"MZ\r\nC"
     stream.close()
-    assert bytes(bench.sent) == b"MZ\r\nCc"
+    assert bytes(bench.sent) == b"MZ\r\nCcO1,2,4,1\r\nO1\r\nO2,2,4,1\r\nO2\r\nMT\r\nUFS"  # as it was
     assert not device_of(bench).streaming
     assert bench.open_lines == 0
 
@@ -75,8 +79,8 @@ def test_every_unit_and_list_gives_the_same_motion(config: DriverConfig) -> None
     samples = make_samples(4)
     with bench.driver(config) as stream:
         frames = frames_for(stream, bench, 1.0)
+        device = device_of(bench).settings
     assert len(frames) > 40
-    device = device_of(bench).settings
     assert device.binary
     assert device.centimetres == config.centimetres
     assert device.microseconds != config.milliseconds
@@ -87,6 +91,47 @@ def test_every_unit_and_list_gives_the_same_motion(config: DriverConfig) -> None
         np.testing.assert_allclose(cosines, 1.0, atol=1e-6)
         assert frame.position_valid.all()
         assert not frame.suspect.any()
+
+
+def test_positions_beyond_the_range_of_the_list_are_not_valid_and_reported_once() -> None:
+    """The stations move out to 4.7 m and back, as walking does."""
+    near = make_samples(2)
+    far = replace(near, position_m=4.7 * near.position_m)
+    bench = Bench(EmulatedDevice(far, now_s=1000.0))
+    with bench.driver(DriverConfig(items=SHORT_LIST, stations=("head", "torso"))) as stream:
+        frames = frames_for(stream, bench, 10.0)
+        counts = stream.counts
+    expected = 0
+    for frame in frames:
+        true_m = far.position_m[round(frame.measured_s[0] * far.rate_hz) % len(far)]
+        outside = (np.abs(true_m) >= 3.0).any(axis=1)
+        expected += int(outside.sum())
+        assert not frame.position_valid[outside].any()
+        assert frame.orientation_valid.all()
+        assert not frame.suspect.any()
+        valid = frame.position_valid
+        np.testing.assert_allclose(frame.position_m[valid], true_m[valid], atol=1e-3)
+    assert expected > 500
+    assert counts["out_of_range"] >= expected
+    (event,) = (event for event in bench.events if event.kind == "out of range")
+    assert "farther than 3 m from the tracker's origin" in event.text
+    assert "40,2,11,21,1" in event.text
+
+
+def test_emitters_beyond_the_range_of_the_list_are_reported_at_set_up() -> None:
+    for items, reported in ((SHORT_LIST, True), (STANDARD_LIST, False)):
+        bench = bench_of(2)
+        device_of(bench).receive(b"MCF10,3.5,0,0,0,0,1,5010\rMCe\r", bench.now_s)
+        bench.driver(DriverConfig(items=items)).close()
+        texts = [event.text for event in bench.events if event.kind == "out of range"]
+        assert ["emitters are up to 3.50 m" in text for text in texts] == [True] * reported
+
+
+def test_a_list_that_does_not_cover_the_room_is_refused() -> None:
+    DriverConfig(items=SHORT_LIST, reach_m=2.9)
+    DriverConfig(reach_m=5.0)
+    with pytest.raises(BadInput, match=r"up to 3 m .* reach 4\.71 m\. Use a list with item 2, such as .*40,2,11,21,1"):
+        DriverConfig(items=SHORT_LIST, reach_m=4.71)
 
 
 def test_a_device_left_in_any_state_is_configured() -> None:
@@ -198,7 +243,7 @@ def test_boresight_and_alignment_are_set_once() -> None:
         frames = frames_for(stream, bench, 0.2)
     sent_data = bytes(bench.sent)
     assert b"R2\r\nA2,0.00,0.00,0.00,0.00,100.00,0.00,-100.00,0.00,0.00\r\n" in sent_data
-    assert b"A1" not in sent_data
+    assert b"A1," not in sent_data
     assert sent_data.count(b"B1\r\n") == sent_data.count(b"B2\r\n") == 1
     x, y, z = frames[0].position_m[1]
     k = round(frames[0].measured_s[0] * 50.0)
@@ -296,7 +341,7 @@ FASTRAK_STATUS = StatusRecord(identification="FASTRAK", firmware="2.10").line()
         (
             DriverConfig(),
             {"stations": 4, "rate_hz": 120.0},
-            r"Try 2 stations, or the 22-byte list \(--items 40,18,19,21,1\), or a device .* 75",
+            r"Try 2 stations, or --items 40,18,19,21,1 \(22 bytes, range 3 m: .*\), or a device .* 75",
         ),
         (DriverConfig(baud=9600), {"baud": 9600}, r"the line carries 9600\. Try .*or a device set to 115200 baud"),
     ],
@@ -384,7 +429,7 @@ def test_an_observer_sees_every_byte_and_the_format_before_data() -> None:
     assert bytes(log.sent_data) == bytes(bench.sent)
     [(received_count, sent_count, wire)] = log.formats
     assert wire == stream.wire
-    assert log.sent_data[sent_count - 4 :] == b"MZ\r\nCc"
+    assert log.sent_data[sent_count - 4 :].startswith(b"MZ\r\nCc")
     assert record_size(wire.items) * 2 * len(frames) <= len(log.received_data) - received_count
     assert [event.kind for event in log.events] == ["connected"]
     assert log.times_s == sorted(log.times_s)

@@ -1,13 +1,16 @@
 """Trouble on the line, reported once each and overcome; in virtual time, so that silence costs nothing."""
 
 from collections.abc import Callable
-from itertools import pairwise
+from dataclasses import replace
+from itertools import islice, pairwise
 from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from harness.core.seeds import generator
+from harness.experiment.scenario import load_scenario
+from harness.live.clock import HostClockEstimator
 from harness.stream.codec.commands import set_output_list
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.items import SHORT_LIST
@@ -15,7 +18,7 @@ from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import ByteFaultKind, Fault
 from harness.stream.frame import TrackerFrame
-from tests.stream.driver.bench import Adapter, Bench, Device, EmulatedDevice, LineLog, frames_for, make_samples
+from tests.stream.driver.bench import START_S, Adapter, Bench, Device, EmulatedDevice, LineLog, frames_for, make_samples
 
 MAX_RECOVERY_S = 2.0
 """Longest time from the device's return to the next frame [s]."""
@@ -50,11 +53,10 @@ def test_a_reset_device_is_configured_again() -> None:
         assert bench.kinds == ["connected", "stalled", "reset", "connected"]
         assert "it reports in ASCII" in bench.events[2].text
         assert stream.counts["reconnects"] == 1
+        assert device_of(bench).settings.binary
     assert max(gaps_s(frames)) < 0.25 + MAX_RECOVERY_S  # the emulator takes 0.25 s to start
     assert_times_increase(frames)
-    device = device_of(bench)
-    assert device.settings.binary
-    assert not device.streaming
+    assert not device_of(bench).streaming
 
 
 def test_device_time_continues_by_the_hosts_clock_over_a_reset() -> None:
@@ -368,6 +370,51 @@ def test_health_reports_rate_and_counts() -> None:
     assert health["garbage_bytes"] > 0
     assert health["reconnects"] == 0
     assert 0.0 <= health["silent_s"] < 0.1
+
+
+def test_no_rate_is_told_before_it_is_known() -> None:
+    """The computer is busy at first, so the first read finds twelve frames: they give no rate, and later ones do."""
+    bench = bench_of()
+    held = bytearray()
+    with bench.driver() as stream:
+        free_s = bench.now_s + 0.25
+
+        def hold(data: bytes) -> bytes:
+            held.extend(data)
+            out = bytes(held) if bench.now_s >= free_s else b""
+            del held[: len(out)]
+            return out
+
+        bench.corrupt = hold
+        told_hz = [stream.health().get("rate_hz") for _ in islice(stream, 100)]
+    assert told_hz[:10] == [None] * 10
+    rates_hz = [rate_hz for rate_hz in told_hz if rate_hz is not None]
+    assert len(rates_hz) > 50
+    assert np.abs(np.array(rates_hz) - 50.0).max() < 10.0
+
+
+@pytest.mark.long
+def test_times_strictly_increase_in_ten_minutes_of_faults() -> None:
+    """All faults of the emulator, at random, behind an adapter that holds bytes back."""
+    scenario = load_scenario("emulator_faults")
+    faults = tuple(replace(fault, station="torso") if fault.station else fault for fault in scenario.fault)
+    device = EmulatedDevice(make_samples(4, 40.0), EmulatorConfig(faults=faults, seed=1), START_S)
+    bench = Bench(Adapter(device))
+    host_clock, host_s = HostClockEstimator(), [0.0]
+    latest_s, unstamped, frames = np.full(4, -np.inf), 0, 0
+    with bench.driver() as stream:
+        for frame in frames_for(stream, bench, 600.0):
+            stamped = ~np.isnan(frame.measured_s)
+            assert (frame.measured_s[stamped] > latest_s.max()).all()
+            latest_s[stamped] = frame.measured_s[stamped]
+            host_s.append(host_clock.measured_s(frame))
+            assert host_s[-1] > host_s[-2]
+            assert (frame.suspect | stamped | ~frame.position_valid).all()
+            unstamped += int((frame.suspect & ~stamped).sum())
+            frames += 1
+        assert stream.counts["reconnects"] >= 2
+    assert frames > 23000
+    assert 0 < unstamped < 100, "damaged stamps cost more than themselves"
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from harness.testing.stream_checks import check_stream
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, decode_frames, device_bytes, frames_equal, in_chunks, stamps_s
 
 ROUNDS = 24
-STAMPS_S = stamps_s(ROUNDS)
+STAMPS_S = stamps_s(ROUNDS, begin_s=0.1)
 DATA = device_bytes(STAMPS_S)
 
 

@@ -1,0 +1,104 @@
+"""Ranking of methods on the same clips, with the statistics of `compare_runs`.
+
+The method with the lowest mean is compared with each other one, as `harness compare RUN --methods OTHER,LOWEST` does.
+The lines of all these pairs are tested together: the ranked metric and the gated ones. Holm's correction therefore
+covers at least the lines of each of those comparisons, and a ranking never says *better* where they cannot tell.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.compare.margins import GATED_METRICS, margin_of
+from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
+from harness.core.arrays import Floats
+
+ClipValues = Mapping[str, Mapping[str, float]]
+"""Metric -> clip -> mean value over the cells of the clip."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Methods with the lowest mean first, and whether the first one is better than each other one."""
+
+    metric: str
+    clips: tuple[str, ...]
+    """(C,) clips on which all methods were measured, sorted."""
+    values: Mapping[str, Floats]
+    """Method -> (C,) values, the lowest mean first."""
+    results: Mapping[str, SignificanceResult]
+    """Other method -> verdict on the first one against it, over the clips on which both were measured."""
+
+    @property
+    def lowest(self) -> str:
+        """The method with the lowest mean."""
+        return next(iter(self.values))
+
+    @property
+    def means(self) -> dict[str, float]:
+        """Method -> mean over the clips, the lowest first."""
+        return {name: float(values.mean()) for name, values in self.values.items()}
+
+    @property
+    def best(self) -> str | None:
+        """The method that is *better* than every other one; None when there is none."""
+        return self.lowest if self.results and not self.others("same", "cannot tell", "worse") else None
+
+    def others(self, *verdicts: str) -> list[str]:
+        """The other methods with these verdicts."""
+        return [name for name, result in self.results.items() if result.verdict in verdicts]
+
+
+def rank_methods(values: Mapping[str, ClipValues], metric: str) -> Ranking | None:
+    """Rank methods by a metric with a margin, of which lower values are better; None when they share no clip.
+
+    Methods without a value of the metric are left out.
+    """
+    measured = {name: by_metric for name, by_metric in values.items() if by_metric.get(metric)}
+    clips = shared_clips(by_metric[metric] for by_metric in measured.values())
+    if not clips:
+        return None
+    columns = {name: np.array([of[metric][clip] for clip in clips]) for name, of in measured.items()}
+    lowest, *others = sorted(columns, key=lambda name: float(columns[name].mean()))
+    metrics = dict.fromkeys((metric, *GATED_METRICS))
+    pairs = [(name, each) for each in metrics for name in others]
+    lines = [_paired(measured[name], measured[lowest], each) for name, each in pairs]
+    kept = [(line, margin) for line, margin in lines if len(line)]
+    results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
+    ordered = {name: columns[name] for name in (lowest, *others)}
+    return Ranking(metric, clips, ordered, dict(zip(others, results, strict=True)))
+
+
+def find_best(values: Mapping[str, ClipValues], metric: str) -> str | None:
+    """The method that is better than every other one by this metric, as `Ranking.best`; None when there is none.
+
+    It computes intervals only where no single p already excludes this.
+    """
+    measured = {name: of[metric] for name, of in values.items() if of.get(metric)}
+    clips = shared_clips(measured.values())
+    if len(measured) < 2 or len(clips) < MIN_CLIPS:
+        return None
+    lowest = min(measured, key=lambda name: np.mean([measured[name][clip] for clip in clips]))
+    for name in measured:
+        line, _ = _paired(values[name], values[lowest], metric)
+        if name != lowest and sign_flip_p(line) > SIGNIFICANCE:
+            return None
+    ranking = rank_methods(values, metric)
+    return ranking.best if ranking else None
+
+
+def shared_clips(values: Iterable[Mapping[str, float]]) -> tuple[str, ...]:
+    """The clips that all have a value for, sorted."""
+    sets = [set(by_clip) for by_clip in values]
+    return tuple(sorted(set.intersection(*sets))) if sets else ()
+
+
+def _paired(a: ClipValues, b: ClipValues, metric: str) -> tuple[Floats, float]:
+    """Differences b - a over the clips that both have, an increase being worse, and the margin for a reference a."""
+    clips: Sequence[str] = shared_clips((a.get(metric, {}), b.get(metric, {})))
+    before, after = (np.array([side[metric][clip] for clip in clips], dtype=float) for side in (a, b))
+    margin = margin_of(metric)
+    difference: Floats = after - before if margin.rise_is_worse else before - after
+    return difference, margin.of(float(before.mean())) if clips else 0.0

@@ -1,0 +1,61 @@
+"""The process that forks the workers of methods. It imports what they need, once, and nothing of a user's.
+
+`worker_process` starts it and asks it: `fork MODULE` with two descriptors, or `poll PID`. It ends with the program that
+started it.
+"""
+
+import gc
+import os
+import signal
+import socket
+import sys
+from contextlib import suppress
+from importlib import import_module
+
+from harness.experiment import method_worker  # noqa: F401  # what all workers need
+
+
+def main(number: str) -> None:
+    """Answer requests on the socket of this number until it is closed."""
+    gc.collect()
+    gc.freeze()  # workers share these objects instead of copying them
+    server = socket.socket(fileno=int(number))
+    while True:
+        text, descriptors, _, _ = socket.recv_fds(server, 4096, 2)
+        word, _, argument = text.decode().partition(" ")
+        if word == "fork":
+            server.send(str(_fork(server, argument, descriptors)).encode())
+        elif word == "poll":
+            server.send(_poll(int(argument)).encode())
+        else:
+            os._exit(0)
+
+
+def _poll(pid: int) -> str:
+    """The exit code of a worker, or `running`."""
+    try:
+        ended, status = os.waitpid(pid, os.WNOHANG)
+    except ChildProcessError:  # it was asked before
+        return str(-signal.SIGKILL)
+    return str(os.waitstatus_to_exitcode(status)) if ended else "running"
+
+
+def _fork(server: socket.socket, module: str, descriptors: list[int]) -> int:
+    """Fork a worker, which is the leader of a process group of its own; its number."""
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            server.close()
+            os.setpgid(0, 0)
+            import_module(module).main(*map(str, descriptors))
+            code = 0
+        except BaseException:
+            sys.excepthook(*sys.exc_info())
+        finally:
+            os._exit(code)
+    with suppress(OSError):
+        os.setpgid(pid, pid)
+    for descriptor in descriptors:
+        os.close(descriptor)
+    return pid

@@ -1,0 +1,45 @@
+"""A ranking of methods in words, as pages and the terminal print it."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from harness.compare.ranking import Ranking
+from harness.core.number_format import count_noun, format_share
+from harness.report.kit.text import list_first
+
+BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
+"""End of the caption of a table with bold cells."""
+_MOST_NAMED = 4
+
+
+def describe_ranking(ranking: Ranking, where: str, format_error: Callable[[float], str], clips: str = "clip") -> str:
+    """Which method is best, or has the lowest error, and what can be told about the others.
+
+    `where` names the motion, such as "5 clips of built-in motion"; `clips` is the noun for what is counted.
+    """
+    lowest, error = ranking.lowest, format_error(ranking.means[ranking.lowest])
+    if not ranking.results:
+        return f"{lowest}: {error} mean joint-angle error on {where}. No other method was measured."
+    if ranking.best:
+        return f"{lowest} is best: {error} mean joint-angle error on {where}. {_lead(ranking, format_error, clips)}"
+    parts = [f"{lowest} has the lowest mean joint-angle error, {error} on {where}."]
+    if better := ranking.others("better"):
+        parts.append(f"It is better than {list_first(better, _MOST_NAMED)}.")
+    if same := ranking.others("same"):
+        parts.append(f"The same within the margin: {list_first(same, _MOST_NAMED)}.")
+    if undecided := ranking.others("cannot tell"):
+        why = ranking.results[undecided[0]].why
+        parts.append(f"Cannot tell whether it is better than {list_first(undecided, _MOST_NAMED)}: {why}.")
+    return " ".join(parts)
+
+
+def _lead(ranking: Ranking, format_error: Callable[[float], str], clips: str) -> str:
+    """The sentence on how much lower the best error is than the next."""
+    (_, best), (second, next_lowest), *_ = ranking.values.items()
+    difference, wins = float(np.mean(next_lowest - best)), int(np.sum(best < next_lowest))
+    share = format_share(difference / float(next_lowest.mean()))
+    counted = count_noun(len(ranking.clips), clips)
+    return (
+        f"That is {format_error(difference)} ({share}) less than {second}, the next, and lower on {wins} of {counted}."
+    )

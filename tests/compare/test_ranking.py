@@ -1,0 +1,96 @@
+"""Rankings agree with `compare_results` on the same values, and never lead where it cannot tell."""
+
+import numpy as np
+import pytest
+
+from harness.compare.comparison import compare_results
+from harness.compare.ranking import ClipValues, Ranking, find_best, rank_methods
+from harness.core.seeds import generator
+from harness.results.reader import ResultSet
+from harness.results.reported_metrics import PRIMARY_METRIC
+from tests.compare.sides import side
+
+METRICS = (PRIMARY_METRIC, "mpjpe_mm", "jitter_m_s3")
+
+
+def values_of(results: ResultSet) -> dict[str, ClipValues]:
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for cell in results.cells:
+        for metric in METRICS:
+            value = cell.metrics[metric]
+            assert value is not None
+            found.setdefault(cell.method, {}).setdefault(metric, {})[cell.clip] = value
+    return dict(found)
+
+
+def rank(results: ResultSet, metric: str = PRIMARY_METRIC) -> Ranking:
+    ranking = rank_methods(values_of(results), metric)
+    assert ranking is not None
+    return ranking
+
+
+def scattered(seed: int, clips: int) -> ResultSet:
+    """Methods whose errors are 0.7 to 1.3 times as large, with scatter over clips."""
+    rng = generator(seed, "ranking")
+    spread = 10.0 ** rng.uniform(-3.0, -1.0)
+    methods = {f"m{n}": list(rng.uniform(0.7, 1.3) * np.exp(spread * rng.normal(size=clips))) for n in range(4)}
+    return side(methods=methods, clips=clips)
+
+
+@pytest.mark.parametrize("clips", [1, 3, 5, 6, 8, 12])
+def test_a_ranking_says_no_more_than_the_comparison_of_two(clips: int) -> None:
+    verdicts = set()
+    for seed in range(6):
+        results = scattered(seed, clips)
+        ranking = rank(results)
+        for name, result in ranking.results.items():
+            for methods, word in (((name, ranking.lowest), "better"), ((ranking.lowest, name), "worse")):
+                lines = compare_results(results, results, methods=methods).differences
+                (line,) = (line for line in lines if line.metric == PRIMARY_METRIC)
+                if result.verdict == "better":
+                    assert line.verdict == word
+                if line.verdict == "cannot tell":
+                    assert result.verdict not in ("better", "worse")
+                if methods[0] == name and "same" in (line.verdict, result.verdict):
+                    assert line.verdict == result.verdict
+                    assert (line.low, line.high) == (result.low, result.high)
+            verdicts.add(result.verdict)
+        assert find_best(values_of(results), PRIMARY_METRIC) == ranking.best
+    assert ("better" in verdicts) == (clips == 12), "9 lines need 9 * 2 / 2^n of at most 0.05"
+
+
+@pytest.mark.parametrize("clips", [1, 2, 5])
+def test_few_clips_have_no_best_method_however_large_the_difference(clips: int) -> None:
+    results = side(methods={"good": 1.0, "poor": 30.0}, clips=clips)
+    assert (rank(results).lowest, rank(results).best) == ("good", None)
+    assert rank(results).others("cannot tell") == ["poor"]
+    assert find_best(values_of(results), PRIMARY_METRIC) is None
+
+
+def test_a_clear_lead_on_many_clips_is_best() -> None:
+    results = side(methods={"poor": 2.0, "good": 1.0, "worst": 3.0}, clips=10)
+    assert list(rank(results).means) == ["good", "poor", "worst"]
+    assert rank(results).best == find_best(values_of(results), PRIMARY_METRIC) == "good"
+
+
+def test_equal_methods_are_the_same_on_any_number_of_clips() -> None:
+    for clips in (1, 5, 8):
+        ranking = rank(side(methods={"one": 1.0, "other": 1.0}, clips=clips))
+        assert (ranking.best, ranking.others("same")) == (None, ["other"])
+
+
+def test_more_methods_need_more_clips() -> None:
+    """Two methods: 3 lines at p = 2/2^8. Twelve methods: 33 lines, and 33 * 2/2^8 is above 0.05."""
+    few = side(methods={f"m{n:02}": 1.0 + n for n in range(2)}, clips=8)
+    many = side(methods={f"m{n:02}": 1.0 + n for n in range(12)}, clips=8)
+    assert (rank(few).best, rank(many).best) == ("m00", None)
+
+
+def test_methods_on_other_clips_are_not_ranked() -> None:
+    values: dict[str, ClipValues] = {"a": {PRIMARY_METRIC: {"x": 1.0}}, "b": {PRIMARY_METRIC: {"y": 1.0}}}
+    assert rank_methods(values, PRIMARY_METRIC) is None
+    assert rank_methods({}, PRIMARY_METRIC) is None
+    assert find_best(values, PRIMARY_METRIC) is None
+    alone = rank_methods({"a": {PRIMARY_METRIC: {"x": 1.0}}}, PRIMARY_METRIC)
+    assert alone is not None
+    assert (alone.lowest, alone.best, alone.results) == ("a", None, {})
