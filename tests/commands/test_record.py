@@ -271,7 +271,9 @@ def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop
     assert "Traceback" not in err
     read = read_recording(tmp_path / "a.rec")
     assert read.damage == ()
-    assert [block.payload for block in read.blocks() if block.kind == "sent"][-1] == b"c"
+    sent = [block.payload for block in read.blocks() if block.kind == "sent"]
+    assert b"c" in sent[sent.index(b"C") :]  # settings are put back after it
+    assert b"C" not in sent[-sent[::-1].index(b"c") :]
 
 
 def test_a_killed_recording_keeps_what_came(port: str, tmp_path: Path) -> None:
