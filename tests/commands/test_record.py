@@ -18,6 +18,7 @@ from harness.cli import main
 from harness.experiment.playback import Playback, prepare_playback
 from harness.stream.codec.blocks import CONFIGURED, FILE_HEADER, RECEIVED
 from harness.stream.driver import DriverConfig, Is900
+from harness.stream.driver.transport import open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.recording.frame_table import FRAME_COLUMNS
 from harness.stream.recording.recording import RecordingWriter, read_recording
@@ -272,8 +273,33 @@ def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop
     read = read_recording(tmp_path / "a.rec")
     assert read.damage == ()
     sent = [block.payload for block in read.blocks() if block.kind == "sent"]
-    assert b"c" in sent[sent.index(b"C") :]  # settings are put back after it
-    assert b"C" not in sent[-sent[::-1].index(b"c") :]
+    assert b"c" in sent[-20:]
+    assert sent[-1] == b"S", "the device has answered after its settings were put back"
+
+
+def test_settings_of_another_program_are_told_and_put_back(
+    port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def talk(data: bytes) -> bytes:
+        line = open_transport(port, 115200)
+        line.write(data)
+        received, until_s = b"", time.monotonic() + 60.0
+        while not received.endswith(b"\r\n") and time.monotonic() < until_s:
+            received += line.read(0.1)
+        line.close()
+        return received
+
+    talk(b"N1,30,0,0\rS")
+    command = ["record", port, str(tmp_path / "a.rec"), "--seconds", "0.3"]
+    assert main(command) == 0
+    said = capsys.readouterr().err
+    assert "settings of another program: tip offset N 30, 0, 0 cm (station 1); at defaults for this session" in said
+    assert "boresight of station 1, 2, 3, 4 undone: it cannot be read or put back" in said
+    assert "put back: tip offset N 30, 0, 0 cm (station 1)" in said
+    assert [event["kind"] for event in read_recording(tmp_path / "a.rec").events].count("settings") == 2
+    assert main([*command, "--keep-settings"]) == 0
+    assert "tip offset N 30, 0, 0 cm (station 1); kept, as asked" in capsys.readouterr().err
+    assert talk(b"N1\r") == b"21N  30.000   0.000   0.000\r\n"
 
 
 def test_a_killed_recording_keeps_what_came(port: str, tmp_path: Path) -> None:
