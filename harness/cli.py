@@ -31,6 +31,7 @@ from harness.commands.report import add_report
 from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
+from harness.core.names import check_command_line, check_words, excerpt
 from harness.core.package_data import VERSION
 from harness.errors import HarnessError, Outcome, was_interrupted
 
@@ -66,13 +67,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
     sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     try:
+        check_command_line(sys.argv[1:] if argv is None else argv)
+        check_words(list(vars(args).values()))
         outcome: Outcome = args.action(args)
         sys.stdout.flush()
     except HarnessError as error:
-        print(f"harness: {error}", file=sys.stderr)
+        print(f"harness: {excerpt(error)}", file=sys.stderr)
         outcome = error.outcome
         if args.json:
-            print(json.dumps({"outcome": outcome.word, "error": str(error)}))
+            print(json.dumps({"outcome": outcome.word, "error": excerpt(error)}))
     except BrokenPipeError:  # the reader of stdout went away, as `| head` does
         _discard_stdout()
         return Outcome.PASS.exit_code

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from harness.bench.leak_check import bench_leak_check
 from harness.bench.load import bench_load
 from harness.bench.neighbour_search import bench_index
 from harness.bench.regression_gate import bench_regression_gate
@@ -43,6 +44,7 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[BenchmarkRow]]] = {
     "index": lambda seed, large: bench_index(seed),
     "methods": _methods,
     "outliers": lambda seed, large: bench_rejected_readings(seed),
+    "leak": lambda seed, large: bench_leak_check(seed),
     "gate": lambda seed, large: bench_regression_gate(seed),
     "sweep": lambda seed, large: bench_sweep(seed),
 }

@@ -22,6 +22,7 @@ from typing import Any
 from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
 from harness.core.files import content_key, move_into_place, temporary_path, to_json, to_json_types, write_text
+from harness.core.names import excerpt
 from harness.errors import BadInput
 from harness.results.digests import file_digest, insert_digest, write_result_json
 from harness.results.integrity import read_summary_json
@@ -46,8 +47,11 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
     BadInput for an invalid name, for a run with missing cells (nothing could be gated there) and for a baseline that
     exists, unless `force` replaces it. BadFile for a folder that is no run.
     """
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name):
-        raise BadInput(f"{name!r} is not a valid name of a baseline.", "Use letters, digits, - _ and ., as in main_2.")
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", name):
+        raise BadInput(
+            f"'{excerpt(name, 60)}' is not a valid name of a baseline.",
+            "Use up to 100 letters, digits, - _ and ., as in main_2.",
+        )
     if not run.is_dir():
         raise BadInput(f"{run} is not a folder.", "Name one that `harness run` or `harness sweep` wrote.")
     results, target = load_results(run), folder / name

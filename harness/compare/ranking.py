@@ -20,7 +20,7 @@ ClipValues = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
-class Ranking:
+class MethodRanking:
     """Methods with the lowest mean first, and whether the first one is better than each other one."""
 
     metric: str
@@ -47,11 +47,11 @@ class Ranking:
         return self.lowest if self.results and not self.others("same", "cannot tell", "worse") else None
 
     def others(self, *verdicts: str) -> list[str]:
-        """The other methods with these verdicts."""
+        """Names of the other methods that have one of these verdicts."""
         return [name for name, result in self.results.items() if result.verdict in verdicts]
 
 
-def rank_methods(values: Mapping[str, ClipValues], metric: str) -> Ranking | None:
+def rank_methods(values: Mapping[str, ClipValues], metric: str) -> MethodRanking | None:
     """Rank methods by a metric with a margin, of which lower values are better; None when they share no clip.
 
     Methods without a value of the metric are left out.
@@ -68,11 +68,11 @@ def rank_methods(values: Mapping[str, ClipValues], metric: str) -> Ranking | Non
     kept = [(line, margin) for line, margin in lines if len(line)]
     results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
     ordered = {name: columns[name] for name in (lowest, *others)}
-    return Ranking(metric, clips, ordered, dict(zip(others, results, strict=True)))
+    return MethodRanking(metric, clips, ordered, dict(zip(others, results, strict=True)))
 
 
 def find_best(values: Mapping[str, ClipValues], metric: str) -> str | None:
-    """The method that is better than every other one by this metric, as `Ranking.best`; None when there is none.
+    """The method that is better than every other one by this metric, as `MethodRanking.best`; None when there is none.
 
     It computes intervals only where no single p already excludes this.
     """

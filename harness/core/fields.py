@@ -4,8 +4,10 @@ import dataclasses
 import math
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
+from harness.core.names import excerpt
+from harness.core.ranges import constraints_of
 from harness.errors import HarnessError, RenamedKey, UnknownName
 
 if TYPE_CHECKING:
@@ -20,11 +22,12 @@ NONE = "none"
 def build(kind: type[T], content: Any, where: str) -> T:
     """Build a dataclass from a mapping by its annotations.
 
-    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values.
+    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values, and
+    ValueError for numbers outside the range of their field (`core.ranges`).
     """
     if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {content!r}")
-    hints = get_type_hints(kind)
+        raise TypeError(f"{where}: expected a table, found {excerpt(repr(content), 60)}")
+    hints = get_type_hints(kind, include_extras=True)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _refuse_unknown_keys(kind, content, fields, where)
     missing = [
@@ -40,9 +43,10 @@ def build(kind: type[T], content: Any, where: str) -> T:
 def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
     """A copy of a dataclass with some fields replaced, checked as by `build`.
 
-    Mappings change nested records and tables field by field. `infinite` allows infinite numbers.
+    Mappings change nested records and tables field by field. `infinite` allows infinite numbers, where no range forbids
+    them.
     """
-    hints = get_type_hints(type(instance))
+    hints = get_type_hints(type(instance), include_extras=True)
     fields = [f.name for f in dataclasses.fields(instance) if f.init]
     _refuse_unknown_keys(type(instance), content, fields, where)
     values: dict[str, Any] = {}
@@ -52,7 +56,7 @@ def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite
             values[key] = replace_fields(now, value, f"{where}.{key}", infinite)
         elif isinstance(now, Mapping) and isinstance(value, Mapping):
             values[key] = {**now, **dict(_replace_entries(now, value, hints[key], f"{where}.{key}", infinite))}
-        elif infinite and hints[key] is float and isinstance(value, float) and math.isinf(value):
+        elif infinite and isinstance(value, float) and math.isinf(value) and _may_be_infinite(hints[key], value):
             values[key] = value
         else:
             values[key] = convert(hints[key], value, f"{where}.{key}")
@@ -85,10 +89,12 @@ def _replace_entries(
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:
-    """Convert a value to the type of an annotation; TypeError names the place and what was expected."""
+    """Convert a value to the type of an annotation; TypeError and ValueError name the place and what was expected."""
     origin, args = get_origin(hint), get_args(hint)
     if hint is Any:
         return value
+    if origin is Annotated:
+        return _require(hint, convert(args[0], value, where), where)
     if origin in (Union, types.UnionType):
         return _convert_union(args, value, where)
     if origin is Literal:
@@ -97,7 +103,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return value
     if origin is tuple:
         if not isinstance(value, list):
-            raise TypeError(f"{where}: expected a list, found {value!r}")
+            raise TypeError(f"{where}: expected a list, found {excerpt(repr(value), 60)}")
         if args[-1] is not Ellipsis and len(args) != len(value):
             raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
@@ -105,17 +111,33 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
     if origin is dict:
         if not isinstance(value, Mapping):
-            raise TypeError(f"{where}: expected a table, found {value!r}")
-        return {str(key): convert(args[1], item, f"{where}.{key}") for key, item in value.items()}
+            raise TypeError(f"{where}: expected a table, found {excerpt(repr(value), 60)}")
+        return {
+            convert(args[0], str(key), where): convert(args[1], item, f"{where}.{excerpt(key, 60)}")
+            for key, item in value.items()
+        }
     if dataclasses.is_dataclass(hint):
         return build(cast("type[DataclassInstance]", hint), value, where)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
-        raise TypeError(f"{where}: expected {hint.__name__}, found {value!r}")
+        raise TypeError(f"{where}: expected {hint.__name__}, found {excerpt(repr(value), 60)}")
     if isinstance(value, float) and not math.isfinite(value):
         raise TypeError(f"{where}: expected a finite number, found {value}")
     return value
+
+
+def _require(hint: Any, value: Any, where: str) -> Any:
+    """The value, if it obeys the rules of an annotation; ValueError."""
+    for rule in constraints_of(hint):
+        if not rule.accepts(value):
+            raise ValueError(f"{where} = {excerpt(repr(value), 60)} must be {rule}")
+    return value
+
+
+def _may_be_infinite(hint: Any, value: float) -> bool:
+    kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return kind is float and all(rule.accepts(value) for rule in constraints_of(hint))
 
 
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
@@ -126,6 +148,6 @@ def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
         if kind is not type(None):
             try:
                 return convert(kind, value, where)
-            except (TypeError, HarnessError) as error:
+            except (TypeError, ValueError, HarnessError) as error:
                 errors.append(error)
     raise errors[0]

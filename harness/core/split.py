@@ -15,6 +15,10 @@ GUARD_S = 1.0
 """No example frame lies within this time of a tested block [s]."""
 
 
+class ExampleLeak(BadInput):
+    """A test clip among its own examples, under whatever name; it ends the whole run."""
+
+
 @dataclass(frozen=True)
 class ClipPart:
     """A clip, or the part of it from `start` to `end`, as shares of its length."""
@@ -65,6 +69,17 @@ def select_examples(test: ClipPart, candidates: Iterable[str], split: Split, sub
             return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
 
 
+def forbidden_frames(test: ClipPart, split: Split, count: int, rate_hz: float) -> range:
+    """The frames of the test take whose motion no example may contain: with `block` the part and its guard, else all.
+
+    `count` and `rate_hz` are the take's number of frames and frame rate.
+    """
+    if split != "block":
+        return range(count)
+    frames, guard = test.frames(count), round(GUARD_S * rate_hz)
+    return range(max(frames.start - guard, 0), min(frames.stop + guard, count))
+
+
 def allowed_frames(held_out: Iterable[ClipPart], example: str, count: int, rate_hz: float) -> list[range]:
     """The runs of frames of an example that a method may learn from: all but held-out parts and their guard time.
 
@@ -81,13 +96,13 @@ def allowed_frames(held_out: Iterable[ClipPart], example: str, count: int, rate_
 
 
 def refuse_leak(held_out: Iterable[ClipPart], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
-    """Raise BadInput if a run of example frames reaches into a held-out part of the example or its guard time."""
+    """Raise ExampleLeak if a run of example frames reaches into a held-out part of the example or its guard time."""
     guard, used = GUARD_S * rate_hz, list(runs)
     for part in held_out:
         frames_out = part.frames(count)
         for run in used if part.clip == example else ():
             if run.start < frames_out.stop + guard - 0.5 and run.stop > frames_out.start - guard + 0.5:
-                raise BadInput(
+                raise ExampleLeak(
                     f"{part} is tested or withheld, but frames {run.start} to {run.stop} of that take are examples.",
                     "A test clip can never be among its own examples: remove it, or use split block with a part.",
                 )

@@ -19,7 +19,7 @@ import numpy as np
 
 from harness.body.mounts import locate_mount
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.split import ClipPart
+from harness.core.split import ClipPart, ExampleLeak
 from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
@@ -108,7 +108,8 @@ class CellOutcome:
 def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[CellOutcome]:
     """Run the cells of one task in order, and yield each outcome; it ends early once the file `stop` exists.
 
-    BadInput on a computer that does not see the folder `out`. Workers clear their caches for each new `session`.
+    BadInput on a computer that does not see the folder `out`. ExampleLeak, which ends the run, when a test clip is
+    among its own examples. Workers clear their caches for each new `session`.
     """
     if not (out / "cells").is_dir():
         raise BadInput(f"A worker on {node()} does not see {out}.", "Name a folder with --out that all workers share.")
@@ -128,6 +129,8 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             yield CellOutcome(str(cell), key, row=as_row(evaluated), seconds=time.perf_counter() - start)
         except MethodFailure as error:
             yield CellOutcome(str(cell), failure=str(error))
+        except ExampleLeak:
+            raise
         except HarnessError as error:
             yield CellOutcome(str(cell), failure=str(error), refused=True)
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails

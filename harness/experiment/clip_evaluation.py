@@ -19,7 +19,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import BodyMotion, Clip
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.core.split import ClipPart, allowed_frames, refuse_leak, select_examples
+from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_frames, refuse_leak, select_examples
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.remote_method import hash_method
@@ -33,6 +33,7 @@ from harness.experiment.simulated_calibration import (
     simulate_tpose_calibration,
     use_exact_calibration,
 )
+from harness.mocap.shared_motion import find_shared_motion
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
@@ -68,7 +69,7 @@ def noise_of(scenario: Scenario) -> Noise:
     """The noise preset with the scenario's changes to single components; UnknownName, BadInput."""
     try:
         return replace_fields(noises.noise_preset(scenario.noise), scenario.components, "components")
-    except TypeError as error:
+    except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 
@@ -164,13 +165,30 @@ class Subject:
 
     @cached_property
     def example_clips(self) -> list[Clip]:
-        """The example clips; BadInput when one is a copy of the test clip under another name."""
-        clips, digest = [self.source.load(name) for name in self.example_names], _motion_digest(self.clip)
+        """The example clips; ExampleLeak when one contains motion of the test clip under any name."""
+        clips = [self.source.load(name) for name in self.example_names]
         for clip in clips:
-            if clip.name != self.part.clip and _motion_digest(clip) == digest:
-                message = f"{clip.name} is {self.part.clip} under another name."
-                raise BadInput(message, "Remove it from motion.examples.")
+            self._refuse_copy(clip)
         return clips
+
+    def _refuse_copy(self, example: Clip) -> None:
+        """Raise ExampleLeak if an example is the test clip, or shares a second of its motion, beyond what is cut."""
+        tested = forbidden_frames(self.part, self.motion.split, len(self.clip), self.clip.rate_hz)
+        runs = self.allowed_runs(example)
+        if example.name != self.part.clip and _motion_digest(example) == _motion_digest(self.clip):
+            shared = f"{example.name} is {self.part.clip} under another name."
+        elif (found := find_shared_motion(self.clip, [tested], example, runs)) is not None:
+            how = ", mirrored" if found.mirrored else ""
+            tested_s, example_s = (f"{from_s:.1f} to {to_s:.1f} s" for from_s, to_s in (found.first_s, found.second_s))
+            shared = f"{self.part} ({tested_s}) and its example {example.name} ({example_s}{how}) are the same motion."
+        else:
+            return
+        advice = f"A test clip can never be among its own examples: remove {example.name} from motion.examples."
+        raise ExampleLeak(shared, advice)
+
+    def allowed_runs(self, example: Clip) -> list[range]:
+        """The runs of an example's frames that a method may learn from."""
+        return allowed_frames(self.held_out_parts, example.name, len(example), example.rate_hz)
 
     @cached_property
     def training(self) -> "Training":
@@ -201,7 +219,7 @@ class Training:
         """The motion that the split lets a method learn from, on the body and at the tracker's rate."""
         takes, held_out = [], self.subject.held_out_parts
         for clip, (whole_take, _) in zip(self.subject.example_clips, self._retargeted, strict=True):
-            runs = allowed_frames(held_out, clip.name, len(clip), clip.rate_hz)
+            runs = self.subject.allowed_runs(clip)
             refuse_leak(held_out, clip.name, runs, len(clip), clip.rate_hz)
             parts = (_cut_take(whole_take, run, clip.name) for run in runs)
             takes += [_resample(self.body, part, self.subject.rate_hz) for part in parts]

@@ -20,15 +20,20 @@ def main(number: str) -> None:
     gc.collect()
     gc.freeze()  # workers share these objects instead of copying them
     server = socket.socket(fileno=int(number))
-    while True:
-        text, descriptors, _, _ = socket.recv_fds(server, 4096, 2)
-        word, _, argument = text.decode().partition(" ")
-        if word == "fork":
-            server.send(str(_fork(server, argument, descriptors)).encode())
-        elif word == "poll":
-            server.send(_poll(int(argument)).encode())
-        else:
-            os._exit(0)
+    with suppress(OSError):  # the program is gone
+        while _answer(server):
+            pass
+
+
+def _answer(server: socket.socket) -> bool:
+    """Answer one request; False when there are no more."""
+    text, descriptors, _, _ = socket.recv_fds(server, 4096, 2)
+    word, _, argument = text.decode().partition(" ")
+    if word == "fork":
+        server.send(str(_fork(server, argument, descriptors)).encode())
+    elif word == "poll":
+        server.send(_poll(int(argument)).encode())
+    return bool(text)
 
 
 def _poll(pid: int) -> str:

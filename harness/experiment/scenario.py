@@ -5,13 +5,17 @@ import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import read_toml
+from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
+from harness.core.ranges import Range, check_fields
+from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
@@ -19,7 +23,6 @@ from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
-from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
@@ -38,19 +41,19 @@ class ScenarioMotion:
 
     source: Literal["builtin", "cmu"]
     """`builtin` is the motion generator; `cmu` is the library that --mocap or HARNESS_MOCAP names."""
-    test: tuple[str, ...]
+    test: tuple[Name, ...]
     """Test clips by name; "13_17@0.20-0.40" is that part of the take (for split `block`)."""
-    behaviours: tuple[str, ...]
+    behaviours: tuple[Name, ...]
     """Behaviour of the test clips: one word for all of them, or one word for each."""
-    examples: tuple[str, ...] = ()
+    examples: tuple[Name, ...] = ()
     """Clips that methods may learn from, except those that the split forbids for a test clip."""
-    withheld: tuple[str, ...] = ()
+    withheld: tuple[Name, ...] = ()
     """Clips and parts of clips that are no examples under any split, with 1 s around them: for example the test clips
     of the tables, while constants are chosen on other clips."""
-    thin_to: int = 0
+    thin_to: Annotated[int, Range(0, 100_000_000)] = 0
     """Number of frames that all examples together keep, evenly spaced, for a sparse database (Kim et al. 2012); 0 keeps
     all."""
-    example_share: float = 1.0
+    example_share: Annotated[float, Range(1e-06, 1.0)] = 1.0
     """Share of the frames of all examples that is kept, in pieces of 0.5 s drawn by the scenario's seed; smaller
     shares are subsets of larger ones (see `harness.experiment.example_subset`)."""
     database: Literal["all", "behaviour"] = "all"
@@ -61,10 +64,13 @@ class ScenarioMotion:
     """Body of the test: `own` has the performer's proportions, the others are the mean skeleton. On `standard` the
     bones point as the performer's do; on `common` the recorded angles are kept and the root's path is scaled by the
     legs."""
-    longest_s: float = 0.0
+    longest_s: Annotated[float, Range(0.0, 1e5)] = 0.0
     """Length of each test clip that is used, from its start [s]; 0 is all of it."""
-    rate_hz: float = 0.0
+    rate_hz: Annotated[float, Range(0.0, 1e4)] = 0.0
     """Frame rate of files that record none and that no index lists [Hz]; 0 refuses such files."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -73,30 +79,33 @@ class Station:
 
     bone: str
     """Name of the bone that carries the station."""
-    along: float = 0.5
+    along: Annotated[float, Range(0.0, 1.0)] = 0.5
     """Position along the bone, 0 at its joint to 1 at its far end."""
-    around_deg: float = 0.0
+    around_deg: Annotated[float, Range(-360.0, 360.0)] = 0.0
     """Angle around the bone [deg]."""
-    stand_off_m: float = 0.01
+    stand_off_m: Annotated[float, Range(0.0, 0.5)] = 0.01
     """Distance of the station's origin from the skin [m]."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
 class CalibrationSettings:
     """Errors of a simulated performer who holds calibration poses, and of the true mounts."""
 
-    miss_deg: float = 2.5
+    miss_deg: Annotated[float, Range(0.0, 45.0)] = 2.5
     """Standard deviation of each hinge, and of the body's lean, from each pose [deg]."""
-    hold_s: float = 3.0
+    hold_s: Annotated[float, Range(2.0, 60.0)] = 3.0
     """Time that each pose is held [s]."""
-    beside_m: float = 0.0
+    beside_m: Annotated[float, Range(0.0, 1.0)] = 0.0
     """Standard deviation of the stations' positions from their nominal mounts, along each axis [m]. It is part of the
     simulated world: the calibration `exact` knows it, the others estimate it."""
-    turned_deg: float = 0.0
+    turned_deg: Annotated[float, Range(0.0, 360.0)] = 0.0
     """Standard deviation of the stations' orientations about each axis [deg]; 180 is nearly random."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -105,17 +114,17 @@ class Scenario:
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"order": "expected_order"}
 
-    name: str
+    name: FileName
     motion: ScenarioMotion
-    stations: dict[str, Station]
+    stations: dict[Name, Station]
     """The stations by name; in a file also the name of a set, such as "liu2011" (see `expand_station_set`)."""
-    methods: tuple[str, ...]
+    methods: tuple[MethodName, ...]
     """Methods by name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
-    seed: int = 1
-    inputs: tuple[str, ...] = ("pos+ori",)
+    seed: Annotated[int, Range(0, 2**63 - 1)] = 1
+    inputs: tuple[MethodName, ...] = ("pos+ori",)
     """Which of position and orientation each station delivers; every method runs with each choice."""
-    worn: tuple[str, ...] = ()
+    worn: tuple[Name, ...] = ()
     """Names of the stations that are worn; all of them if empty. Vary "worn" to compare sets of stations. The stream
     has no other stations, so that a station that is not worn is not a lost one."""
     calibration: Literal["exact", "tpose", "poses", "liu2011", "kim2012"] = "exact"
@@ -124,27 +133,30 @@ class Scenario:
     the papers' equations as printed: eight poses, and a T-pose. Vary it to measure the cost of calibration."""
     calibrating: CalibrationSettings = field(default_factory=CalibrationSettings)
     """Errors of the simulated calibration."""
-    mount: str = "tibia"
+    mount: Text = "tibia"
     """Name of the mounting in tables, such as tibia or foot: the place of the ankle stations."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The device and its line."""
     noise: Literal["clean", "noise", "default"] = "default"
     """Noise preset."""
-    profile: str = ""
+    profile: Text = ""
     """Name of changed noise in tables; without it the preset's name and an asterisk."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise preset (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
     disturbance: Disturbance = field(default_factory=Disturbance)
     """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.results.recovery`)."""
-    vary: dict[str, Any] = field(default_factory=dict)
+    vary: dict[Text, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]. Everything runs with each value,
     or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
     """Rankings that papers state (see `harness.results.expected_orders`)."""
-    left_out: dict[str, str] = field(default_factory=dict)
+    left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
     """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     @property
     def worn_stations(self) -> dict[str, Station]:
@@ -286,6 +298,7 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
 def find_scenario(path: Path | str) -> Path:
     """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile."""
     given = Path(path)
+    check_words(given)
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_scenarios()}
@@ -317,8 +330,6 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse("no methods", "names in methods", "`harness list` names them.")
     if not scenario.inputs:
         refuse("no inputs", "names in inputs", "`harness list` names them.")
-    if scenario.name != Path(scenario.name).name:
-        refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
     counted = not any(map(_is_pattern, scenario.motion.test))  # else `expand_clips` checks it
     if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
@@ -339,21 +350,13 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
     ):
         if len(set(repeated)) < len(repeated):
             refuse(f"{what} names something twice", "each name once", "Remove the second.")
+    parts = sorted(map(ClipPart.parse, scenario.motion.test), key=lambda part: (part.clip, part.start))
+    for one, other in pairwise(parts):
+        if one.clip == other.clip and other.start < one.end:
+            refuse(f"motion.test has {one} and {other}, which overlap", "parts without common frames", "Shorten one.")
     for name in scenario.worn:
         if name not in scenario.stations:
             refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
-    if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
-        refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
-    if not 0.0 < scenario.motion.example_share <= 1.0:
-        refuse(f"motion.example_share = {scenario.motion.example_share}", "above 0, at most 1", "1 keeps all frames.")
-    for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
-        if value < 0.0:
-            refuse(f"motion.{key} = {value}", "0 or more", "0 uses the whole clip, or the rate in the file.")
-    for name, station in scenario.stations.items():
-        if not 0.0 <= station.along <= 1.0:
-            refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
-        if station.stand_off_m < 0.0:
-            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Stations sit on the skin.")
 
 
 def check_expected_orders(path: Path, scenario: Scenario) -> None:

@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from harness.core.fields import build
 from harness.core.files import read_toml
+from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
+from harness.core.ranges import Range
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.scenario import (
     SCHEMA,
@@ -28,16 +30,16 @@ _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 class Sweep:
     """Content of a sweep's file; keys that it leaves out are those of the scenarios."""
 
-    name: str
-    scenarios: tuple[str, ...]
+    name: FileName
+    scenarios: tuple[Text, ...]
     """Names of shipped scenarios, or of files in the sweep's folder without `.toml`."""
     schema: int = SCHEMA
-    methods: tuple[str, ...] = ()
-    inputs: tuple[str, ...] = ()
-    clips: tuple[str, ...] = ()
+    methods: tuple[MethodName, ...] = ()
+    inputs: tuple[MethodName, ...] = ()
+    clips: tuple[Name, ...] = ()
     """Subset of the scenarios' test clips, () for all."""
-    seeds: tuple[int, ...] = ()
-    vary: dict[str, Any] = field(default_factory=dict)
+    seeds: Annotated[tuple[int, ...], Range(0, 2**63 - 1)] = ()
+    vary: dict[Text, Any] = field(default_factory=dict)
     """Varied keys as in a scenario, in addition to those that the scenarios vary."""
 
 
@@ -55,8 +57,6 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     if sweep.schema != SCHEMA:
         advice = "This version of the harness reads no other."
         raise BadFile(path, f"schema {sweep.schema}", f"schema {SCHEMA}", advice)
-    if sweep.name != Path(sweep.name).name or not sweep.name:
-        raise BadFile(path, f"name = {sweep.name!r}", "a plain name", "Results are written to a folder of that name.")
     if not sweep.scenarios:
         raise BadFile(path, "no scenarios", "names in scenarios", "`harness list` names the shipped ones.")
     for key in ("scenarios", "methods", "inputs", "clips", "seeds"):
@@ -69,6 +69,7 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
 def find_sweep(path: Path | str) -> Path:
     """Path of a sweep, given as a file or as the name of a shipped one; BadFile, UnknownName."""
     given = Path(path)
+    check_words(given)
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_sweeps()}

@@ -160,5 +160,5 @@ def read_findings(path: Path) -> PaperFindings:
     content = read_result_json(path, expected, advice)
     try:
         return build(PaperFindings, content, "findings")
-    except (TypeError, UnknownName) as error:
+    except (TypeError, ValueError, UnknownName) as error:
         raise BadFile(path, str(error), expected, advice) from error

@@ -264,7 +264,7 @@ def read_placement(path: Path) -> PlacementFindings:
         raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
     try:
         findings = build(PlacementFindings, content, "findings")
-    except (TypeError, UnknownName) as error:
+    except (TypeError, ValueError, UnknownName) as error:
         raise BadFile(path, str(error), expected, advice) from error
     if strangers := _unknown_stations(findings):
         raise BadFile(path, f"names {strangers[0]!r}, which is no candidate of it", expected, advice)

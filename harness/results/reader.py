@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from harness.core.names import check_words
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, read_result_json
@@ -72,6 +73,7 @@ def load_results(where: Path | str) -> ResultSet:
     written by another version; UnknownName for an unknown name.
     """
     folder = Path(where)
+    check_words(folder)
     if not folder.is_dir():
         known = sorted(path.parent.name for path in BASELINES.glob(f"*/{CELLS_FILE}"))
         if folder.name != str(where):

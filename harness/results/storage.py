@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import TEMPORARY, content_key, digest
+from harness.core.names import check_words
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.results.digests import write_result_json
@@ -56,6 +57,7 @@ def open_folder(
     `difference` says in what an existing identity file differs, "" if it does not. BadInput when it differs, when the
     folder holds other files, and when it cannot be written.
     """
+    check_words(out)
     advice = "Name another folder with --out, or delete this one."
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out} is a file.", "Name a folder with --out.")

@@ -5,16 +5,16 @@ shows the error without the fault; `results.recovery` compares the two.
 """
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
+from harness.core.ranges import Range, check_fields
 from harness.errors import UnknownName
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.orientation_offset import OrientationOffset
 from harness.simulate.components.position_offset import PositionOffset
 from harness.simulate.noise import Noise
-from harness.simulate.parameter_ranges import require_ranges
 
 Kind = Literal["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -32,19 +32,19 @@ class Disturbance:
     """
     station: str = ""
     """Station of `one_lost` and `one_off`; "" is the first."""
-    from_s: float = 3.0
+    from_s: Annotated[float, Range(0.0, 1e6)] = 3.0
     """Beginning [s]; `start_off` always begins with the take."""
-    lasts_s: float = 2.0
+    lasts_s: Annotated[float, Range(0.0, 1e6)] = 2.0
     """Duration [s]."""
-    off_m: float = 0.3
+    off_m: Annotated[float, Range(-100.0, 100.0)] = 0.3
     """Position error of `one_off` [m]."""
-    turn_deg: float = 30.0
+    turn_deg: Annotated[float, Range(-360.0, 360.0)] = 30.0
     """Angle of `all_turned` about the vertical [deg]."""
-    start_off_m: float = 1.0
+    start_off_m: Annotated[float, Range(-100.0, 100.0)] = 1.0
     """Position error of `start_off` [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, from_s=(0.0, 1e6), lasts_s=(0.0, 1e6))
+        check_fields(self)
 
     @property
     def begins_s(self) -> float:

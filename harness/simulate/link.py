@@ -2,10 +2,12 @@
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.ranges import Range, check_fields
 from harness.errors import BadInput
 from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
@@ -14,30 +16,23 @@ from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 class TrackerConfig:
     """Rates, latency, line and output list of a simulated IS-900."""
 
-    rate_hz: float = 40.0
+    rate_hz: Annotated[float, Range(1.0, 1000.0)] = 40.0
     """Records per second of each station (Liu et al. 2011)."""
-    latency_s: float = 0.004
+    latency_s: Annotated[float, Range(0.0, 60.0)] = 0.004
     """Delay from the sample to the first bit on a free line [s] (docs/is900.md 13.1, unverified)."""
-    baud: int = 115200
+    baud: Annotated[int, Range(1, 100_000_000)] = 115200
     """Bits per second of the line (docs/is900.md 2)."""
-    slot_s: float | None = None
+    slot_s: Annotated[float | None, Range(0.0, 1.0)] = None
     """Time between the samples of one station and the next [s]; by default as fast as the line takes records."""
-    items: tuple[int, ...] = STANDARD_LIST
+    items: Annotated[tuple[int, ...], Range(0, 255)] = STANDARD_LIST
     """Output list (item numbers) of every station."""
-    queue_records: int = 12
+    queue_records: Annotated[int, Range(1, 1_000_000)] = 12
     """Length of the send queue; when it is full the oldest record is dropped (docs/is900.md 14) [choice]."""
-    origin_m: tuple[float, float, float] = (0.0, 0.0, 2.5)
+    origin_m: Annotated[tuple[float, float, float], Range(-100.0, 100.0)] = (0.0, 0.0, 2.5)
     """Origin of the tracker's frame in the world [m]; the default is under the ceiling."""
 
     def __post_init__(self) -> None:
-        for key, valid, wanted in (
-            ("rate_hz", 0.0 < self.rate_hz < 1e5, "a number above 0 and below 100000"),
-            ("latency_s", 0.0 <= self.latency_s < 60.0, "a number from 0, below 60"),
-            ("baud", self.baud >= 1, "a number from 1"),
-            ("queue_records", self.queue_records >= 1, "a number from 1"),
-        ):
-            if not valid:
-                raise BadInput(f"The tracker's {key} = {getattr(self, key):g}.", f"Give {wanted}.")
+        check_fields(self)
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
 

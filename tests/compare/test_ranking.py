@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.compare.comparison import compare_results
-from harness.compare.ranking import ClipValues, Ranking, find_best, rank_methods
+from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
 from harness.core.seeds import generator
 from harness.results.reader import ResultSet
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -23,7 +23,7 @@ def values_of(results: ResultSet) -> dict[str, ClipValues]:
     return dict(found)
 
 
-def rank(results: ResultSet, metric: str = PRIMARY_METRIC) -> Ranking:
+def rank(results: ResultSet, metric: str = PRIMARY_METRIC) -> MethodRanking:
     ranking = rank_methods(values_of(results), metric)
     assert ranking is not None
     return ranking

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from harness.experiment.method_run import run_method
 from harness.experiment.reference_workload import FRAMES_PER_TIMING
@@ -41,3 +42,32 @@ def test_reference_work_lies_between_steps_and_the_step_after_it_is_not_timed() 
         )
     assert (step_ms[np.isfinite(step_ms)] > 0.0).all()
     assert (reference_ms[np.isfinite(reference_ms)] > 0.0).all()
+
+
+class Rewriter:
+    """A session whose answers are one array, which it writes anew at every step."""
+
+    def __init__(self) -> None:
+        self.qpos = np.zeros(55)
+
+    def begin(self, calibration: Any) -> "Rewriter":
+        return self
+
+    def step(self, frame: int) -> SimpleNamespace:
+        self.qpos[:] = frame
+        return SimpleNamespace(qpos=self.qpos, status=0, origin=0)
+
+
+def test_an_answer_is_copied_at_its_step() -> None:
+    method: Any = Rewriter()
+    shown: Any = range(5)
+    answers = run_method(method, method, shown)
+    np.testing.assert_array_equal(answers.qpos[:, 0], np.arange(5.0))
+
+
+def test_a_pose_of_another_size_is_an_error() -> None:
+    method: Any = Rewriter()
+    method.qpos = np.zeros(54)
+    shown: Any = range(5)
+    with pytest.raises(ValueError, match=r"shape \(54,\), expected \(55,\)"):
+        run_method(method, method, shown)

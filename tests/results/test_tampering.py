@@ -17,6 +17,7 @@ from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
 from harness.experiment.status import read_status
 from harness.report.run.data import read_run
+from harness.results.cell import read_row
 from harness.results.digests import file_digest
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.loaded_run import load_run
@@ -276,6 +277,15 @@ def test_values_that_disagree_between_files_are_refused_although_each_digest_fit
     rewrite_digests(run)
     with pytest.raises(BadFile, match=r"summary\.json: mpjpe_mm of the cell \w+ is .* as in its cell\.json"):
         read_run(run)
+
+
+def test_a_cell_in_the_folder_of_another_is_refused_although_its_digests_fit(run: Path) -> None:
+    """A resumed run reads rows by the name of the folder alone."""
+    first, second, *_ = cells(run)
+    shutil.rmtree(first)
+    shutil.copytree(second, first)
+    with pytest.raises(BadFile, match=f"the cell {second.name}; expected the cell that its folder is named after"):
+        read_row(first)
 
 
 def test_an_edited_index_is_made_anew_from_the_cells(run: Path) -> None:

@@ -129,7 +129,7 @@ def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
      ("queue_records", 0)],
 )  # fmt: skip
 def test_an_impossible_tracker_is_refused_with_its_key(key: str, value: Any) -> None:
-    with pytest.raises(BadInput, match=f"^The tracker's {key} = {value:g}. Give a number"):
+    with pytest.raises(BadInput, match=f"^TrackerConfig.{key} = {value}. Give a number"):
         TrackerConfig(**{key: value})
 
 

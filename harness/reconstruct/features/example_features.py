@@ -6,7 +6,7 @@ of their weights, so that squared Euclidean distances are those of eq. 2. They a
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
+from harness.core.ranges import Range
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Lookup, make_index
@@ -35,11 +36,11 @@ _CHUNK = 512
 class FeatureWeights:
     """Weights of eq. 2 of Kim et al. 2012."""
 
-    position: float = 0.6
+    position: Annotated[float, Range(0.0, 1e6)] = 0.6
     """Weight of positions [1/m^2]."""
-    velocity: float = 0.2
+    velocity: Annotated[float, Range(0.0, 1e6)] = 0.2
     """Weight of velocities [s^2/m^2]."""
-    orientation: float = 0.2
+    orientation: Annotated[float, Range(0.0, 1e6)] = 0.2
     """Weight of unit quaternions."""
 
 

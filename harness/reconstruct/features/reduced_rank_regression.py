@@ -13,6 +13,7 @@ training without them.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import solve
@@ -21,6 +22,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
+from harness.core.ranges import Range
 from harness.reconstruct.database import Windows
 from harness.reconstruct.features.ground_step import features_from_readings
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
@@ -48,13 +50,13 @@ _TRAINING_WINDOWS = 20_000
 class ReducedRankOptions:
     """Options of the reduced-rank regression."""
 
-    window_weight: float = 0.3
+    window_weight: Annotated[float, Range(0.0, 1e6)] = 0.3
     """Factor of the window's columns [rad, m] against readings in metres."""
-    lever_m: float = 0.3
+    lever_m: Annotated[float, Range(1e-06, 100.0)] = 0.3
     """Displacement that counts as much as a rotation of one radian [m]."""
-    directions: int = 40
+    directions: Annotated[int, Range(1, 10_000)] = 40
     """Number of features z."""
-    ridge: float = 1e-5
+    ridge: Annotated[float, Range(0.0, 1e6)] = 1e-5
     """Ridge of the regression, as a share of the predictors' total variance."""
 
 

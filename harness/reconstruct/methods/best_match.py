@@ -14,6 +14,7 @@ Options (fields of `BestMatch`): the three weights of eq. 2 (0.6, 0.2, 0.2 for m
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.outlier_gate import OutlierGate
@@ -44,13 +46,13 @@ class BestMatch:
     name: str = "best_match"
     summary: str = "the nearest example frame, placed at the trackers: a baseline"
     needs_examples: bool = True
-    position_weight: float = 0.6
+    position_weight: Annotated[float, Range(0.0, 1e6)] = 0.6
     """Weight of positions in eq. 2 [1/m^2]."""
-    velocity_weight: float = 0.2
+    velocity_weight: Annotated[float, Range(0.0, 1e6)] = 0.2
     """Weight of velocities in eq. 2 [s^2/m^2]."""
-    orientation_weight: float = 0.2
+    orientation_weight: Annotated[float, Range(0.0, 1e6)] = 0.2
     """Weight of unit quaternions in eq. 2."""
-    longest_gap_s: float = 0.2
+    longest_gap_s: Annotated[float, Range(0.0, 1e4)] = 0.2
     """Longest time between two readings from which a velocity is computed [s]."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedBestMatch":

@@ -14,6 +14,7 @@ Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -46,9 +48,9 @@ class CleanUp:
     """Scales and robust loss of the residuals."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""
-    spread_share: float = 0.5
+    spread_share: Annotated[float, Range(0.0, 1e4)] = 0.5
     """Standard deviation of each hinge about the other method's pose, as a share of its spread over the examples."""
-    prior_sigma_rad: float = math.radians(30.0)
+    prior_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
     """Standard deviation of each hinge about the pose of a method that has no examples [rad]."""
 
     @property

@@ -22,7 +22,7 @@ scenarios/tune_dynamic_map.toml and other validation clips chose them. `regressi
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
@@ -87,38 +88,38 @@ class DynamicMap:
     """Search of the neighbours: by the last estimates and the readings, or by the last estimates alone (the paper)."""
     regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
     """Options of the reduced-rank regression that makes the features; used when `search` is "features"."""
-    poses: int = 3
+    poses: Annotated[int, Range(1, 100)] = 3
     """m: number of past estimates from which the next pose is predicted."""
-    neighbours: int = 800
+    neighbours: Annotated[int, Range(2, 1_000_000)] = 800
     """K: number of examples in the local model."""
-    width: float = 0.2
+    width: Annotated[float, Range(1e-06, 1e6)] = 0.2
     """Variance of the weights over the K/2-th neighbour's squared distance; 0 is eq. 6 as printed, D_w = 1."""
-    variance_kept: float = 1.0
+    variance_kept: Annotated[float, Range(1e-06, 1.0)] = 1.0
     """Share of the windows' variance that the regression uses (eq. 5); 1 keeps all and relies on the ridge."""
-    ridge: float = 0.1
+    ridge: Annotated[float, Range(0.0, 1e6)] = 0.1
     """Ridge added to the eigenvalues of the windows' covariance, as a share of its trace."""
     covariance: Literal["full", "diagonal"] = "full"
     """Covariance of the prediction: that of the regression's residuals, or its diagonal alone (the paper, eq. 8)."""
-    spread: float = 3.0
+    spread: Annotated[float, Range(1e-06, 1e6)] = 3.0
     """Factor on the standard deviations of the prediction, which allows for another performer than the examples'.
 
     At 1 the prior is so narrow that it pulls the body off exact trackers."""
-    widening: float = 100.0
+    widening: Annotated[float, Range(0.0, 1e6)] = 100.0
     """For performers unlike the examples, the covariance grows by the factor f = 1 + (widening d^2)^2, where d is the
     RMS distance of the nearest example per column of the query; 0 for no growth."""
-    ik_prior_weight: float = 1.0
+    ik_prior_weight: Annotated[float, Range(0.0, 1e6)] = 1.0
     """The prior of `ik` takes part with the weight `ik_prior_weight` (1 - 1/f); 0 leaves it out."""
-    least_sigma_rad: float = math.radians(1.0)
+    least_sigma_rad: Annotated[float, Range(0.0, 100.0)] = math.radians(1.0)
     """Floor of every hinge's standard deviation [rad]."""
-    tilt_sigma_rad: float = math.radians(3.0)
+    tilt_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(3.0)
     """Floor of the root's tilt, standard deviation [rad]."""
-    height_sigma_m: float = 0.02
+    height_sigma_m: Annotated[float, Range(1e-06, 100.0)] = 0.02
     """Floor of the root's height, standard deviation [m]."""
-    step_sigma_m: float = 3.0
+    step_sigma_m: Annotated[float, Range(1e-06, 100.0)] = 3.0
     """Floor of the root's step over the ground, standard deviation [m]; a small one makes a slip permanent.
 
     With a full covariance neither the step nor the turn has a prior."""
-    turn_sigma_rad: float = math.radians(60.0)
+    turn_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(60.0)
     """Floor of the root's rotation about the vertical per frame, standard deviation [rad]."""
     start: Literal["prediction", "closest"] = "prediction"
     """Start of the solver. "closest" is the closest example (the paper). "prediction" is the prediction, then the
@@ -127,9 +128,9 @@ class DynamicMap:
     """Search index: "auto" or a name of `index.selection`."""
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
-    jump_m: float = 0.1
+    jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    lost_after_s: float = LOST_AFTER_S
+    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""

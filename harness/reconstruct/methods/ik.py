@@ -20,12 +20,14 @@ Presets: `ik:previous` (prior about the last estimate, learns nothing), `ik:mean
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
@@ -46,17 +48,17 @@ class Ik:
     summary: str = "robust whole-body inverse kinematics with a weak prior about the examples' mean posture"
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
-    towards_mean: float = 0.1
+    towards_mean: Annotated[float, Range(0.0, 1.0)] = 0.1
     """Mean of the prior: 0 is the last estimate, 1 the examples' mean posture."""
-    prior_sigma_rad: float = math.radians(30.0)
+    prior_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
     """Root mean square of the hinges' standard deviations [rad]; inf for no prior."""
     spread: bool = True
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
     limits: bool = True
     """Keep hinges within the body's limits."""
-    jump_m: float = JUMP_M
+    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    lost_after_s: float = LOST_AFTER_S
+    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""

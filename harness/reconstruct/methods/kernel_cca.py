@@ -13,9 +13,10 @@ scenarios/tune_kernel_cca.toml chose them.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from harness.core.arrays import Floats
+from harness.core.ranges import Range
 from harness.reconstruct.methods import cca
 from harness.reconstruct.methods.local_regression import LocalRegression
 
@@ -30,15 +31,15 @@ class KernelCca(LocalRegression):
     summary: str = (
         "kernel canonical correlation regression on the nearest examples, smoothed, then fitted to the trackers"
     )
-    neighbours: int = 12
+    neighbours: Annotated[int, Range(1, 1_000_000)] = 12
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
-    bases: int = 12
+    bases: Annotated[int, Range(1, 1_000_000)] = 12
     """l of eq. 4: number of canonical bases, at most m - 1."""
-    kappa: float = 0.3
+    kappa: Annotated[float, Range(0.0, 1e6)] = 0.3
     """Ridge of eq. 3, as a share of each Gram matrix's mean eigenvalue."""
     regularise_projection: bool = True
     """Whether the ridge of eq. 3 regularises the projection of eq. 4 too; false is eq. 4 as printed."""
-    width: float = 1.0
+    width: Annotated[float, Range(1e-06, 1e6)] = 1.0
     """Standard deviation of the Gaussian kernels, in RMS distances of two examples."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:

@@ -15,6 +15,7 @@ chosen on built-in takes that no scenario evaluates.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -25,6 +26,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
@@ -48,17 +50,17 @@ class KernelRidge:
     name: str = "kernel_ridge"
     summary: str = "one smooth map from readings to posture, learnt from all examples at once"
     needs_examples: bool = True
-    most_frames: int = 2000
+    most_frames: Annotated[int, Range(2, 1_000_000)] = 2000
     """Largest number of example frames; more are thinned at random."""
-    ridge: float = 0.01
+    ridge: Annotated[float, Range(1e-12, 1e6)] = 0.01
     """Ridge that is added to the kernel matrix, whose diagonal is 1."""
-    width: float = 1.4
+    width: Annotated[float, Range(1e-06, 1e6)] = 1.4
     """Standard deviation of the kernel, in RMS distances of two examples."""
-    lever_m: float = 0.3
+    lever_m: Annotated[float, Range(1e-06, 100.0)] = 0.3
     """Displacement that counts as much as a rotation of one radian [m]."""
-    position_noise_m: float = 0.004
+    position_noise_m: Annotated[float, Range(0.0, 10.0)] = 0.004
     """Noise added to the examples' positions on each axis, standard deviation [m]."""
-    orientation_noise_rad: float = 0.01
+    orientation_noise_rad: Annotated[float, Range(0.0, 10.0)] = 0.01
     """Noise added to the examples' orientations about each axis, standard deviation [rad]."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedKernelRidge":

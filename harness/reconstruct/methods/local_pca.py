@@ -19,6 +19,7 @@ Options are the fields of `LocalPca`; scenarios/tune_local_pca.toml chose the de
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
@@ -60,34 +62,34 @@ class LocalPca:
     name: str = "local_pca"
     summary: str = "best fit to the readings within the principal directions of similar examples"
     needs_examples: bool = True
-    neighbours: int = 300
+    neighbours: Annotated[int, Range(2, 1_000_000)] = 300
     """K, examples of the local model."""
-    components: int = 40
+    components: Annotated[int, Range(1, 55)] = 40
     """Number of principal directions."""
-    prior_weight: float = 0.3
+    prior_weight: Annotated[float, Range(0.0, 1e6)] = 0.3
     """alpha: weight of the squared distance from the mean, in the examples' standard deviations."""
-    smooth_weight: float = 0.2
+    smooth_weight: Annotated[float, Range(0.0, 1e6)] = 0.2
     """beta: weight of the squared change of velocity, in units of `smooth_sigma_rad`."""
-    smooth_sigma_rad: float = 0.1
+    smooth_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = 0.1
     """Typical change of a hinge's step from one frame to the next [rad; m for the height]."""
-    control_weight: float = 1.0
+    control_weight: Annotated[float, Range(0.0, 1e6)] = 1.0
     """Weight of the readings in the query: m^2 of the readings against rad^2 of the postures."""
-    lever_m: float = 0.3
+    lever_m: Annotated[float, Range(1e-06, 100.0)] = 0.3
     """Displacement that counts as much as a rotation of one radian in the query [m]."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
-    widening: float = 20.0
+    widening: Annotated[float, Range(0.0, 1e6)] = 20.0
     """Standard deviation of each hinge about the answer within the subspace [rad]: this times the squared RMS distance
     of the nearest example, per column of the query. Below 1 deg the answer stays within the subspace."""
-    ik_prior_weight: float = 9.0
+    ik_prior_weight: Annotated[float, Range(0.0, 1e6)] = 9.0
     """Weight of the prior of `ik` where the answer leaves the subspace; 0 leaves it out."""
     restart: bool = True
     """Whether a cold start follows when readings contradict the answer for long; if not, only after a loss."""
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
-    jump_m: float = JUMP_M
+    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    lost_after_s: float = LOST_AFTER_S
+    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
     """Convergence criteria. They are looser than those of `ik`; on validation clips errors differ by 0.001 deg."""

@@ -19,7 +19,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.calibration_cache import CalibrationCache
@@ -61,19 +62,19 @@ class LocalRegression(ABC):
     name: str
     summary: str
     needs_examples: bool = True
-    neighbours: int = 8
+    neighbours: Annotated[int, Range(1, 1_000_000)] = 8
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     weights: FeatureWeights = field(default_factory=FeatureWeights)
     """Weights of positions, velocities and orientations in eq. 2."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
-    longest_gap_s: float = 0.2
+    longest_gap_s: Annotated[float, Range(0.0, 1e4)] = 0.2
     """Longest time between two readings or examples from which a velocity is computed [s]."""
-    jump_m: float = JUMP_M
+    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    alpha: float = 0.3
+    alpha: Annotated[float, Range(0.0, 1.0)] = 0.3
     """alpha of eq. 6: share of the frame before last in the blend of the last two."""
-    beta: float = 0.4
+    beta: Annotated[float, Range(0.0, 1.0)] = 0.4
     """beta of eq. 6: share of the last two frames; 0 disables smoothing."""
     outputs: Literal["angles", "quaternions"] = "angles"
     """Coordinates in which poses are blended and smoothed: hinge angles, or the joints' quaternions (the paper)."""
@@ -81,15 +82,15 @@ class LocalRegression(ABC):
     """Whether inverse kinematics follows; without it only the root is fitted to the trackers."""
     solve: Literal["body", "limbs"] = "body"
     """Inverse kinematics: "body" takes a few Levenberg-Marquardt steps, "limbs" solves limbs in closed form."""
-    root_sigma_m: float = 0.1
+    root_sigma_m: Annotated[float, Range(1e-06, 100.0)] = 0.1
     """Standard deviation of the root's position about the regressed one [m]."""
-    root_sigma_rad: float = math.radians(10.0)
+    root_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(10.0)
     """Standard deviation of the root's orientation about the regressed one [rad]."""
-    hinge_sigma_rad: float = math.radians(30.0)
+    hinge_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
     """RMS of the hinges' standard deviations about the regressed pose [rad]."""
     spread: bool = True
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
-    most_steps: int = 4
+    most_steps: Annotated[int, Range(1, 10_000)] = 4
     """Largest number of Levenberg-Marquardt steps."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":

@@ -10,11 +10,13 @@ Options: `neighbours` 16, `power` 4, and those of `LocalRegression`; scenarios/t
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.ranges import Range
 from harness.reconstruct.methods.local_regression import LocalRegression
 
 
@@ -24,9 +26,9 @@ class WeightedBlend(LocalRegression):
 
     name: str = "weighted_blend"
     summary: str = "nearest examples weighted by inverse distance, smoothed, then fitted to the trackers"
-    neighbours: int = 16
+    neighbours: Annotated[int, Range(1, 1_000_000)] = 16
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
-    power: float = 4.0
+    power: Annotated[float, Range(0.0, 100.0)] = 4.0
     """Exponent of the weights, distance^-power."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:

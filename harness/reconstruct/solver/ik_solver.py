@@ -8,11 +8,13 @@ cost is undone, and the damping is raised.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import specialise
+from harness.core.ranges import Range
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.levenberg_marquardt import PriorAndLimits, minimise, new_quadratic_model
 from harness.reconstruct.solver.residuals import Residuals
@@ -46,11 +48,11 @@ def multiply_priors(prior: Prior, broad: Prior, weight: float) -> Prior:
 class Stopping:
     """Criteria of convergence, and the limit of steps."""
 
-    step: float = 1e-4
+    step: Annotated[float, Range(0.0, 1.0)] = 1e-4
     """Converged once no component of an undamped step is larger [m, rad]: 0.1 mm, 0.006 deg."""
-    decrease: float = 1e-5
+    decrease: Annotated[float, Range(0.0, 1.0)] = 1e-5
     """Converged, too, once an undamped step is predicted to lower the cost, a log likelihood, by less."""
-    most_steps: int = 30
+    most_steps: Annotated[int, Range(1, 10_000)] = 30
     """Steps after which a solve ends without convergence."""
 
 

@@ -8,6 +8,7 @@ rho(e) = sL^2/sd^2 log(1 + e^2 / 2 sL^2). That is the square for small e, and gi
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import specialise
+from harness.core.ranges import Range
 from harness.errors import ShapeError
 from harness.reconstruct.solver.kinematic_tree import build_tree, new_state
 from harness.reconstruct.solver.normal_equations import (
@@ -32,19 +34,19 @@ from harness.stream.frame import TrackerFrame
 class Loss:
     """The noise model of readings and the robust loss."""
 
-    position_sigma_m: float = 0.003
+    position_sigma_m: Annotated[float, Range(1e-06, 10.0)] = 0.003
     """Standard deviation of measured positions [m]."""
-    orientation_sigma_rad: float = math.radians(0.5)
+    orientation_sigma_rad: Annotated[float, Range(1e-06, 10.0)] = math.radians(0.5)
     """Standard deviation of measured orientations [rad]."""
     robust: bool = True
     """Lorentzian instead of squared residuals."""
-    position_scale_m: float = 0.03
+    position_scale_m: Annotated[float, Range(1e-06, 10.0)] = 0.03
     """The Lorentzian's scale for positions [m]."""
-    orientation_scale_rad: float = math.radians(8.0)
+    orientation_scale_rad: Annotated[float, Range(1e-06, 10.0)] = math.radians(8.0)
     """The Lorentzian's scale for orientations [rad]."""
     quality: bool = True
     """Weigh every reading by its station's quality, 0 to 1: a standard deviation of sigma / sqrt(quality)."""
-    suspect_weight: float = 0.1
+    suspect_weight: Annotated[float, Range(0.0, 1.0)] = 0.1
     """Further factor on the precision of a suspect reading: 1 treats it like any other, 0 leaves it out."""
 
 

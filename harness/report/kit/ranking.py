@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from harness.compare.ranking import Ranking
+from harness.compare.ranking import MethodRanking
 from harness.core.number_format import count_noun, format_share
 from harness.report.kit.text import list_first
 
@@ -13,7 +13,9 @@ BOLD_NOTE = " Bold: better than every other method, by the rules of harness comp
 _MOST_NAMED = 4
 
 
-def describe_ranking(ranking: Ranking, where: str, format_error: Callable[[float], str], clips: str = "clip") -> str:
+def describe_ranking(
+    ranking: MethodRanking, where: str, format_error: Callable[[float], str], clips: str = "clip"
+) -> str:
     """Which method is best, or has the lowest error, and what can be told about the others.
 
     `where` names the motion, such as "5 clips of built-in motion"; `clips` is the noun for what is counted.
@@ -34,7 +36,7 @@ def describe_ranking(ranking: Ranking, where: str, format_error: Callable[[float
     return " ".join(parts)
 
 
-def _lead(ranking: Ranking, format_error: Callable[[float], str], clips: str) -> str:
+def _lead(ranking: MethodRanking, format_error: Callable[[float], str], clips: str) -> str:
     """The sentence on how much lower the best error is than the next."""
     (_, best), (second, next_lowest), *_ = ranking.values.items()
     difference, wins = float(np.mean(next_lowest - best)), int(np.sum(best < next_lowest))

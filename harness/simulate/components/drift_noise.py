@@ -1,11 +1,12 @@
 """Slow drift of position and orientation."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -18,19 +19,17 @@ class DriftNoise:
     Gravity constrains pitch and roll better than ranges constrain yaw.
     """
 
-    position_m: float = 0.0015
+    position_m: Annotated[float, Range(0.0, 1.0)] = 0.0015
     """RMS on each axis [m]."""
-    pitch_roll_rad: float = float(np.deg2rad(0.25))
+    pitch_roll_rad: Annotated[float, Range(0.0, 1.0)] = float(np.deg2rad(0.25))
     """RMS about each horizontal axis [rad]."""
-    yaw_rad: float = float(np.deg2rad(0.50))
+    yaw_rad: Annotated[float, Range(0.0, 1.0)] = float(np.deg2rad(0.50))
     """RMS about the vertical axis [rad]."""
-    correlation_s: float = 1.0
+    correlation_s: Annotated[float, Range(1e-3, 1e6)] = 1.0
     """Time after which the correlation is 1/e [s]."""
 
     def __post_init__(self) -> None:
-        require_ranges(
-            self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6)
-        )
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         draws = [readings.take_rng("slow", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]

@@ -1,11 +1,12 @@
 """Short losses: the line of sight is blocked, the station coasts on its inertial sensors, then it is lost."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
 
@@ -17,17 +18,17 @@ class Dropout:
     During the gap, records repeat the filter's last state (section 7). Share and lengths are inferred (13.5).
     """
 
-    share: float = 0.01
+    share: Annotated[float, Range(0.0, 0.99)] = 0.01
     """Share of station readings with quality 0, 0 to below 1."""
-    gap_s: tuple[float, float] = (0.1, 0.5)
+    gap_s: Annotated[tuple[float, float], Range(1e-3, 1e6, ascending=True)] = (0.1, 0.5)
     """Shortest and longest gap [s]."""
-    coast_s: float = 0.5
+    coast_s: Annotated[float, Range(1e-3, 60.0)] = 0.5
     """Time without ranges before each gap, at most since the previous gap [s]."""
-    tilt_rad: float = float(np.deg2rad(0.25))
+    tilt_rad: Annotated[float, Range(0.0, 1.0)] = float(np.deg2rad(0.25))
     """Tilt error while coasting [rad]: the RMS of pitch and roll."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, share=(0.0, 0.99), gap_s=(1e-3, 1e6), coast_s=(1e-3, 60.0), tilt_rad=(0.0, 1.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = np.zeros(readings.time_s.shape, bool)

@@ -1,11 +1,12 @@
 """Outliers from ultrasound reflections."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from harness.core.ranges import Range, check_fields
 from harness.simulate.components.excursion import direction
-from harness.simulate.parameter_ranges import require_ranges
 from harness.simulate.readings import SimulatedReadings
 
 _WARM_UP = 64
@@ -20,15 +21,15 @@ class Echo:
     docs/is900.md 13.3 and 13.5). `share` is the "outlier rate" of the studies.
     """
 
-    share: float = 0.03
+    share: Annotated[float, Range(0.0, 0.99)] = 0.03
     """Share of station readings that are outliers, 0 to below 1."""
-    burst_records: tuple[int, int] = (1, 8)
+    burst_records: Annotated[tuple[int, int], Range(1, 100_000, ascending=True)] = (1, 8)
     """Fewest and most readings in a burst; uniform."""
-    size_m: tuple[float, float] = (0.05, 0.30)
+    size_m: Annotated[tuple[float, float], Range(0.0, 10.0, ascending=True)] = (0.05, 0.30)
     """Smallest and largest displacement [m]; uniform."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, share=(0.0, 0.99), burst_records=(1, 100_000), size_m=(0.0, 10.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)

@@ -1,11 +1,12 @@
 """Position errors of several seconds that come and go."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -17,17 +18,17 @@ class Excursion:
     and drawn for each onset. Overlapping excursions add up, limited to the largest size.
     """
 
-    onsets_per_min: float = 1.0
+    onsets_per_min: Annotated[float, Range(0.0, 600.0)] = 1.0
     """Mean number of onsets per minute and station."""
-    size_m: tuple[float, float] = (0.005, 0.03)
+    size_m: Annotated[tuple[float, float], Range(0.0, 10.0, ascending=True)] = (0.005, 0.03)
     """Smallest and largest displacement [m]."""
-    stay_s: tuple[float, float] = (1.0, 5.0)
+    stay_s: Annotated[tuple[float, float], Range(0.0, 1e6, ascending=True)] = (1.0, 5.0)
     """Shortest and longest time from onset to the beginning of the return [s]."""
-    ramp_s: float = 0.2
+    ramp_s: Annotated[float, Range(0.0, 60.0)] = 0.2
     """Length of the rise and of the return [s]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, onsets_per_min=(0.0, 600.0), size_m=(0.0, 10.0), stay_s=(0.0, 1e6), ramp_s=(0.0, 60.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)

@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -14,15 +15,15 @@ class LostStation:
     """Quality 0 from `from_s` to `to_s`; records keep coming (docs/is900.md 7). A fault that scenarios name."""
 
     station: str
-    from_s: float = 0.0
+    from_s: Annotated[float, Range(-1e6, 1e6)] = 0.0
     """Beginning of the loss [s]."""
-    to_s: float = math.inf
+    to_s: Annotated[float, Range(-1e6, math.inf)] = math.inf
     """End of the loss [s]."""
-    fade_s: float = 0.5
+    fade_s: Annotated[float, Range(0.0, 1e6)] = 0.5
     """Time before `from_s` in which quality falls, as ranges become fewer (docs/is900.md 13.3) [s] [choice]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = readings.mask((self.station,), self.from_s, self.to_s)

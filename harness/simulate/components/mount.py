@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core import rotations
+from harness.core.ranges import Range, check_fields
 from harness.errors import UnknownName
-from harness.simulate.parameter_ranges import require_ranges
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -15,13 +16,13 @@ from harness.simulate.readings import SimulatedReadings
 class MountOffset:
     """Constant normal offset of each tracker from its nominal mount, for a whole session. In no noise preset."""
 
-    position_m: float = 0.0
+    position_m: Annotated[float, Range(0.0, 1.0)] = 0.0
     """Standard deviation along each axis of the station [m]."""
-    orientation_rad: float = 0.0
+    orientation_rad: Annotated[float, Range(0.0, math.pi)] = 0.0
     """Standard deviation about each axis of the station [rad]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         for row, station in enumerate(readings.stations):
@@ -36,17 +37,17 @@ class MountSlip:
     """A slip of one strap: the tracker moves around and along its bone, at once or slowly, and stays there."""
 
     station: str
-    from_s: float = 0.0
+    from_s: Annotated[float, Range(-1e6, 1e6)] = 0.0
     """Beginning of the slip [s]."""
-    over_s: float = 0.0
+    over_s: Annotated[float, Range(0.0, 1e6)] = 0.0
     """Duration of the slip [s]; 0 is a step."""
-    around_rad: float = 0.0
+    around_rad: Annotated[float, Range(-100.0, 100.0)] = 0.0
     """Final angle about the bone, by the right-hand rule about the bone's direction [rad]."""
-    along_m: float = 0.0
+    along_m: Annotated[float, Range(-10.0, 10.0)] = 0.0
     """Final distance along the bone, towards its far end [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, over_s=(0.0, math.inf))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         if self.station not in readings.stations:

@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -18,15 +19,15 @@ class OrientationOffset:
 
     stations: tuple[str, ...] = ()
     """Affected stations; () is all of them."""
-    from_s: float = 0.0
+    from_s: Annotated[float, Range(-1e6, 1e6)] = 0.0
     """Beginning [s]."""
-    to_s: float = math.inf
+    to_s: Annotated[float, Range(-1e6, math.inf)] = math.inf
     """End [s]."""
-    angle_rad: float = 0.0
+    angle_rad: Annotated[float, Range(-100.0, 100.0)] = 0.0
     """Angle about the tracker's z axis [rad]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, to_s=(self.from_s, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = readings.mask(self.stations, self.from_s, self.to_s)

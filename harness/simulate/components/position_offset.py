@@ -2,8 +2,9 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -13,15 +14,15 @@ class PositionOffset:
 
     stations: tuple[str, ...] = ()
     """Affected stations; () is all of them, as if the performer stood elsewhere."""
-    from_s: float = 0.0
+    from_s: Annotated[float, Range(-1e6, 1e6)] = 0.0
     """Beginning [s]."""
-    to_s: float = math.inf
+    to_s: Annotated[float, Range(-1e6, math.inf)] = math.inf
     """End [s]."""
-    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_m: Annotated[tuple[float, float, float], Range(-100.0, 100.0)] = (0.0, 0.0, 0.0)
     """Offset in the tracker's axes [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, to_s=(self.from_s, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = readings.mask(self.stations, self.from_s, self.to_s)

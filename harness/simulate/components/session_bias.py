@@ -1,9 +1,10 @@
 """Errors that are constant for a session."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from harness.core import rotations
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -14,13 +15,13 @@ class SessionBias:
     Both are normal and drawn once per session (docs/is900.md 13.3 and 13.5; the sizes are inferred).
     """
 
-    scale: float = 0.001
+    scale: Annotated[float, Range(0.0, 0.1)] = 1e-3
     """Standard deviation of the scale error about the tracker's origin, common to all stations."""
-    station_offset_m: float = 0.001
+    station_offset_m: Annotated[float, Range(0.0, 1.0)] = 1e-3
     """Standard deviation of the offset on each axis of a station [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, scale=(0.0, 0.1), station_offset_m=(0.0, 1.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         for row, station in enumerate(readings.stations):

@@ -6,12 +6,13 @@ al. 2005). docs/is900.md 13.6 has its numbers and the limits of this model.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 _FASTER_INWARD = 2.0
@@ -28,15 +29,15 @@ class SoftTissueArtefact:
     equilibrium; in other poses gravity displaces the station. The model is deterministic and draws nothing.
     """
 
-    frequency_hz: float = 5.0
+    frequency_hz: Annotated[float, Range(0.1, 100.0)] = 5.0
     """Natural frequency along the skin for a tissue thickness of `reference_tissue_m` [Hz]."""
-    damping: float = 0.3
+    damping: Annotated[float, Range(0.01, 10.0)] = 0.3
     """Damping ratio; 1 is critical damping."""
-    reference_tissue_m: float = 0.04
+    reference_tissue_m: Annotated[float, Range(1e-3, 0.5)] = 0.04
     """Tissue thickness to which `frequency_hz` refers [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), reference_tissue_m=(1e-3, 0.5))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / readings.tissue_m)

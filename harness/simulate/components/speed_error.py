@@ -1,8 +1,9 @@
 """Position error that is proportional to velocity."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from harness.simulate.parameter_ranges import require_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -13,11 +14,11 @@ class SpeedError:
     Gilson et al. 2006 found errors that grow with speed; the size is inferred (docs/is900.md 13.3 and 13.5).
     """
 
-    ahead_s: float = 0.002
+    ahead_s: Annotated[float, Range(-1.0, 1.0)] = 0.002
     """Time by which positions run ahead of the record's time stamp [s]; negative lags."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, ahead_s=(-1.0, 1.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         readings.move(self.ahead_s * readings.velocity_m_s)

@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
+from harness.core.ranges import Range, check_fields
 from harness.simulate.components.mount import MountSlip
-from harness.simulate.parameter_ranges import require_ranges
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -16,17 +17,17 @@ class StrapSlip:
     choices. Each station has its own random draws, so it slips alike in every set of stations that contains it.
     """
 
-    share: float = 0.2
+    share: Annotated[float, Range(0.0, 1.0)] = 0.2
     """Probability that a strap slips."""
-    along_m: float = 0.01
+    along_m: Annotated[float, Range(0.0, 0.5)] = 0.01
     """Standard deviation of the slip along the bone [m]."""
-    around_rad: float = 0.15
+    around_rad: Annotated[float, Range(0.0, math.pi)] = 0.15
     """Standard deviation of the slip around the bone [rad]."""
-    over_s: float = 0.5
+    over_s: Annotated[float, Range(0.0, 60.0)] = 0.5
     """Duration of a slip [s]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, share=(0.0, 1.0), along_m=(0.0, 0.5), around_rad=(0.0, math.pi), over_s=(0.0, 60.0))
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         begin_s, end_s = float(readings.time_s.min()), float(readings.time_s.max())

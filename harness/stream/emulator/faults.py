@@ -7,10 +7,11 @@ an additional fault leaves the others unchanged.
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
+from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadInput
 
@@ -47,13 +48,13 @@ class Fault:
     """
 
     kind: FaultKind
-    share: float = 0.0
+    share: Annotated[float, Range(0.0, 1.0)] = 0.0
     """Share of the records and replies in which a byte is lost, changed, doubled or added, 0 to 1."""
-    at_s: tuple[float, ...] = ()
+    at_s: Annotated[tuple[float, ...], Range(0.0, 1e6)] = ()
     """Times after power-on [s]."""
-    per_minute: float = 0.0
+    per_minute: Annotated[float, Range(0.0, 6e4)] = 0.0
     """Mean number of additional random occurrences per minute."""
-    lasts_s: float = 0.0
+    lasts_s: Annotated[float, Range(0.0, 1e6)] = 0.0
     """Duration of a burst, stall, disconnection or loss of sight [s]."""
     station: str = ""
     """Name of the station that is out of sight; "" is the first."""
@@ -71,8 +72,7 @@ class Fault:
         for name, (is_set, allowed) in keys.items():
             if is_set and not allowed:
                 raise BadInput(f"fault {self.kind!r} has no {name}.", "Omit it.")
-        if not (0.0 <= self.share <= 1.0 and self.per_minute >= 0.0 and min((0.0, self.lasts_s, *self.at_s)) >= 0.0):
-            raise BadInput(f"Not a possible fault: {self}.", "A share is 0 to 1; times are not negative.")
+        check_fields(self)
         if self.kind in FAULT_EPISODE_KINDS and self.kind not in _INSTANT_KINDS and self.lasts_s == 0.0:
             raise BadInput(f"fault {self.kind!r} has no duration.", "Give lasts_s.")
         if not (self.share or self.at_s or self.per_minute or self.firmware):

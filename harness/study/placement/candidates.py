@@ -20,10 +20,12 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
+from harness.core.names import Name
+from harness.core.ranges import Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
 from harness.results.placement_findings import StationPlacement
@@ -41,13 +43,13 @@ _SIDE_BY_PREFIX: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right
 class Candidate:
     """One [[candidate]] of a study."""
 
-    name: str
-    bone: str
-    along: float = 0.5
+    name: Name
+    bone: Name
+    along: Annotated[float, Range(0.0, 1.0)] = 0.5
     """Position along the bone, 0 at its joint to 1 at its far end."""
-    around_deg: float = 0.0
+    around_deg: Annotated[float, Range(-360.0, 360.0)] = 0.0
     """Angle around the bone [deg] (see `harness.body.mounts`)."""
-    stand_off_m: float = 0.01
+    stand_off_m: Annotated[float, Range(0.0, 0.5)] = 0.01
     """Distance of the station's origin from the skin [m]."""
     pair: Pair = ""
     """Also use the mirror image: `each` independently, or both `together`; "" for the place alone."""
@@ -78,9 +80,9 @@ class CandidateGrid:
     """One [[grid]]: a candidate for each bone, position and angle."""
 
     bones: tuple[str, ...]
-    along: tuple[float, ...]
-    around_deg: tuple[float, ...]
-    stand_off_m: float = 0.01
+    along: Annotated[tuple[float, ...], Range(0.0, 1.0)]
+    around_deg: Annotated[tuple[float, ...], Range(-360.0, 360.0)]
+    stand_off_m: Annotated[float, Range(0.0, 0.5)] = 0.01
     pair: Pair = ""
 
     def groups(self) -> tuple[CandidateGroup, ...]:

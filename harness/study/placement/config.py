@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from harness.compare.margins import MARGINS
 from harness.core.fields import build, replace_fields
 from harness.core.files import read_toml
+from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
+from harness.core.ranges import Range
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario
 from harness.score.metrics import DEFINITIONS
@@ -48,7 +50,7 @@ class AddOptions:
 class GreedyOptions:
     """Add one unit after another, each time the one that reduces the error most."""
 
-    most: int
+    most: Annotated[int, Range(1, 12)]
     """Number of stations at the end."""
     base: tuple[str, ...] = ()
     of: tuple[str, ...] = ()
@@ -58,11 +60,11 @@ class GreedyOptions:
 class ExhaustiveOptions:
     """Measure every set."""
 
-    most: int
+    most: Annotated[int, Range(1, 12)]
     """Most stations of a set."""
-    fewest: int = 1
+    fewest: Annotated[int, Range(1, 12)] = 1
     of: tuple[str, ...] = ()
-    most_cells: int = 5000
+    most_cells: Annotated[int, Range(1, 100_000_000)] = 5000
     """Limit of the number of cells; a study with more is refused."""
 
 
@@ -72,19 +74,19 @@ class RefineOptions:
 
     set: tuple[str, ...] = ()
     """The initial set; by default the best measured set of `size` stations."""
-    size: int = 0
-    along: tuple[float, ...] = (0.2, 0.1)
+    size: Annotated[int, Range(0, 12)] = 0
+    along: Annotated[tuple[float, ...], Range(0.0, 1.0)] = (0.2, 0.1)
     """Steps along the bone, the largest first, as shares of its length."""
-    around_deg: tuple[float, ...] = (45.0, 22.5)
+    around_deg: Annotated[tuple[float, ...], Range(0.0, 360.0)] = (45.0, 22.5)
     """Steps around the bone, as many as in `along` [deg]."""
-    most_moves: int = 6
+    most_moves: Annotated[int, Range(1, 1000)] = 6
 
 
 @dataclass(frozen=True)
 class ConditionOptions:
     """A further condition under which the same sets are measured."""
 
-    name: str
+    name: Name
     scenario: str = ""
     """Another scenario, without the study's `changes`; by default the study's scenario with its `changes`."""
     methods: tuple[str, ...] = ()
@@ -102,7 +104,7 @@ class PublishedClaim:
     set: tuple[str, ...]
     among: tuple[str, ...] = ()
     """The candidates that the source considers; the other sets of the same size consist of these. All by default."""
-    margin: float = 0.1
+    margin: Annotated[float, Range(0.0, 10.0)] = 0.1
     """Largest relative difference between the error of the set and that of all candidates together."""
     why_not: str = ""
     """An explanation for a claim that is not reproduced."""
@@ -112,18 +114,18 @@ class PublishedClaim:
 class PlacementStudy:
     """The configuration that `harness placement` reads."""
 
-    name: str
+    name: FileName
     kind: Literal["placement"]
-    title: str
+    title: Text
     scenario: str
     """A file in the folder of the study (without `.toml`), or a shipped scenario. It defines motion, body, calibration,
     noise, tracker and seed; its stations, methods, inputs and varied values are not used."""
-    methods: tuple[str, ...]
+    methods: tuple[MethodName, ...]
     """Methods; the mean of their errors is minimised."""
     schema: int = SCHEMA
     metric: str = "joint_angle_mean_deg"
-    inputs: str = "pos+ori"
-    held_out: tuple[str, ...] = ()
+    inputs: MethodName = "pos+ori"
+    held_out: tuple[Name, ...] = ()
     """Held-out clips: sets that were chosen on the scenario's test clips are tested on these."""
     link: bool = False
     """Limit the rate of each set to what the serial line carries, at most the scenario's rate."""
@@ -138,7 +140,7 @@ class PlacementStudy:
     exhaustive: ExhaustiveOptions | None = None
     refine: RefineOptions | None = None
     condition: tuple[ConditionOptions, ...] = ()
-    condition_size: int = 3
+    condition_size: Annotated[int, Range(1, 12)] = 3
     """Size of the sets that every condition ranks."""
     claim: tuple[PublishedClaim, ...] = ()
 
@@ -150,6 +152,7 @@ class PlacementStudy:
 def find_placement_study(path: Path | str) -> Path:
     """Find a study by path, or a shipped one by name; BadFile, UnknownName."""
     given = Path(path)
+    check_words(given)
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_placements()}
@@ -192,8 +195,6 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     """Check what types cannot express; returns what was found, what is expected and advice."""
     if study.schema != SCHEMA:
         return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads only that schema."
-    if study.name != Path(study.name).name:
-        return f"name = {study.name!r}", "a plain name", "Results are written to a folder of that name."
     if not study.methods:
         return "no methods", "names in methods", "`harness list` names them."
     if study.metric not in DEFINITIONS:

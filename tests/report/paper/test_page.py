@@ -1,6 +1,5 @@
 """The page of a paper: its first sentence, the content of each claim, and its safety."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from harness.report.paper.writer import write_paper_page
 from harness.results.findings import BarChart, Claim, FindingsTable, LineChart, PaperExperiment, PaperFindings
 from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
 from tests.report.reading import read, text_of
+from tests.results.rewrite import read_json, write_json
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- end of paper --> ```"
 EMPTY = PaperExperiment("empty", "Nothing", "", ())
@@ -235,10 +235,9 @@ def test_a_folder_without_findings_is_refused(tmp_path: Path) -> None:
 
 def test_a_table_that_is_none_is_refused(tmp_path: Path) -> None:
     folder = write_study(tmp_path, liu())
-    text = (folder / "findings.json").read_text()
-    content = json.loads(text)
+    content = read_json(folder / "findings.json")
     content["tables"][0]["rows"][0].append("one more")
-    (folder / "findings.json").write_text(json.dumps(content))
+    write_json(folder / "findings.json", content)
     with pytest.raises(BadFile, match="a row of 3 texts under 2 columns"):
         write_paper_page(folder)
 
@@ -258,3 +257,14 @@ def test_printed_statements_have_both_readings_in_one_row(study: Path) -> None:
     rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', table)
     assert len(rows) == len({c.text for e in liu().experiments for c in e.claims if c.kind == "printed"})
     assert all(row.count("<td") == 3 for row in rows)
+
+
+def test_edited_findings_are_refused(tmp_path: Path) -> None:
+    """A verdict that was turned by hand."""
+    folder = write_study(tmp_path, liu())
+    path = folder / "findings.json"
+    before = path.read_text()
+    path.write_text(before.replace('"not reproduced"', '"reproduced"', 1))
+    assert path.read_text() != before
+    with pytest.raises(BadFile, match=r"findings\.json: damaged or edited.*Give the command of the study again"):
+        write_paper_page(folder)

@@ -122,7 +122,7 @@ def test_random_episodes_have_their_rate_and_never_overlap() -> None:
         ({"kind": "burst", "at_s": (1.0,)}, "Give lasts_s"),
         ({"kind": "stall", "share": 0.1, "lasts_s": 1.0}, "has no share"),
         ({"kind": "reset", "at_s": (1.0,), "lasts_s": 1.0}, "has no lasts_s"),
-        ({"kind": "reset", "at_s": (-1.0,)}, "not negative"),
+        ({"kind": "reset", "at_s": (-1.0,)}, "Give a number from 0"),
         ({"kind": "garbled", "share": 0.1, "station": "head"}, "has no station"),
         ({"kind": "firmware", "firmware": "new"}, "such as 4.2301"),
         ({"kind": "firmware"}, "never happens"),

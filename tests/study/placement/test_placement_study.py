@@ -187,7 +187,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
     ("tables", "said"),
     [
         ([""], "no search mode"),
-        (["[exhaustive]\nmost = 13"], "1 to 12 stations"),
+        (["[exhaustive]\nmost = 13"], "from 1 to 12"),
         (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 stations are 12 cells"),
         (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base has 'knee'"),
         (["[refine]\nset = ['pelvis']\nalong = []"], "equally many of both"),
@@ -197,7 +197,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
         (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
         (["[ablate]\n[[condition]]\nname = 'a'\n[[condition]]\nname = 'a'"], "distinct names"),
         (["[ablate]\n[[claim]]\ntext = 't'\nsource = 's'\nset = ['knee']"], "has 'knee'"),
-        (["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"], "far .along = 2"),
+        (["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"], "along = 2.0 must be a number from 0 to 1"),
         (["[[candidate]]\nname = 'x'\nbone = 'headd'\n[ablate]"], "Did you mean 'head'"),
         (["[abblate]"], "Did you mean 'ablate'"),
     ],

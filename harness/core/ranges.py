@@ -1,0 +1,85 @@
+"""Ranges of numbers, declared in the annotation of a field: `share: Annotated[float, Range(0.0, 1.0)] = 0.1`.
+
+`core.fields` checks them where it reads a value from a file or an option, and `check_fields` when a record is made.
+`core.names.Label` does the same for names.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+
+from harness.core.names import Label, excerpt
+from harness.errors import BadInput
+
+
+class Constraint(Protocol):
+    """A rule for the values of a field; `str` puts it into words."""
+
+    def accepts(self, value: Any) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Range:
+    """The numbers that a field may have, both ends included; for a tuple, the numbers that each entry may have."""
+
+    low: float
+    high: float
+    ascending: bool = False
+    """Whether the entries of a tuple must not descend."""
+
+    def accepts(self, value: Any) -> bool:
+        """Whether a number, or each entry of a tuple, is in the range; NaN never is, None always."""
+        if value is None:
+            return True
+        numbers = value if isinstance(value, tuple) else (value,)
+        if self.ascending and any(a > b for a, b in itertools.pairwise(numbers)):
+            return False
+        return all(self.low <= number <= self.high for number in numbers)
+
+    def __str__(self) -> str:
+        """The range in words, such as "a number from 0 to 1"."""
+        kind = "two ascending numbers" if self.ascending else "a number"
+        return f"{kind} from {self.low:g}" + (f" to {self.high:g}" if math.isfinite(self.high) else "")
+
+
+def constraints_of(hint: Any) -> tuple[Constraint, ...]:
+    """The rules that an annotation declares for the value itself."""
+    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return tuple(extra for extra in extras if isinstance(extra, Range | Label))
+
+
+def check_fields(record: object, **more: Range) -> None:
+    """BadInput unless each field of a dataclass obeys its annotation; `more` has further ranges by name."""
+    kind: type = type(record)
+    for name, hint in _hints(kind).items():
+        for value, broken in _violations(hint, getattr(record, name)):
+            raise _error(record, name, value, broken)
+    for name, allowed in more.items():
+        if not allowed.accepts(getattr(record, name)):
+            raise _error(record, name, getattr(record, name), allowed)
+
+
+def _error(record: object, name: str, value: Any, broken: Constraint) -> BadInput:
+    return BadInput(f"{type(record).__name__}.{name} = {excerpt(repr(value), 60)}.", f"Give {broken}.")
+
+
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def _violations(hint: Any, value: Any) -> Iterator[tuple[Any, Constraint]]:
+    """Values that break a rule, the entries of tuples and tables too, and the rules."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        yield from ((value, rule) for rule in constraints_of(hint) if not rule.accepts(value))
+    elif origin is tuple and args[-1] is Ellipsis:
+        for item in value:
+            yield from _violations(args[0], item)
+    elif origin is dict:
+        for key, item in value.items():
+            yield from _violations(args[0], key)
+            yield from _violations(args[1], item)

@@ -1,0 +1,113 @@
+"""Edited copies of a clip, as somebody would make them who wants a test clip among its own examples."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints
+from harness.core.motion import Clip
+from harness.core.skeleton import forward_kinematics
+
+
+def trimmed(clip: Clip) -> Clip:
+    """The clip without its first frame and its last quarter."""
+    return take_rows(clip, np.arange(1, 3 * len(clip) // 4))
+
+
+def resampled(clip: Clip, rate_hz: float) -> Clip:
+    """The clip at another rate: positions and angles interpolated linearly, orientations normalised."""
+    old_s = np.arange(len(clip)) / clip.rate_hz
+    new_s = np.arange(0.0, old_s[-1], 1.0 / rate_hz)
+
+    def at(values: Floats) -> Floats:
+        return np.stack([np.interp(new_s, old_s, column) for column in values.T], axis=1)
+
+    world_from_root = at(rotations.continuous(clip.world_from_root))
+    return replace(
+        clip,
+        rate_hz=rate_hz,
+        root_m=at(clip.root_m),
+        world_from_root=world_from_root / np.linalg.norm(world_from_root, axis=1, keepdims=True),
+        angles_rad=at(clip.angles_rad),
+    )
+
+
+def hastened(clip: Clip) -> Clip:
+    """Every second frame at the old rate: motion at twice the speed, as an AMC file that names no rate plays it."""
+    return take_rows(clip, np.arange(0, len(clip), 2))
+
+
+def reversed_in_time(clip: Clip) -> Clip:
+    return take_rows(clip, np.arange(len(clip))[::-1])
+
+
+def moved(clip: Clip) -> Clip:
+    """The clip at another place and with another heading."""
+    turn = rotations.exp(np.array([0.0, 0.0, 2.0]))
+    return replace(
+        clip,
+        root_m=rotations.rotate(turn, clip.root_m) + np.array([3.0, -1.0, 0.1]),
+        world_from_root=rotations.multiply(turn, clip.world_from_root),
+    )
+
+
+def mirrored(clip: Clip) -> Clip:
+    """The clip with left and right changed, played on the same skeleton."""
+    skeleton, flip = clip.skeleton, np.array([1.0, -1.0, 1.0])
+    angles_rad = np.empty_like(clip.angles_rad)
+    for bone, name in enumerate(skeleton.names):
+        swapped = {"l": "r", "r": "l"}.get(name[0], "") + name[1:]
+        other = skeleton.names.index(swapped) if swapped in skeleton.names else bone
+        # A turn about an axis is seen in a mirror as a turn about the mirrored axis, the other way round.
+        for dof, source in zip(
+            range(*skeleton.dof_of_bone[bone].indices(len(skeleton.axes))),
+            range(*skeleton.dof_of_bone[other].indices(len(skeleton.axes))),
+            strict=True,
+        ):
+            angles_rad[:, dof] = (
+                np.sign(-(flip * skeleton.axes[source]) @ skeleton.axes[dof]) * (clip.angles_rad[:, source])
+            )
+    return replace(
+        clip,
+        root_m=flip * clip.root_m,
+        world_from_root=clip.world_from_root * np.array([1.0, -1.0, 1.0, -1.0]),
+        angles_rad=angles_rad,
+    )
+
+
+def noisy(clip: Clip) -> Clip:
+    """The clip with noise on all hinges that moves the joints by a millimetre (RMS)."""
+    rng = np.random.default_rng(1)
+    noise_rad = rng.normal(size=clip.angles_rad.shape)
+    few = replace(clip, **{k: getattr(clip, k)[:50] for k in ("root_m", "world_from_root", "angles_rad")})
+    at_m = [
+        forward_kinematics(c.skeleton, c.root_m, c.world_from_root, c.angles_rad).end_m
+        for c in (few, replace(few, angles_rad=few.angles_rad + 1e-3 * noise_rad[:50]))
+    ]
+    scale = 1e-3 / np.sqrt(np.mean(np.sum((at_m[0] - at_m[1]) ** 2, axis=2)))
+    return replace(clip, angles_rad=clip.angles_rad + 1e-3 * scale * noise_rad)
+
+
+def take_rows(clip: Clip, rows: Ints) -> Clip:
+    """The frames `rows` of a clip."""
+    return replace(
+        clip, root_m=clip.root_m[rows], world_from_root=clip.world_from_root[rows], angles_rad=clip.angles_rad[rows]
+    )
+
+
+COPIES: dict[str, Callable[[Clip], Clip]] = {
+    "renamed": lambda clip: clip,
+    "less one frame": lambda clip: take_rows(clip, np.arange(1, len(clip))),
+    "trimmed": trimmed,
+    "60 Hz": lambda clip: resampled(clip, 60.0),
+    "100 Hz": lambda clip: resampled(clip, 100.0),
+    "30 Hz": lambda clip: resampled(clip, 30.0),
+    "twice the speed": hastened,
+    "reversed": reversed_in_time,
+    "moved": moved,
+    "mirrored": mirrored,
+    "noisy": noisy,
+    "all at once": lambda clip: noisy(moved(mirrored(resampled(trimmed(clip), 60.0)))),
+}
