@@ -50,7 +50,7 @@ def add_calibrate(verbs: Verbs) -> None:
         "--simulate", type=positive_int, metavar="N", help="calibrate N simulated performers and print the errors"
     )
     verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files in DIR")
-    verb.add_argument("--port", help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT")
+    verb.add_argument("--port", help="as --port of `harness live`")
     text = "scenario with the stations and their nominal mounts (see `harness list`)"
     verb.add_argument("--scenario", metavar="NAME", help=text)
     text = DEVICE_STATIONS_HELP.replace("4)", "4; a recording's own)")
@@ -143,7 +143,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
     from harness.experiment.scenario import load_scenario
     from harness.live.pose_terminal import PoseTerminal
     from harness.live.viewer import ViewerOutput
-    from harness.stream.driver import DriverConfig, Is900
+    from harness.stream.driver import DriverConfig, open_tracker
 
     for name in ("port", "scenario"):
         if getattr(args, name) is None:
@@ -161,7 +161,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
             displays.append(view)
         config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
         device = opened.enter_context(
-            Is900(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
+            open_tracker(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
         where = f"{device.identification or 'an IS-900'} at {args.port}"
         print_status(f"{where}; stations {device.station_list}; Ctrl-C ends it")

@@ -16,8 +16,8 @@ from harness.errors import BadInput, Outcome
 Verbs = Any  # argparse's subparsers object has no public type
 DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
-LINE_FLAGS = ("items", "baud", "quality", "keep_settings")
-"""Flags of `add_line_flags`."""
+LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
+"""Flags of `add_line_flags`, as attributes of the parsed command line."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 1)."""
 DEVICE_STATIONS_HELP = (
@@ -77,6 +77,10 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
     text = "use the device as other programs left it: tip offset, alignment, boresight, mounting angles and filters"
     verb.add_argument("--keep-settings", action="store_true", default=None, help=text)
+    text = "set the heading of every station to zero at its present direction, when the device is set up"
+    verb.add_argument("--boresight", action="store_true", default=None, help=text)
+    text = "frame to report in: its origin, a point on +X and a point on +Y, nine numbers in the present frame [m]"
+    verb.add_argument("--alignment", type=parse_alignment, metavar="X,Y,Z,X,Y,Z,X,Y,Z", help=text)
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -84,6 +88,9 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    if options and args.port.startswith("udp:"):
+        name = min(options).replace("_", "-")
+        raise BadInput(f"--{name} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
     if args.stations is not None and "=" in args.stations:
         options["characters"] = "".join(parse_station_map(args.stations).values())
     return options
@@ -118,6 +125,17 @@ def parse_items(text: str) -> tuple[int, ...]:
     if not all(is_whole_number(code.strip()) for code in codes):
         raise argparse.ArgumentTypeError(f"{text!r} is not a list such as 40,2,11,21,1")
     return tuple(map(int, codes))
+
+
+def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
+    """Three points of an alignment frame, such as 0,0,0,1,0,0,0,1,0 [m]."""
+    try:
+        values = [float(number) for number in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 9 or not all(abs(value) < float("inf") for value in values):
+        raise argparse.ArgumentTypeError(f"{text!r} is not nine numbers such as 0,0,0,1,0,0,0,1,0")
+    return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
 
 
 def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | list[str]:

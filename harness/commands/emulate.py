@@ -32,7 +32,10 @@ def add_emulate(verbs: Verbs) -> None:
     text = "open a pseudo terminal, and link to it under this name"
     where.add_argument("--pty", type=Path, metavar="LINK", help=text)
     where.add_argument("--tcp", metavar="HOST:PORT", help="listen at a TCP port; port 0 takes a free one")
-    verb.add_argument("--anywhere", action="store_true", help="accept connections from other computers")
+    text = "also broadcast UDP packets from the start, as after MEthUdp1; without HOST, to this computer"
+    verb.add_argument("--udp", metavar="[HOST:]PORT", help=text)
+    text = "accept connections from other computers, or broadcast to them"
+    verb.add_argument("--anywhere", action="store_true", help=text)
     verb.add_argument("--clip", help="clip to play (default: the scenario's first)")
     text = "play the calibration poses of `harness calibrate`, held one after another, instead of the clip"
     verb.add_argument("--poses", action="store_true", help=text)
@@ -56,6 +59,8 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--check-baud", action="store_true", help=text)
     verb.add_argument("--firmware", metavar="VERSION", help="firmware version (default 4.2301; 4.1105 has no item 40)")
     verb.add_argument("--restart", type=float, metavar="S", help="seconds of silence after a restart (default 0.25)")
+    text = "buttons and joystick: cycle moves all of them in turn, still none (default cycle)"
+    verb.add_argument("--controls", choices=["cycle", "still"], help=text)
     verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave the scenario's faults out")
 
 
@@ -63,9 +68,11 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     from harness.experiment.playback import prepare_playback
     from harness.stream.emulator.capacity import check_capacity, check_range
     from harness.stream.emulator.server import open_port, play_samples
+    from harness.stream.emulator.udp_port import LOOPBACK, parse_udp_address
 
-    if args.pty and args.anywhere:
-        raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp: leave it out.")
+    if args.pty and args.anywhere and not args.udp:
+        raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
+    udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
     if args.tcp and args.check_baud:
         raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
     playback = prepare_playback(
@@ -79,7 +86,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         posing=args.poses,
     )
     scenario, tracker = playback.scenario, playback.tracker
-    config = _config(args, scenario)
+    config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or args.overload):
@@ -96,18 +103,21 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         )
         print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {names}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
-        counts = play_samples(samples, config, port)
+        if udp:
+            print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
+        counts = play_samples(samples, config, port, udp[0] if udp else LOOPBACK)
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
 
 
-def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
+def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None) -> "EmulatorConfig":
     from harness.stream.emulator.config import EmulatorConfig
 
-    options = {"firmware": args.firmware, "restart_s": args.restart}
+    options = {"firmware": args.firmware, "restart_s": args.restart, "controls": args.controls, "udp_port": udp_port}
     return EmulatorConfig(
         **{name: value for name, value in options.items() if value is not None},
         baud=args.baud or scenario.tracker.baud,
         paced=not args.unpaced,
+        udp=udp_port is not None,
         queue_records=scenario.tracker.queue_records,
         check_baud=args.check_baud,
         faults=scenario.fault if args.faults else (),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from harness.core.calibration import Calibration
     from harness.experiment.playback import Playback
     from harness.live.pose import Output
-    from harness.stream.driver import Is900, LineEvent
+    from harness.stream.driver import LineEvent, Tracker
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -41,7 +41,9 @@ def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time, to a viewer, VMC, LSL or BVH, until Ctrl-C"
     verb = add_verb(verbs, "live", text, run_live, "seed", "mocap")
     verb.add_argument(
-        "--port", required=True, help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT"
+        "--port",
+        required=True,
+        help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT, udp://HOST:PORT",
     )
     text = "scenario with the stations, their mounts, the body and the examples (see `harness list`)"
     verb.add_argument("--scenario", required=True, metavar="NAME", help=text)
@@ -141,10 +143,10 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 
 
 @contextmanager
-def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "Iterator[Is900]":
+def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
     from harness.stream.codec.items import position_range_m
-    from harness.stream.driver import DriverConfig, Is900
+    from harness.stream.driver import DriverConfig, open_tracker
 
     def happened(event: "LineEvent") -> None:
         events.append(event)
@@ -155,7 +157,7 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
     options = {"items": tracker.items, **line_options(args)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
     config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
-    with Is900(args.port, config, on_event=happened) as device:
+    with open_tracker(args.port, config, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
             raise BadInput(

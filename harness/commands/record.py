@@ -2,8 +2,9 @@
 
 import argparse
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from harness.commands.common import (
     LINE_FLAGS,
@@ -29,7 +30,9 @@ SIMULATION_PREFIX = "sim:"
 def add_record(verbs: Verbs) -> None:
     text = "record both directions of a device's line until Ctrl-C; appends to a recording in the same file"
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
-    verb.add_argument("port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for a simulated line")
+    verb.add_argument(
+        "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, or sim:SCENARIO for a simulated line"
+    )
     verb.add_argument("file", type=Path, help="the recording to write")
     text = (
         "names of the device's active stations, in order, or names with stations of the device (head=3,torso=1); "
@@ -40,6 +43,13 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
     verb.add_argument("--seconds", type=float, metavar="N", help="stop after N seconds")
+    text = (
+        "send this command and print its answer, instead of setting the device up; may be repeated. ^K is a control "
+        "character. If C is the last one, what it streams is recorded"
+    )
+    verb.add_argument("--send", action="append", metavar="CMD", help=text)
+    text = "allow --send of commands that write the device's memory, restart it, or are in no source"
+    verb.add_argument("--allow-writes", action="store_true", help=text)
     verb.add_argument("--clip", metavar="CLIP", help="with sim: clip to play (default: the scenario's first)")
     verb.add_argument("--noise", metavar="PRESET", help="with sim: clean, noise or default (default: the scenario's)")
     text = "with sim: play the calibration poses of `harness calibrate` instead of the clip"
@@ -50,7 +60,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in LINE_FLAGS:
+        for name in (*LINE_FLAGS, "send"):
             if getattr(args, name) is not None:
                 raise BadInput(
                     f"--{name.replace('_', '-')} with {args.port}.",
@@ -60,7 +70,9 @@ def run_record(args: argparse.Namespace) -> Outcome:
     for name in ("clip", "noise", "poses", "seed"):
         if getattr(args, name) is not None:
             raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out.")
-    return _record_port(args)
+    if args.allow_writes and args.send is None:
+        raise BadInput("--allow-writes without --send.", "It is for commands that --send names: leave it out.")
+    return _record_port(args) if args.send is None else _record_commands(args)
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
@@ -111,7 +123,38 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     return _print_recording(args, writer.counts, line.get("out_of_range", 0))
 
 
-def _print_recording(args: argparse.Namespace, counts: Mapping[str, int], out_of_range: int = 0) -> Outcome:
+def _record_commands(args: argparse.Namespace) -> Outcome:
+    from harness.stream.driver import DriverConfig
+    from harness.stream.recording.command_recording import check_commands, record_commands
+    from harness.stream.recording.exchange_text import format_exchanges
+    from harness.stream.recording.recording import RecordingWriter
+
+    for name in ("stations", *LINE_FLAGS):
+        if name != "baud" and getattr(args, name) is not None:
+            raise BadInput(
+                f"--{name.replace('_', '-')} with --send.", "--send sets nothing but what it names: leave it out."
+            )
+    if args.port.startswith("udp:"):
+        raise BadInput(f"--send with {args.port}.", "UDP carries no commands: name the serial line.")
+    check_commands(args.send, args.allow_writes)
+    config = DriverConfig(rate_hz=args.rate, **line_options(args))
+    note = {"source": "commands", "port": args.port, "harness": VERSION}
+    with RecordingWriter(args.file, note) as writer:
+        exchanges = record_commands(
+            args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
+        )
+    content = [exchange.as_dict() for exchange in exchanges]
+    return _print_recording(args, writer.counts, more={"exchanges": content}, lines=format_exchanges(content))
+
+
+def _print_recording(
+    args: argparse.Namespace,
+    counts: Mapping[str, int],
+    out_of_range: int = 0,
+    *,
+    more: Mapping[str, Any] | None = None,
+    lines: Sequence[str] = (),
+) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
     content |= {"set_up": counts["conf"], "events": counts["evnt"], "out_of_range": out_of_range}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
@@ -119,4 +162,4 @@ def _print_recording(args: argparse.Namespace, counts: Mapping[str, int], out_of
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
     text += f", {counts['evnt']} events" if counts["evnt"] else ""
     text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
-    return print_result(args, content, text)
+    return print_result(args, {**content, **(more or {})}, *lines, text)

@@ -12,6 +12,7 @@ from harness.commands.ending import print_data
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
+    from harness.stream.recording.recording import Recording
     from harness.stream.recording.replay import RecordingStream
 
 
@@ -36,9 +37,13 @@ def add_replay(verbs: Verbs) -> None:
 
 
 def run_replay(args: argparse.Namespace) -> Outcome:
+    from harness.stream.recording.recording import read_recording
     from harness.stream.recording.replay import RecordingStream, parse_speed
 
-    stream = RecordingStream(args.file, parse_speed(args.speed))
+    speed, recording = parse_speed(args.speed), read_recording(args.file)
+    if recording.answers and not recording.formats:
+        return _print_answers(args, recording)
+    stream = RecordingStream(recording, speed)
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
     scoring = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
@@ -47,7 +52,16 @@ def run_replay(args: argparse.Namespace) -> Outcome:
     return _print_frames(args, stream)
 
 
+def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
+    """Print the commands of a recording that has no frames."""
+    from harness.stream.recording.exchange_text import format_exchanges
+
+    content = {"frames": 0, "lost": recording.damage, "answers": recording.answers}
+    return print_result(args, content, *format_exchanges(recording.answers))
+
+
 def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    from harness.stream.recording.exchange_text import format_exchanges
     from harness.stream.recording.frame_table import FRAME_COLUMNS, format_csv_row, frame_rows
     from harness.stream.recording.summary import StreamSummary
 
@@ -63,11 +77,13 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
                 return Outcome.PASS
     recording = stream.recording
     content = {**summary.as_dict(), **stream.counts, "lost": recording.damage, "events": recording.events}
+    content |= {"answers": recording.answers}
     lines = [
         str(summary),
         "",
         _format_counts(stream),
         *(f"{e['monotonic_s']:.3f} s: {e['text']}" for e in recording.events),
+        *format_exchanges(recording.answers),
     ]
     if args.frames and not args.json:  # the frames are the data
         print(*lines, sep="\n", file=sys.stderr)

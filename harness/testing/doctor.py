@@ -31,6 +31,7 @@ from harness.score.null_methods import score_null_methods
 from harness.score.score import Scores, score_estimate
 from harness.simulate import noise
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
+from harness.testing.device_checks import check_emulated_device, describe_serial_ports
 
 OPTIONAL_PACKAGES = {
     "plotly": "the interactive view of the report (extra viz)",
@@ -79,7 +80,22 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
     """
     clips = [synthetic.generate(b, "p1", 1, seed=1, duration_s=6.0) for b in synthetic.BEHAVIOURS]
     takes = [retargeting.retarget_to_own_body(clip)[1] for clip in clips]
-    return [*check_scores(takes), _check_stream(clips[0]), *_check_optional_parts(), _check_library(folder)]
+    return [
+        *check_scores(takes),
+        _check_stream(clips[0]),
+        *_check_device(),
+        *_check_optional_parts(),
+        _check_library(folder),
+    ]
+
+
+def _check_device() -> list[InstallationCheck]:
+    """Read an emulated device on this computer, and list the ports at which a real one may be."""
+    return [
+        InstallationCheck("an emulated device over TCP", *check_emulated_device("tcp")),
+        InstallationCheck("an emulated device over UDP", *check_emulated_device("udp")),
+        InstallationCheck("serial ports", True, describe_serial_ports()),
+    ]
 
 
 def _check_stream(clip: Clip) -> InstallationCheck:

@@ -94,6 +94,16 @@ def test_intersense_reads_and_sets_stations_while_data_flow(tmp_path: Path, vers
         client.close()
 
 
+def test_intersense_reads_a_device_with_more_stations_than_inertia_cubes(tmp_path: Path) -> None:
+    """It gives up at an answer to `MCI` above 4."""
+    with run_device(tmp_path, stations=6, rate_hz=30.0) as device:
+        client = InterSenseClient(device.port, "2.09")
+        assert client.open()
+        assert all(client.read_station(number) for number in range(1, 9))
+        assert [station.cube_number for station in client.stations] == [1, 2, 3, 4, -1, -1, -1, -1]
+        client.close()
+
+
 def test_intersense_looks_for_another_product_first(tmp_path: Path) -> None:
     """Its other probes are joined to the first `MS`, which gets an error record."""
     with run_device(tmp_path) as device:
@@ -129,7 +139,7 @@ def check_silence(port: str) -> None:
 
 @pytest.mark.parametrize("stations", [4, 12])
 def test_freevr(tmp_path: Path, stations: int) -> None:
-    with run_device(tmp_path, stations=stations, rate_hz=60.0) as device:
+    with run_device(tmp_path, stations=stations, rate_hz=60.0, controls="still") as device:
         client = FreeVrClient(device.port, wands="1C")
         assert client.open(LIMIT_S)
         assert (client.firmware, client.system) == ("4.2301", "IS900VET")
@@ -196,7 +206,8 @@ def test_vrui(tmp_path: Path) -> None:
         assert stations_read == [1 + 2 * ((k + (stations_read[0] == 3)) % 2) for k in range(200)]
         for pose in client.poses:
             check_pose(pose.station, tuple(INCH_M * v for v in pose.position_in), pose.angles_deg, 1e-4, 0.01)
-            assert (pose.buttons, pose.stick) == (0, (127, 127))
+            assert pose.buttons in (0, 1, 2, 4, 8, 16, 32)
+            assert 127 in pose.stick  # one axis moves at a time
         second_client = VruiClient(device.port, scale=0.05)
         assert second_client.open((2,), reset=True)
         second_client.start()

@@ -52,8 +52,12 @@ def test_timestamps_with_a_stylus_and_a_wand(tmp_path: Path) -> None:
     check_reports(client.reports)
     for report in client.reports:
         assert (report.buttons is None, report.stick is None) == (report.sensor not in (0, 1), report.sensor != 0)
-        assert report.buttons in (None, 0)
-        assert report.stick in (None, (0.0, 0.0))
+        assert report.buttons in (None, 0, 1, 2, 4, 8, 16, 32)
+    sticks = [report.stick for report in client.reports if report.stick is not None]
+    assert max(abs(value) for stick in sticks for value in stick) > 0.9  # a wand has a joystick that moves
+    assert all(0.0 in stick for stick in sticks)
+    for sensor in (0, 1):
+        assert len({report.buttons for report in client.reports if report.sensor == sensor}) > 1
     steps_back = [k for k in range(1, 600) if client.reports[k].time_s < client.reports[k - 1].time_s]
     assert len(steps_back) <= 1  # records between `C` and `MZ` carry the old clock
     reports = client.reports[(steps_back or [0])[0] :]

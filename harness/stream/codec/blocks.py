@@ -29,8 +29,9 @@ MAX_PAYLOAD_BYTES = 1 << 16
 
 RECEIVED, SENT = "recv", "sent"
 """Bytes from and to the device, unchanged."""
-CONFIGURED, EVENT, NOTE = "conf", "evnt", "note"
-"""JSON: the format of the bytes that follow, an event on the line, the origin of the recording."""
+CONFIGURED, EVENT, NOTE, ANSWERED = "conf", "evnt", "note", "answ"
+"""JSON: the format of the bytes that follow, an event on the line, the origin of the recording, a command with its
+decoded answer."""
 
 _CRC = struct.Struct("<I")
 _VERSION = struct.Struct("<8sI")

@@ -126,6 +126,10 @@ class Command:
         """Whether it acts at once, without a terminator."""
         return len(self.line) == 1 and self.line in IMMEDIATE_LETTERS + CONTROL_CHARACTERS
 
+    def encode(self) -> bytes:
+        """Return its bytes. A line ends in CR, and one that was cut is still longer than `LONGEST_LINE`."""
+        return self.line if self.immediate else self.line + b"?" * self.cut + b"\r"
+
 
 class CommandReader:
     """Splits incoming bytes into commands.

@@ -56,13 +56,13 @@ class ContinuousFrameReader:
         return self._last_byte_s + SILENCE_PERIODS * self._period_s
 
     def begin_session(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
-        """Start a session: later bytes have this format, and the device's clock starts at zero.
+        """Start a session: later bytes have this format, and the device's clock starts at zero if `wire` says so.
 
         Returns the unfinished frame of the session before.
         """
         frames = self.finish()
         self._totals["sessions"] += 1
-        self._reader, self._period_s = FrameReader(wire, now_s), 1.0 / wire.rate_hz
+        self._reader, self._period_s = FrameReader(wire, now_s if wire.zeroed else None), 1.0 / wire.rate_hz
         self._last_byte_s, self._is_new = now_s, True
         return frames
 

@@ -7,6 +7,8 @@ import struct
 from dataclasses import dataclass
 
 _HEAD, _STATION_DATA = 0xFF, 1
+DATAGRAM_START = bytes([_HEAD, _STATION_DATA])
+"""The first two bytes of a packet with station data."""
 _BODY_STRUCT = struct.Struct("<4B4B8B3f3f")
 _TIME_STRUCT = struct.Struct("<f")
 

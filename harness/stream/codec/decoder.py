@@ -76,7 +76,7 @@ def merge_adjacent(events: Iterable[DecoderEvent]) -> list[DecoderEvent]:
         elif (
             isinstance(event, RecordRun)
             and isinstance(last, RecordRun)
-            and last.items == event.items
+            and (last.items, last.size) == (event.items, event.size)
             and last.offset + last.nbytes == event.offset
         ):
             out[-1] = RecordRun(last.offset, last.items, np.concatenate([last.table, event.table]), last.size)

@@ -11,6 +11,7 @@ from harness.errors import BadInput
 from harness.stream.codec.assembler import FrameAssembler
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.clock import ClockUnwrapper
+from harness.stream.codec.datagram_decoder import DatagramDecoder
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, position_range_m
 from harness.stream.codec.plausibility import PlausibilityCheck
@@ -33,6 +34,10 @@ class WireFormat:
     settings: RecordFormat = field(default_factory=RecordFormat)
     characters: bytes = b""
     """Characters of the stations on the wire, ascending; by default `1` for the first, and so on."""
+    zeroed: bool = True
+    """Whether the device's clock was set to zero when these records began."""
+    datagrams: bool = False
+    """Whether UDP packets carry the records, and not a serial line or TCP (docs/is900.md 9)."""
 
     def __post_init__(self) -> None:
         if not self.characters:
@@ -67,7 +72,7 @@ class FrameReader:
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
-        self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
+        self._decoder = _make_decoder(wire)
         self._clock = ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
         self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
@@ -179,6 +184,12 @@ class FrameReader:
         return self._plausibility.mark_suspect(
             Readings(raw.station, received_s, measured_s, position_m, quaternion, quality, suspect)
         )
+
+
+def _make_decoder(wire: WireFormat) -> Decoder | DatagramDecoder:
+    if wire.datagrams:
+        return DatagramDecoder(wire.items, wire.characters)
+    return Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
 
 
 class CaptureStream:

@@ -59,6 +59,17 @@ class RecordValues:
     joystick: Ints | int = 127
     """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
 
+    def rows(self, rows: list[int]) -> "RecordValues":
+        """Return the values of these records."""
+        return RecordValues(
+            self.measured_s[rows],
+            self.position_m[rows],
+            self.tracker_from_station[rows],
+            self.quality[rows],
+            self.buttons if isinstance(self.buttons, int) else self.buttons[rows],
+            self.joystick if isinstance(self.joystick, int) else self.joystick[rows],
+        )
+
 
 def encode_records(
     items: tuple[int, ...], stations: NDArray[np.uint8], values: RecordValues, settings: RecordFormat

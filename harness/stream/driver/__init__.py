@@ -1,7 +1,18 @@
-"""Driver of a real IS-900 on a serial port or a TCP connection, as a `TrackerStream` (docs/device.md, Driver)."""
+"""Driver of a real IS-900 on a serial port, TCP or UDP, as a `TrackerStream` (docs/device.md, Driver)."""
 
+from harness.stream.driver.broadcast import Is900Broadcast
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.is900 import Is900
+from harness.stream.driver.opening import Tracker, open_tracker
 from harness.stream.line_events import LineEvent, LineObserver
 
-__all__ = ["DriverConfig", "DriverTiming", "Is900", "LineEvent", "LineObserver"]
+__all__ = [
+    "DriverConfig",
+    "DriverTiming",
+    "Is900",
+    "Is900Broadcast",
+    "LineEvent",
+    "LineObserver",
+    "Tracker",
+    "open_tracker",
+]

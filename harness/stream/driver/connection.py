@@ -82,6 +82,18 @@ class DeviceConnection:
             data += self.receive(left_s)
         return data
 
+    def listen_until_silence(self) -> bytes:
+        """Return what arrives until `quiet_s` of silence: the first byte within `answer_s`, all within twice that."""
+        began_s, data = self._host.monotonic_s(), b""
+        silent_from_s = began_s
+        while (now_s := self._host.monotonic_s()) < began_s + 2.0 * self.timing.answer_s:
+            left_s = silent_from_s + (self.timing.quiet_s if data else self.timing.answer_s) - now_s
+            if left_s <= 0.0:
+                break
+            if chunk := self.receive(left_s):
+                data, silent_from_s = data + chunk, self._host.monotonic_s()
+        return data
+
     def stop(self, command: bytes = STOP) -> bool:
         """Stop the data stream. Returns False when the device keeps sending after three attempts."""
         for _ in range(3):

@@ -84,7 +84,7 @@ def _no_answer_error(port: str, bauds: Sequence[int | None], received_bytes: int
     if received_bytes == 0:
         return NoAnswer(
             f"Port {port}: nothing answers{rates}.",
-            f"{advice}Is the device on and started (up to 20 s), the cable a null modem, and this its port?",
+            f"{advice}Is the device on and started (up to 20 s), the cable that of the device, and this its port?",
         )
     return NoAnswer(
         f"Port {port}: {received_bytes} bytes arrived{rates}, but no reply of an IS-900.",

@@ -136,7 +136,7 @@ class Is900:
 
         `rate_hz` is absent until enough frames have arrived to tell it.
         """
-        rate_hz = _arrival_rate_hz(list(self._recent_s))
+        rate_hz = arrival_rate_hz(list(self._recent_s))
         rate = {} if rate_hz is None else {"rate_hz": rate_hz}
         return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
 
@@ -379,7 +379,7 @@ class Is900:
             self._host.sleep(min(left_s, self._timing.poll_s))
 
 
-def _arrival_rate_hz(received_s: list[float]) -> float | None:
+def arrival_rate_hz(received_s: list[float]) -> float | None:
     """Frames per second of frames received at these times [s]; None for too short a time.
 
     Frames that arrived together with the first are left out: nothing tells how long they waited.

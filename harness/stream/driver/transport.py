@@ -19,10 +19,12 @@ from typing import Protocol
 import serial
 
 from harness.errors import HarnessError
+from harness.stream.codec.datagram import DATAGRAM_START
 from harness.stream.driver.transport_errors import (
-    parse_tcp_address,
+    parse_network_address,
     serial_port_error,
     tcp_connection_error,
+    udp_port_error,
     unknown_scheme_error,
 )
 
@@ -32,8 +34,11 @@ else:
     import termios
 
     _IO_ERRORS = (OSError, ValueError, termios.error)
+UDP_SCHEME = "udp://"
 READ_BYTES = 65536
 """More than any operating system buffers for a port [bytes]."""
+MAX_PACKETS = 100
+"""UDP packets that are read at once."""
 WRITE_TIMEOUT_S, CONNECT_TIMEOUT_S = 2.0, 2.0
 """A line that takes no byte for so long is lost; a host that does not answer for so long is unreachable [s]."""
 _POLL_INTERVAL_S = 0.002
@@ -76,13 +81,15 @@ class Transport(Protocol):
 
 
 def open_transport(port: str, baud: int = 115200) -> Transport:
-    """Open `/dev/ttyUSB0`, `COM3`, a pty, `tcp://host:port` or `socket://host:port`; other addresses are refused.
+    """Open `/dev/ttyUSB0`, `COM3`, a pty, `tcp://host:port`, `socket://host:port` or `udp://host:port`.
 
     A serial port is opened for this process alone: 8N1, no handshake, as every IS-900 client does (docs/is900.md 2).
     Raises BadInput when there is no such port or host, or when it is in use or may not be opened.
     """
     if port.startswith(("tcp://", "socket://")):
-        return _TcpTransport(port, parse_tcp_address(port))
+        return _TcpTransport(port, parse_network_address(port))
+    if port.startswith(UDP_SCHEME):
+        return _UdpTransport(port, parse_network_address(port))
     if "://" in port:
         raise unknown_scheme_error(port)
     try:
@@ -233,6 +240,48 @@ class _TcpTransport(_SelectTransport):
 
     def _send(self, data: bytes) -> None:
         self._socket.sendall(data)
+
+    def _release(self) -> None:
+        self._socket.close()
+        super()._release()
+
+
+class _UdpTransport(_SelectTransport):
+    """Packets that are sent to an address of this computer; it sends nothing.
+
+    The host that first sends station data is the tracker. Packets of other hosts are left out.
+    """
+
+    def __init__(self, name: str, address: tuple[str, int]) -> None:
+        try:
+            (family, _, _, _, resolved), *_ = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)
+            self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        except (OSError, UnicodeError) as error:
+            raise udp_port_error(name, address, error) from error
+        try:
+            self._socket.bind(resolved)
+        except OSError as error:
+            self._socket.close()
+            raise udp_port_error(name, address, error) from error
+        super().__init__(name, self._socket.fileno())
+        self._socket.setblocking(False)
+        self._sender = ""
+
+    def _take(self) -> bytes:
+        """Return the packets that have arrived, one after another."""
+        packets: list[bytes] = []
+        while len(packets) < MAX_PACKETS:
+            try:
+                packet, (host, *_) = self._socket.recvfrom(READ_BYTES)
+            except BlockingIOError:
+                break
+            if not self._sender and packet.startswith(DATAGRAM_START):
+                self._sender = host
+            packets += [packet] if host == self._sender else []
+        return b"".join(packets)
+
+    def _send(self, data: bytes) -> None:
+        raise OSError("packets carry no commands")
 
     def _release(self) -> None:
         self._socket.close()

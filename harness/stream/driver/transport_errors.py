@@ -11,6 +11,7 @@ from harness.errors import BadInput
 from harness.stream.codec.items import BAUD_RATES
 
 _BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN)
+_TCP_EXAMPLE = "tcp://HOST:PORT, such as tcp://127.0.0.1:5005"
 _BAUD_RATES_TEXT = f"{', '.join(map(str, BAUD_RATES[:-1]))} and {BAUD_RATES[-1]}"
 
 
@@ -18,21 +19,20 @@ def unknown_scheme_error(port: str) -> BadInput:
     """Return the error for `spy://...` and other unsupported addresses."""
     return BadInput(
         f"Port {port}: this kind of address is not known.",
-        "Name a serial port (/dev/ttyUSB0, COM3), tcp://HOST:PORT or socket://HOST:PORT.",
+        "Name a serial port (/dev/ttyUSB0, COM3), tcp://HOST:PORT, socket://HOST:PORT or udp://HOST:PORT.",
     )
 
 
-def parse_tcp_address(port: str) -> tuple[str, int]:
-    """Split `tcp://host:port` into host and port number. Raises BadInput when either is missing."""
+def parse_network_address(port: str) -> tuple[str, int]:
+    """Split `tcp://host:port` or `udp://host:port` into host and port number. Raises BadInput when one is missing."""
+    example = "udp://HOST:PORT, such as udp://127.0.0.1:5001" if port.startswith("udp:") else _TCP_EXAMPLE
     try:
         parts = urlsplit(port)
         host, number = parts.hostname, parts.port
     except ValueError as error:
-        raise BadInput(f"Port {port}: {error}.", "Write tcp://HOST:PORT, such as tcp://127.0.0.1:5005.") from error
+        raise BadInput(f"Port {port}: {error}.", f"Write {example}.") from error
     if not host or not number:
-        raise BadInput(
-            f"Port {port}: host or port number is missing.", "Write tcp://HOST:PORT, such as tcp://127.0.0.1:5005."
-        )
+        raise BadInput(f"Port {port}: host or port number is missing.", f"Write {example}.")
     return host, number
 
 
@@ -49,6 +49,21 @@ def tcp_connection_error(port: str, address: tuple[str, int], error: Exception) 
             "Start the device (or `harness emulate`) first, and check the port number.",
         )
     return BadInput(f"Port {port}: {_error_text(error)}.", "Check the address and the network.")
+
+
+def udp_port_error(port: str, address: tuple[str, int], error: Exception) -> BadInput:
+    """Return the error for an address at which packets cannot be received."""
+    host, number = address
+    if isinstance(error, (socket.gaierror, UnicodeError)):
+        return BadInput(f"Port {port}: there is no host called {host}.", "Check the name, or give its address.")
+    if getattr(error, "errno", None) == errno.EADDRINUSE:
+        return BadInput(
+            f"Port {port}: another program receives at port {number}.", "Close that program, or choose another port."
+        )
+    return BadInput(
+        f"Port {port}: {_error_text(error)}.",
+        "Name an address of this computer: 127.0.0.1, or 0.0.0.0 for packets from the network.",
+    )
 
 
 def serial_port_error(port: str, baud: int, error: Exception) -> BadInput:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from harness.errors import BadInput
+from harness.stream.emulator.controls import check_control_pattern
 from harness.stream.emulator.faults import Fault, check_firmware
 
 SUPPORTED_BAUD_RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
@@ -33,6 +34,12 @@ class EmulatorConfig:
     """Silence after a restart [s]; clients wait 10 to 20 s for a real device (docs/is900.md 4.1)."""
     check_baud: bool = False
     """On a pty: corrupt both directions while the client has set another baud rate than the device."""
+    controls: str = "cycle"
+    """Pattern of buttons and joystick, one of `CONTROL_PATTERNS`: "cycle" moves all of them, "still" none."""
+    udp: bool = False
+    """Whether the device broadcasts UDP packets after power-on; the command `MEthUdp` switches them on and off."""
+    udp_port: int = 5001
+    """Port of these packets after power-on; `MEthUdpPort` changes it (docs/is900.md 9)."""
     faults: tuple[Fault, ...] = ()
     """Faults that are injected."""
     seed: int = 1
@@ -40,6 +47,7 @@ class EmulatorConfig:
 
     def __post_init__(self) -> None:
         check_firmware(self.firmware)
+        check_control_pattern(self.controls)
         if not (self.identification.isascii() and self.identification.isprintable() and len(self.identification) < 32):
             raise BadInput(
                 f"identification {self.identification!r} is not possible.", "Give up to 31 ASCII characters."
@@ -52,5 +60,7 @@ class EmulatorConfig:
             raise BadInput(f"{self.baud} baud.", f"An IS-900 supports {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
         if self.queue_records < 1:
             raise BadInput(f"queue_records = {self.queue_records} is not possible.", "Give at least 1.")
+        if not 0 < self.udp_port < 65536:
+            raise BadInput(f"udp_port = {self.udp_port} is not possible.", "Give a number from 1 to 65535.")
         if not 0.0 <= self.restart_s <= 3600.0:
             raise BadInput(f"restart_s = {self.restart_s:g} is not possible.", "Give a number from 0 to 3600.")

@@ -29,7 +29,7 @@ class DeviceState:
         """Switch the device on at `now_s` [s]."""
         self.samples, self.config = samples, config or EmulatorConfig()
         self.firmware = self.config.firmware
-        self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
+        self.rounds = RoundEncoder(SamplePlayer(samples, now_s), self.config.controls)
         self.streaming = self.suspended = False
         self.command_count = self.refused_count = 0
         """Numbers of all commands and of the rejected ones."""
@@ -37,7 +37,9 @@ class DeviceState:
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while the command log is open."""
         stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
-        self._factory = DeviceSettings(stations, baud=self.config.baud)
+        self._factory = DeviceSettings(
+            stations, baud=self.config.baud, udp=self.config.udp, udp_port=self.config.udp_port
+        )
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0

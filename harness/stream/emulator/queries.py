@@ -17,9 +17,11 @@ from harness.stream.codec.replies import (
 )
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import OUT_OF_RANGE, CommandArgument, CommandError
-from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
+from harness.stream.emulator.settings import DeviceSettings, StationSettings
 
 Query = Callable[[DeviceSettings, CommandArgument], Iterable[ParsedReply]]
+_INERTIA_CUBES, NO_INERTIA_CUBE = "1234", -1
+"""Numbers of InertiaCubes, and the answer for a station without one (docs/is900.md 14)."""
 _STATE_FLAGS = 32
 """Number of flags in the reply to `l*`."""
 
@@ -88,7 +90,9 @@ QUERIES: dict[str, Query] = {
     "Mg": _device_query(lambda settings: IntegerReply("1", "g", settings.gain)),
     "MCF": _emitter_list,
     "MCI": _station_query(
-        lambda name, station: IntegerReply(name, "I", 1 + STATION_NAMES.index(name) if station.active else -1)
+        lambda name, station: IntegerReply(
+            name, "I", int(name) if station.active and name in _INERTIA_CUBES else NO_INERTIA_CUBE
+        )
     ),
     "MLogState": _device_query(lambda settings: _text_reply(f"31LS{int(settings.command_log)}")),
     "MSchAlg": _device_query(lambda settings: _text_reply(f"31SchAlg{settings.scheduling}")),

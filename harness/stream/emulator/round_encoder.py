@@ -7,6 +7,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.emulator import geometry
+from harness.stream.emulator.controls import CONTROL_PATTERNS
 from harness.stream.emulator.player import SamplePlayer
 from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
 
@@ -16,8 +17,9 @@ _INCH_M, _CENTIMETRE_M = 0.0254, 0.01
 class RoundEncoder:
     """Encodes the records of one round of stations at a time, once."""
 
-    def __init__(self, player: SamplePlayer) -> None:
-        self.player = player
+    def __init__(self, player: SamplePlayer, controls: str = "cycle") -> None:
+        """`controls` names the pattern of buttons and joystick."""
+        self.player, self._pattern = player, CONTROL_PATTERNS[controls]
         self._lost: frozenset[str] = frozenset()
         self._cache: tuple[int, DeviceSettings, tuple[float, float], dict[str, bytes]] | None = None
         """Round number, settings and epoch of the latest encoding, and its records by station."""
@@ -52,11 +54,13 @@ class RoundEncoder:
             self._cache = cached = number, settings, epoch, self._encode(number, settings)
         return cached[3]
 
-    def _encode(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
+    def values(self, number: int, settings: DeviceSettings) -> RecordValues:
+        """Return what the stations that are plugged in report in a round, with the geometry of these settings."""
         samples, instant, stamps_s = self.player.samples, self.player.instant_of(number), self.player.stamps_s(number)
         position_m, orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
         quality = samples.quality[instant].copy()
-        rows_of: dict[tuple[int, ...], list[int]] = {}
+        # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
+        buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
         for row, (name, station) in enumerate(zip(self.plugged, settings.stations, strict=False)):
             if not station.plain:
                 position_m[row], orientation[row] = geometry.apply_station_settings(
@@ -64,12 +68,18 @@ class RoundEncoder:
                 )
             if name in self._lost:
                 quality[row] = 0.0
+        return RecordValues(stamps_s, position_m, orientation, quality, buttons, joystick)
+
+    def _encode(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
+        values = self.values(number, settings)
+        rows_of: dict[tuple[int, ...], list[int]] = {}
+        for row, station in zip(range(len(self.plugged)), settings.stations, strict=False):
             rows_of.setdefault(station.items, []).append(row)
         out, number_format = {}, record_format(settings)
         for items, rows in rows_of.items():
-            values = RecordValues(stamps_s[rows], position_m[rows], orientation[rows], quality[rows])
+            part = values.rows(rows)
             characters = np.array([ord(STATION_NAMES[row]) for row in rows], np.uint8)
-            table = encode_records(items, characters, values, number_format)
+            table = encode_records(items, characters, part, number_format)
             for index, row in enumerate(rows):
                 out[STATION_NAMES[row]] = to_bytes(items, table[index : index + 1], number_format)
         return out

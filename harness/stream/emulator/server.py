@@ -16,11 +16,14 @@ import numpy as np
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.codec.samples import DeviceSamples
+from harness.stream.emulator.addresses import parse_address
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.port import Port
 from harness.stream.emulator.tcp_port import LogCallback, TcpPort
+from harness.stream.emulator.udp_broadcast import UdpBroadcast
+from harness.stream.emulator.udp_port import LOOPBACK, UdpPort
 
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0
@@ -63,8 +66,12 @@ class ServerCounts:
 class EmulatorServer:
     """Serves an emulator until it is told to stop."""
 
-    def __init__(self, emulator: Emulator, port: Port, on_sent: SentCallback | None = None) -> None:
+    def __init__(
+        self, emulator: Emulator, port: Port, on_sent: SentCallback | None = None, udp_host: str = LOOPBACK
+    ) -> None:
+        """`udp_host` is the address to which the device broadcasts while `MEthUdp` is on."""
         self.emulator, self.port, self.counts = emulator, port, ServerCounts()
+        self._broadcast, self._udp = UdpBroadcast(emulator.device, time.monotonic()), UdpPort(udp_host)
         self._on_sent = on_sent
         self._woken, self._waker = socket.socketpair()
         self._stopped = False
@@ -80,9 +87,13 @@ class EmulatorServer:
                     self.emulator.receive(self._distort(data), now_s)
                 for sent in self.emulator.advance(now_s):
                     self._write(sent)
+                for packet in self._broadcast.packets(now_s):
+                    if not self.emulator.unplugged(now_s):
+                        self._udp.send(packet, self.emulator.device.settings.udp_port)
                 self._plug(now_s)
         finally:
             self.port.close()
+            self._udp.close()
             self._woken.close()
             self._waker.close()
 
@@ -96,7 +107,8 @@ class EmulatorServer:
 
     def _wait(self) -> bool:
         """Wait until something is due or arrives; return whether the port can be read or takes more of a message."""
-        wait_s = min(max(self.emulator.next_s - time.monotonic(), 0.0), MAX_WAIT_S)
+        due_s = min(self.emulator.next_s, self._broadcast.next_s)
+        wait_s = min(max(due_s - time.monotonic(), 0.0), MAX_WAIT_S)
         waking = self._woken.fileno()
         ready, free, _ = select.select([*self.port.readable(), waking], self.port.writable(), [], wait_s)
         return bool(free) or any(end != waking for end in ready)
@@ -131,6 +143,8 @@ class EmulatorServer:
             "messages_unread": float(counts.unread),
             "messages_unplugged": float(self.emulator.unplugged_messages),
             "messages_damaged": float(counts.damaged),
+            "packets_sent": float(self._udp.sent),
+            "packets_unsent": float(self._udp.unsent),
             "commands": float(device.command_count),
             "commands_refused": float(device.refused_count),
             "pacing_p50_ms": float(np.quantile(late_ms, 0.5)),
@@ -139,9 +153,11 @@ class EmulatorServer:
         }
 
 
-def play_samples(samples: DeviceSamples, config: EmulatorConfig, port: Port) -> dict[str, float]:
+def play_samples(
+    samples: DeviceSamples, config: EmulatorConfig, port: Port, udp_host: str = LOOPBACK
+) -> dict[str, float]:
     """Play samples at a port until Ctrl-C, the normal end; return `EmulatorServer.summary`."""
-    server = EmulatorServer(Emulator(samples, config, time.monotonic()), port)
+    server = EmulatorServer(Emulator(samples, config, time.monotonic()), port, udp_host=udp_host)
     with contextlib.suppress(KeyboardInterrupt):
         server.run()
     return server.summary()
@@ -212,7 +228,4 @@ def open_port(
         from harness.stream.emulator.pty_port import PtyPort
 
         return PtyPort(pty)
-    host, colon, number = (tcp or "").rpartition(":")
-    if not colon or not (number.isascii() and number.isdecimal()) or int(number) > 65535:
-        raise BadInput(f"{tcp!r} is no HOST:PORT.", "An example is 127.0.0.1:5005; port 0 takes a free one.")
-    return TcpPort(host.strip("[]"), int(number), anywhere=anywhere, log=log)
+    return TcpPort(*parse_address(tcp or ""), anywhere=anywhere, log=log)

@@ -1,27 +1,45 @@
 """A TCP port of the emulator: it carries the same bytes as the serial line (docs/is900.md 9)."""
 
 import socket
+import time
 from collections.abc import Callable
 
 from harness.errors import BadInput
+from harness.stream.emulator.addresses import check_loopback
+from harness.stream.emulator.tcp_client import MAX_UNREAD_BYTES, TcpClient
 
 LogCallback = Callable[[str], None]
 """Receives one line of text for the user."""
-_READ_BYTES = 4096
-_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+MAX_CLIENTS = 32
+"""Further clients are turned away."""
+IDLE_S = 5.0
+"""A client keeps the device until it has sent and received nothing for this long [s] [choice]."""
 
 
 class TcpPort:
-    """A TCP port for one client at a time; further clients are turned away at once."""
+    """A TCP port. Of its clients, the one that sends a command gets the device, until it leaves or is idle.
 
-    def __init__(self, host: str, port: int, *, anywhere: bool = False, log: LogCallback = lambda line: None) -> None:
+    An idle client keeps nobody out. Another that sends a command meanwhile is turned away, so that two programs do not
+    change each other's settings. A client that does not read is dropped when its queue is full.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        anywhere: bool = False,
+        log: LogCallback = lambda line: None,
+        idle_s: float = IDLE_S,
+    ) -> None:
         """Listen at this address. Raises BadInput when it is taken, or reachable by others without `anywhere`."""
-        if host not in _LOOPBACK and not anywhere:
-            advice = "Use 127.0.0.1, or --anywhere: anyone who reaches the port can then command the emulator."
-            raise BadInput(f"{host} is reachable from other computers.", advice)
-        self._log = log
-        self._client: socket.socket | None = None
-        self._unsent = b""
+        check_loopback(host, anywhere, "anyone who reaches the port can then command the emulator")
+        self._log, self._idle_s = log, idle_s
+        self._clients: list[TcpClient] = []
+        self._user: TcpClient | None = None
+        """The client that has the device."""
+        self._used_s = float("-inf")
+        """When that client last sent or received something [s]."""
         self._server: socket.socket | None = None
         self._address = host, port
         self.plug()
@@ -32,47 +50,36 @@ class TcpPort:
         return f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
 
     def readable(self) -> list[int]:
-        return [end.fileno() for end in (self._server, self._client) if end is not None]
+        ends: list[socket.socket | TcpClient] = [] if self._server is None else [self._server]
+        return [end.fileno() for end in (*ends, *self._clients)]
 
     def writable(self) -> list[int]:
-        return [self._client.fileno()] if self._unsent and self._client is not None else []
+        return [client.fileno() for client in self._clients if client.unread_bytes]
 
     def read(self) -> bytes:
-        self._flush()
-        data = self._receive()
-        if not data:  # notice a departed client before accepting one: the same client may be reconnecting
-            self._accept_client()
-        return data
-
-    def _receive(self) -> bytes:
-        if self._client is None:
-            return b""
-        try:
-            data = self._client.recv(_READ_BYTES)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            data = b""
-        if not data:
-            self._drop_client()
+        for client in self._clients:
+            client.flush()
+        user_first = sorted(self._clients, key=lambda client: client is not self._user)  # it may have left
+        data = b"".join(self._read_from(client) for client in user_first)
+        self._drop_clients()  # before others are accepted: the same client may be reconnecting
+        self._accept_clients()
         return data
 
     def write(self, data: bytes) -> bool:
-        self._flush()
-        if self._client is None or self._unsent:
+        if self._user is None:
             return False
-        self._unsent = data
-        self._flush()
-        if self._client is not None and len(self._unsent) < len(data):
-            return True
-        self._unsent = b""
-        return False
+        self._user.write(data)
+        self._used_s = time.monotonic()
+        self._drop_clients()
+        return self._user is not None
 
     def baud(self) -> int | None:
         return None
 
     def unplug(self) -> None:
-        self._drop_client()
+        for client in self._clients:
+            client.open = False
+        self._drop_clients()
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -92,34 +99,40 @@ class TcpPort:
     def close(self) -> None:
         self.unplug()
 
-    def _accept_client(self) -> None:
-        """Accept a waiting client if there is none; turn away further ones."""
+    def _read_from(self, client: TcpClient) -> bytes:
+        """Return the commands of a client if the device is free for it; turn it away if not."""
+        data, now_s = client.read(), time.monotonic()
+        if not client.open and self._user is client:
+            self._user = None
+        if not data:
+            return b""
+        if self._user not in (None, client) and now_s < self._used_s + self._idle_s:
+            client.open = False
+            self._log(f"turned away {client.name}: another client has the device")
+            return b""
+        self._user, self._used_s = client, now_s
+        return data
+
+    def _accept_clients(self) -> None:
         while self._server is not None:
             try:
-                client, address = self._server.accept()
+                connection, (host, port, *_) = self._server.accept()
             except (BlockingIOError, ConnectionError):
                 return
-            if self._client is not None:
-                client.close()
-                self._log(f"turned away {address[0]}:{address[1]}: one client at a time")
+            if len(self._clients) >= MAX_CLIENTS:
+                connection.close()
+                self._log(f"turned away {host}:{port}: there are {MAX_CLIENTS} clients")
                 continue
-            client.setblocking(False)
-            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
-            self._client = client
-            self._log(f"client {address[0]}:{address[1]}")
+            self._clients.append(TcpClient(connection, f"{host}:{port}"))
+            self._log(f"client {host}:{port}")
 
-    def _drop_client(self) -> None:
-        if self._client is not None:
-            self._client.close()
-            self._client, self._unsent = None, b""
-            self._log("client gone")
-
-    def _flush(self) -> None:
-        if self._unsent and self._client is not None:
-            try:
-                self._unsent = self._unsent[self._client.send(self._unsent) :]
-            except BlockingIOError:
-                pass
-            except OSError:
-                self._drop_client()
+    def _drop_clients(self) -> None:
+        """Close the connections that have ended, and those of clients that do not read."""
+        for client in self._clients.copy():
+            if client.open and client.unread_bytes <= MAX_UNREAD_BYTES:
+                continue
+            self._clients.remove(client)
+            self._user = None if self._user is client else self._user
+            client.close()
+            reason = f"dropped: it left {client.unread_bytes} bytes unread" if client.open else "gone"
+            self._log(f"client {client.name} {reason}")

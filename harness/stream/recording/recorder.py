@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from harness.stream.codec.blocks import RECEIVED
-from harness.stream.driver import DriverConfig, Is900, LineEvent
+from harness.stream.driver import DriverConfig, LineEvent, Tracker, open_tracker
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter
 
@@ -33,7 +33,7 @@ def record_port(
         log(event.text)
 
     counts: dict[str, int] = {}
-    with suppress(KeyboardInterrupt), Is900(port, config, observer=writer, on_event=report_event) as device:
+    with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=report_event) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
@@ -53,7 +53,7 @@ def record_port(
     return counts
 
 
-def _progress_text(device: Is900, frame: TrackerFrame, writer: RecordingWriter) -> str:
+def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     beyond = f", {health['out_of_range']:.0f} positions out of range" if health["out_of_range"] else ""
     tracked = int((frame.position_valid | frame.orientation_valid).sum())

@@ -7,6 +7,7 @@ costs only the blocks it touches, and these are reported. A recording that was c
     conf         JSON of the `WireFormat` of the bytes that follow; the device's clock starts at zero there
     evnt         JSON of an event on the line, as the driver reported it
     note         JSON of the origin of what follows: the port, or the scenario, clip, seed, stations and rate
+    answ         JSON of a command that a person sent, with the bytes and the decoded values of its answer
 """
 
 import json
@@ -27,6 +28,7 @@ from harness.core.fields import build
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadFile, HarnessError, SystemFault
 from harness.stream.codec.blocks import (
+    ANSWERED,
     CONFIGURED,
     EVENT,
     FILE_HEADER,
@@ -47,6 +49,8 @@ from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
 _WRITABLE_FILE = "a file to record into"
+_MAX_ANSWER_BYTES = 8192
+"""Most bytes of an answer that are repeated next to its decoded values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,12 @@ class Recording:
         """Events on the line: kind, text and time on the host's clock [s]."""
         event_blocks = [block for block in self.blocks() if block.kind == EVENT]
         return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in event_blocks]
+
+    @property
+    def answers(self) -> list[dict[str, Any]]:
+        """Commands that a person sent, with their answers and the time on the host's clock [s]."""
+        blocks = [block for block in self.blocks() if block.kind == ANSWERED]
+        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in blocks]
 
     def format_of(self, configured: RecordingBlock) -> WireFormat:
         """Parse the wire format in a "conf" block. Raises BadFile."""
@@ -158,8 +168,8 @@ class RecordingWriter:
     def __init__(self, path: Path | str, note: Mapping[str, Any] | None = None) -> None:
         """Check the file. `note` describes the origin of the recording."""
         self.path = Path(path)
-        self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT), 0)
-        """Bytes received and sent, and numbers of configurations and events, by block kind."""
+        self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT, ANSWERED), 0)
+        """Bytes received and sent, and numbers of configurations, events and answers, by block kind."""
         self._note = dict(note or {})
         existing = self._existing_recording()
         self._new = existing is None
@@ -191,6 +201,9 @@ class RecordingWriter:
             )
         self._stations = wire.stations
         content = asdict(wire) | {"characters": wire.characters.decode("latin-1")}
+        for name, usual in (("zeroed", True), ("datagrams", False)):
+            if content[name] is usual:
+                del content[name]  # earlier versions refuse a key that they do not know
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
@@ -199,10 +212,18 @@ class RecordingWriter:
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 
+    def on_answer(self, content: Mapping[str, Any]) -> None:
+        """Write a command with its answer (`Exchange.as_dict`), as much of it as fits; `recv` blocks have all of it."""
+        fitting = {**content, "received": content["received"][: 3 * _MAX_ANSWER_BYTES]}
+        while len(json.dumps(fitting)) > MAX_PAYLOAD_BYTES:
+            fitting["answers"] = fitting["answers"][: len(fitting["answers"]) // 2]
+        self._append_json(ANSWERED, fitting)
+        self.counts[ANSWERED] += 1
+
     def close(self) -> None:
         """Flush everything to the disk and close the file; may be called twice.
 
-        A new file is removed when no device was ever configured in it, because it contains nothing usable.
+        A new file is removed when no device was ever configured or answered in it, because it contains nothing usable.
         """
         with self._lock:
             self._closed = True
@@ -210,7 +231,7 @@ class RecordingWriter:
                 os.fsync(self._file)
                 os.close(self._file)
                 self._file = None
-                if self._new and not self.counts[CONFIGURED]:
+                if self._new and not self.counts[CONFIGURED] and not self.counts[ANSWERED]:
                     self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> "RecordingWriter":

@@ -41,7 +41,7 @@ def test_settings_take_effect_at_once() -> None:
 
 
 def test_lists_differ_by_station() -> None:
-    session = DeviceSession()
+    session = DeviceSession(EmulatorConfig(controls="still"))
     reply = session.send(b"O1,2,1\rO2,40,2,11,21,1\rO3,22,23,0\rO4,2,4,16,1\rfP", after_s=0.5)
     assert [len(part) for part in (reply[:17], reply[17:55], reply[55:62], reply[62:])] == [17, 38, 7, 31]
     assert reply[55:62] == b"03 \x00\x7f\x7f "

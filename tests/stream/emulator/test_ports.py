@@ -2,11 +2,13 @@
 
 import itertools
 import os
+import re
 import select
 import socket
 import subprocess
 import sys
 import termios
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,11 +17,12 @@ import pytest
 
 from harness.errors import BadInput
 from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
 from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.pty_port import PtyPort
-from harness.stream.emulator.server import RunningEmulator, open_port, serve_emulator
-from harness.stream.emulator.tcp_port import TcpPort
+from harness.stream.emulator.server import EmulatorServer, RunningEmulator, open_port, serve_emulator
+from harness.stream.emulator.tcp_port import MAX_CLIENTS, TcpPort
 from tests.stream.emulator.played import make_samples
 
 TIMEOUT_S = 120.0
@@ -160,34 +163,105 @@ def test_tcp_serves_one_client_after_another(tmp_path: Path) -> None:
             open_port(None, f"127.0.0.1:{address[1]}")
 
 
-def test_a_second_client_is_turned_away_and_reported(tmp_path: Path) -> None:
+def connect(emulator: RunningEmulator) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", int(emulator.name.rpartition(":")[2])), TIMEOUT_S)
+
+
+def test_idle_tcp_clients_block_nobody() -> None:
+    """One is silent, and one stops in the middle of a command; others get their answers."""
+    with serve_emulator(make_samples(), tcp="127.0.0.1:0") as emulator, connect(emulator), connect(emulator) as partial:
+        partial.sendall(b"O1,2,4")
+        for _ in range(2):
+            with connect(emulator) as client:
+                client.sendall(b"S")
+                assert read_bytes(client.fileno(), 55)[:6] == b"21S3F0"
+        partial.sendall(b",21,1\rO1\r")
+        assert read_bytes(partial.fileno(), 13) == b"21O 2 421 1\r\n"
+
+
+def test_a_client_that_has_the_device_keeps_it_until_it_is_idle() -> None:
     messages: list[str] = []
-    port = TcpPort("127.0.0.1", 0, log=messages.append)
+    port = TcpPort("127.0.0.1", 0, log=messages.append, idle_s=0.5)
     address = ("127.0.0.1", int(port.name.rpartition(":")[2]))
-    with socket.create_connection(address, TIMEOUT_S), socket.create_connection(address, TIMEOUT_S) as second_client:
-        wait_until(lambda: (port.read() == b"") and len(messages) > 1)
-        assert second_client.recv(1) == b""
-    assert "turned away" in messages[1]
-    wait_until(lambda: (port.read() == b"") and messages[-1] == "client gone")
+    with (
+        socket.create_connection(address, TIMEOUT_S) as first,
+        socket.create_connection(address, TIMEOUT_S) as second,
+        socket.create_connection(address, TIMEOUT_S) as third,
+    ):
+        wait_until(lambda: port.read() == b"" and len(messages) == 3)
+        assert not port.write(b"nobody has sent a command")
+        first.sendall(b"S")
+        wait_until(lambda: port.read() == b"S")
+        second.sendall(b"c")
+        wait_until(lambda: port.read() == b"" and len(messages) == 5)
+        assert second.recv(1) == b""
+        assert re.fullmatch(r"turned away 127\.0\.0\.1:\d+: another client has the device", messages[3])
+        for _ in range(4):  # it only receives, for longer than `idle_s`
+            assert port.write(b"record")
+            time.sleep(0.2)
+        assert read_bytes(first.fileno(), 24) == b"record" * 4
+        time.sleep(0.5)
+        third.sendall(b"P")
+        wait_until(lambda: port.read() == b"P")
+        assert port.write(b"reply")
+        assert read_bytes(third.fileno(), 5) == b"reply"
     port.close()
 
 
-def test_a_tcp_client_that_does_not_read_blocks_nothing() -> None:
-    with serve_emulator(
-        make_samples(rate_hz=900.0, instants=900), EmulatorConfig(paced=False), tcp="127.0.0.1:0"
-    ) as emulator:
-        client = socket.socket()
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        client.connect(("127.0.0.1", int(emulator.name.rpartition(":")[2])))
-        client.sendall(SET_UP)
-        wait_until(lambda: emulator.server.counts.unread > 100)
-        client.sendall(b"c")
-        wait_until(lambda: not emulator.emulator.device.streaming)
-        client.settimeout(TIMEOUT_S)
-        byte_count = emulator.server.counts.bytes
-        data = read_bytes(client.fileno(), byte_count)
-        assert {data[at : at + 1] for at in range(0, len(data), 38)} == {b"0"}
+def test_an_overlong_command_is_rejected_over_tcp_too() -> None:
+    with serve_emulator(make_samples(), tcp="127.0.0.1:0") as emulator, connect(emulator) as client:
+        client.sendall(b"O1," + b"2," * 400 + b"1\r\nO1\r\n")
+        assert read_bytes(client.fileno(), 131).endswith(b"EC -5*PS1  *FL1 *ST0\r\n21O 2 4 1\r\n")
+
+
+def test_clients_beyond_the_greatest_number_are_turned_away() -> None:
+    messages: list[str] = []
+    port = TcpPort("127.0.0.1", 0, log=messages.append)
+    address = ("127.0.0.1", int(port.name.rpartition(":")[2]))
+    clients = []
+    for number in range(1, MAX_CLIENTS + 2):
+        clients.append(socket.create_connection(address, TIMEOUT_S))
+        wait_until(lambda: port.read() == b"" and len(messages) >= number)  # noqa: B023  # called within the iteration
+    assert clients[-1].recv(1) == b""
+    assert messages[-1].startswith("turned away 127.0.0.1:")
+    assert messages[-1].endswith(f"there are {MAX_CLIENTS} clients")
+    for client in clients:
         client.close()
+    wait_until(lambda: (port.read() == b"") and len(messages) == 2 * MAX_CLIENTS + 1)
+    assert all(message.endswith(" gone") for message in messages[-MAX_CLIENTS:])
+    port.close()
+
+
+def test_a_tcp_client_that_does_not_read_is_dropped_and_stalls_nobody() -> None:
+    messages: list[str] = []
+    port = open_port(None, "127.0.0.1:0", log=messages.append)
+    server = EmulatorServer(
+        Emulator(make_samples(rate_hz=900.0, instants=900), EmulatorConfig(paced=False), time.monotonic()), port
+    )
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    address = ("127.0.0.1", int(port.name.rpartition(":")[2]))
+    deaf = socket.socket()
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deaf.connect(address)
+    try:
+        deaf.sendall(SET_UP)
+        wait_until(lambda: any("dropped" in message for message in messages))
+        assert server.emulator.device.streaming
+        with socket.create_connection(address, TIMEOUT_S) as client:
+            client.sendall(b"c")
+            wait_until(lambda: not server.emulator.device.streaming)
+            client.sendall(b"O1\r")
+            data = b""
+            while not data.endswith(b"21O40 21121 1\r\n"):  # records may precede it
+                data += read_bytes(client.fileno(), 1)
+                assert len(data) < 1 << 20
+    finally:
+        server.stop()
+        thread.join(TIMEOUT_S)
+        deaf.close()
+    (dropped,) = [message for message in messages if "dropped" in message]
+    assert re.fullmatch(r"client 127\.0\.0\.1:\d+ dropped: it left \d+ bytes unread", dropped)
 
 
 def test_other_computers_are_excluded_by_default() -> None:

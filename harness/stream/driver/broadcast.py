@@ -1,0 +1,251 @@
+"""An IS-900 that broadcasts UDP packets, as a `TrackerStream`. Nothing is sent to it, so it must be set up already."""
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from types import TracebackType
+
+import numpy as np
+
+from harness.errors import BadInput
+from harness.stream.codec.continuous_reader import ContinuousFrameReader
+from harness.stream.codec.datagram import Datagram
+from harness.stream.codec.datagram_decoder import DATAGRAM_FORMAT, DATAGRAM_LIST, split_packets
+from harness.stream.codec.items import STATION_CHARACTERS
+from harness.stream.codec.reader import WireFormat
+from harness.stream.driver.config import DriverConfig, DriverTiming
+from harness.stream.driver.connection import DeviceConnection, DriverClosed
+from harness.stream.driver.detection import NoAnswer
+from harness.stream.driver.host import Host
+from harness.stream.driver.is900 import arrival_rate_hz
+from harness.stream.driver.rate_measurement import MIN_RECORDS, estimate_rate_hz
+from harness.stream.driver.transport import LineLost
+from harness.stream.frame import TrackerFrame
+from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, NullLineObserver
+
+_RATE_WINDOW_FRAMES = 50
+"""Number of frames over which the present frame rate is computed."""
+_MIN_TIME_STEPS = 2
+"""Fewest different stamps of a clock that counts. Where the time was not requested, the field may be constant."""
+
+
+class Is900Broadcast:
+    """Receiver of the UDP packets of an IS-900. It listens, finds stations and rate, and streams while it is iterated.
+
+    Packets can be lost or doubled on a network; a station without a packet is an invalid row. `close` may be called
+    from any thread. Raises BadInput when no packets arrive, or when the configuration needs commands.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        config: DriverConfig | None = None,
+        *,
+        observer: LineObserver | None = None,
+        on_event: Callable[[LineEvent], None] = lambda event: None,
+        timing: DriverTiming | None = None,
+        host: Host | None = None,
+    ) -> None:
+        """Listen at `udp://host:port` until the stations and their rate are known."""
+        self.port, self.config = port, config or DriverConfig()
+        self._timing, self._host = timing or DriverTiming(), host or Host()
+        self._observer, self._on_event = observer or NullLineObserver(), on_event
+        if self.config.boresight or self.config.alignment is not None:
+            raise BadInput(f"Port {port}: packets carry no commands.", "Set boresight and alignment by a line.")
+        self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
+        self._reader = ContinuousFrameReader()
+        self._frames: deque[TrackerFrame] = deque()
+        self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
+        self._closing = threading.Event()
+        self._transport = self._host.open(port, 0)
+        try:
+            # These packets belong to no session, so the observer does not see them.
+            self._line = self._connect(NullLineObserver())
+            self._wire = self._read_wire_format()
+        except BaseException:
+            self.close()
+            raise
+        self._trouble: LineEventKind | None = "stalled"
+        self._last_byte_s = self._host.monotonic_s()
+        self._streaming = False
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Station names, in the order of the device's stations."""
+        return self._wire.stations
+
+    @property
+    def wire(self) -> WireFormat:
+        """Content of the packets."""
+        return self._wire
+
+    @property
+    def identification(self) -> str:
+        """Name of the source; packets have none of the device."""
+        return "a broadcast"
+
+    @property
+    def station_list(self) -> str:
+        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
+        return ", ".join(f"{c} {name}" for c, name in zip(self._wire.characters.decode(), self.stations, strict=True))
+
+    @property
+    def setup_note(self) -> str:
+        """What a person at the device should know of its set-up, in one line."""
+        return "a broadcast takes no commands: settings of other programs are as they were, and cannot be read"
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of `sessions`, `reconnects`, `frames`, `records`, `garbage_bytes` and `clock_resets` so far."""
+        return self._reader.counts | {"reconnects": 0}
+
+    def health(self) -> dict[str, float]:
+        """Return the counts, the present frame rate [Hz] and the time since the last packet [s].
+
+        `rate_hz` is absent until enough frames have arrived to tell it.
+        """
+        rate_hz = arrival_rate_hz(list(self._recent_s))
+        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
+        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
+
+    def wall_s(self, received_s: float) -> float:
+        """Convert a time on the host's monotonic clock to seconds since 1970."""
+        return received_s + self._wall_ahead_s
+
+    def __iter__(self) -> Iterator[TrackerFrame]:
+        """Yield frames as they become complete, until the receiver is closed."""
+        while not self._closing.is_set():
+            if self._frames:
+                yield self._frames.popleft()
+                continue
+            try:
+                self._step()
+            except (DriverClosed, LineLost):
+                if self._closing.is_set():
+                    return
+                raise
+
+    def close(self) -> None:
+        """Stop listening and end every iteration. May be called from any thread, and more than once."""
+        if not self._closing.is_set():
+            self._closing.set()
+            with contextlib.suppress(LineLost):
+                self._transport.close()
+
+    def __enter__(self) -> "Is900Broadcast":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _step(self) -> None:
+        """Wait once for packets and process them."""
+        if not self._streaming:
+            self._start()
+        received, now_s = self._line.receive(self._timing.poll_s), self._host.monotonic_s()
+        if not received:
+            overdue = self._reader.expire(now_s)
+            if overdue:
+                self._observer.on_received(b"", now_s, self._host.wall_s())
+            self._add_frames(overdue)
+        self._report_trouble(now_s)
+
+    def _on_data(self, data: bytes, now_s: float) -> None:
+        self._last_byte_s = now_s
+        self._add_frames(self._reader.feed(data, now_s))
+
+    def _add_frames(self, frames: list[TrackerFrame]) -> None:
+        self._frames.extend(frames)
+        self._recent_s.extend(frame.received_s for frame in frames)
+
+    def _report_trouble(self, now_s: float) -> None:
+        """Report silence once, and the return of packets."""
+        silent_s = now_s - self._last_byte_s
+        if self._frames and self._trouble is not None:
+            self._trouble = None
+            self._report("connected", f"packets arrive: {len(self.stations)} stations at {self._wire.rate_hz:g} Hz")
+        elif self._trouble is None and silent_s > self._timing.stalled_s:
+            self._trouble = "stalled"
+            self._report("stalled", f"no packet for {silent_s:.1f} s")
+        elif self._trouble == "stalled" and silent_s > self._timing.silent_s:
+            self._trouble = "silent"
+            self._report("silent", f"no packet for {silent_s:.1f} s")
+
+    def _report(self, kind: LineEventKind, text: str) -> None:
+        event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
+        self._observer.on_event(event)
+        self._on_event(event)
+
+    def _connect(self, observer: LineObserver) -> DeviceConnection:
+        line = DeviceConnection(self._transport, self._host, observer, self._timing)
+        line.closing = self._closing.is_set
+        return line
+
+    def _start(self) -> None:
+        """Begin a session. Packets that waited since the set-up are dropped, because nobody knows when they arrived."""
+        while self._transport.read(0.0):
+            pass
+        self._line = self._connect(self._observer)
+        self._observer.on_configured(self._wire)
+        self._reader.begin_session(self._wire, self._host.monotonic_s())
+        self._line.on_data, self._streaming = self._on_data, True
+
+    def _read_wire_format(self) -> WireFormat:
+        """Listen for a while, and find the stations, the rate and whether packets have a time."""
+        packets = self._listen()
+        numbers = sorted({packet.station for packet in packets})
+        if not numbers:
+            raise NoAnswer(
+                f"Port {self.port}: no packet of an IS-900 arrived in {self._timing.silent_s:g} s.",
+                "Switch the broadcast on (MEthUdp1), and listen at its port: udp://0.0.0.0:5001 hears the network.",
+            )
+        if self.config.characters is not None:
+            asked = [1 + STATION_CHARACTERS.index(c) for c in self.config.characters.encode()]
+            if missing := sorted(set(asked) - set(numbers)):
+                raise BadInput(
+                    f"Port {self.port}: no packets of station {', '.join(map(str, missing))} arrive; "
+                    f"they are of {', '.join(map(str, numbers))}.",
+                    "Name one of these, or switch the missing one on.",
+                )
+            numbers = asked
+        names = self.config.stations or tuple(chr(STATION_CHARACTERS[number - 1]) for number in numbers)
+        if len(names) > len(numbers):
+            raise BadInput(
+                f"Port {self.port}: {len(names)} stations requested ({', '.join(names)}), packets of {len(numbers)} "
+                f"arrive ({', '.join(map(str, numbers))}).",
+                "Name at most these.",
+            )
+        times_s = [packet.time_s for packet in packets if packet.station == numbers[0] and packet.time_s is not None]
+        has_time = len(set(times_s)) >= _MIN_TIME_STEPS
+        return WireFormat(
+            stations=names,
+            rate_hz=self.config.rate_hz or self._rate_hz(packets, numbers[0], has_time),
+            items=DATAGRAM_LIST if has_time else tuple(code for code in DATAGRAM_LIST if code != 21),
+            settings=DATAGRAM_FORMAT,
+            characters=bytes(STATION_CHARACTERS[number - 1] for number in numbers[: len(names)]),
+            zeroed=False,
+            datagrams=True,
+        )
+
+    def _listen(self) -> list[Datagram]:
+        """Return the packets of `measure_s` after the first one, which must come within `silent_s`."""
+        packets: list[Datagram] = []
+        until_s = self._host.monotonic_s() + self._timing.silent_s
+        while (left_s := until_s - self._host.monotonic_s()) > 0.0:
+            new = split_packets(self._line.receive(left_s))
+            if new and not packets:
+                until_s = self._host.monotonic_s() + self._timing.measure_s
+            packets += new
+        return packets
+
+    def _rate_hz(self, packets: list[Datagram], station: int, has_time: bool) -> float:
+        """Return rounds per second by the stamps, or by the number of packets where there are none."""
+        own = [packet for packet in packets if packet.station == station]
+        rate_hz = estimate_rate_hz(np.array([packet.time_s for packet in own], float)) if has_time else None
+        rate_hz = rate_hz or len(own) / self._timing.measure_s
+        if len(own) < MIN_RECORDS:
+            raise BadInput(f"Port {self.port}: too few packets of station {station} arrived.", "Give the rate.")
+        return rate_hz

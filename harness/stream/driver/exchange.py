@@ -1,0 +1,142 @@
+"""Commands and their answers, one after another, with a device that is left as it is: nothing else is set."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.errors import BadInput
+from harness.stream.codec import commands
+from harness.stream.codec.command_table import parse_command
+from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
+from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.readings import decode_readings
+from harness.stream.codec.records import RecordFormat
+from harness.stream.codec.replies import (
+    OutputList,
+    StationStates,
+    StatusRecord,
+    SystemRecord,
+    TrackingStatus,
+    UnknownReply,
+    parse_reply,
+)
+from harness.stream.driver.connection import DeviceConnection
+
+Answer = dict[str, Any]
+"""A decoded answer: its kind and its values."""
+_CONTROLS = ("buttons", "joystick")
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """A command and what came back."""
+
+    command: str
+    """The command as a person writes it, such as `O1` or `^Q`."""
+    sent: bytes
+    received: bytes
+    answers: tuple[Answer, ...]
+    """Each reply, data record and stretch of other bytes, in sequence. Records have SI units."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content as JSON has it; bytes are hexadecimal."""
+        return {
+            "command": self.command,
+            "sent": self.sent.hex(" "),
+            "received": self.received.hex(" "),
+            "answers": list(self.answers),
+        }
+
+
+def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exchange:
+    """Send a command and collect what comes back, until silence. `wire` is the format of data records, if known.
+
+    A device that streams never falls silent; it is heard for twice `answer_s`. `C` has no answer but the stream itself,
+    of which nothing is collected.
+    """
+    command = parse_command(text)
+    sent = command.line if command.immediate else command.line + b"\r\n"
+    line.send(sent)
+    received = b"" if sent == commands.STREAM else line.listen_until_silence()
+    return Exchange(text, sent, received, decode_answers(received, wire))
+
+
+def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireFormat:
+    """Ask in which format the device would send data records; nothing is set. The device must not stream.
+
+    `rate_hz` is the rate of a device that does not report it [Hz]. Raises BadInput where the answers do not suffice.
+    """
+    answer_s = line.timing.answer_s
+    status = line.ask(commands.STATUS, StatusRecord, answer_s)
+    system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
+    states = line.ask(commands.STATION_STATES, StationStates, answer_s)
+    if status is None or states is None or not states.stations:
+        raise BadInput("The device does not tell its format and its active stations (S, l*).", "")
+    lists = {
+        station: line.ask(commands.query_output_list(station), OutputList, answer_s) for station in states.stations
+    }
+    items = {answer.items for answer in lists.values() if answer is not None}
+    if None in lists.values() or len(items) != 1:
+        raise BadInput("The stations have different output lists, or do not tell them (O).", "")
+    if rate_hz is None:
+        tracking = line.ask(commands.TRACKING, TrackingStatus, answer_s)
+        rate_hz = tracking.rate_hz if tracking is not None else 0.0
+    if not rate_hz > 0.0:
+        raise BadInput("The device does not report its rate (MP).", "Give --rate.")
+    settings = RecordFormat(
+        metres_per_unit=0.01 if status.centimetres else 0.0254,
+        seconds_per_tick=1e-6 if system is not None and system.microseconds else 1e-3,
+        binary=status.binary,
+    )
+    characters = "".join(states.stations).encode()
+    return WireFormat(states.stations, rate_hz, items.pop(), settings, characters, zeroed=False)
+
+
+def decode_answers(data: bytes, wire: WireFormat | None) -> tuple[Answer, ...]:
+    """Decode replies, and data records where their format is known."""
+    if wire is None:
+        return tuple(_decode_reply(line) for line in data.split(b"\n") if line.strip(b"\r"))
+    decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
+    events: list[DecoderEvent] = [*decoder.feed(data), *decoder.finish()]
+    return tuple(answer for event in events for answer in _decode_event(event, data, wire))
+
+
+def _decode_event(event: DecoderEvent, data: bytes, wire: WireFormat) -> list[Answer]:
+    match event:
+        case Reply():
+            return [_decode_reply(event.line)]
+        case Garbage():
+            return [_decode_reply(data[event.offset : event.offset + event.size])]
+        case RecordRun():
+            return _decode_records(event, wire)
+
+
+def _decode_reply(line: bytes) -> Answer:
+    reply = parse_reply(line)
+    match reply:
+        case UnknownReply():
+            values: Answer = {"text": reply.text.decode("latin-1")}
+        case StationStates():
+            values = {"station": reply.station, "active": "".join(reply.stations)}
+        case _:
+            values = asdict(reply)
+    return {"kind": type(reply).__name__, **values}
+
+
+def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
+    """Decode data records: time [s], position [m], unit quaternion, quality 0 to 1, buttons and joystick as sent."""
+    readings = decode_readings(run.table, np.zeros(len(run.table)), wire.characters, wire.settings)
+    names: tuple[str, ...] = run.table.dtype.names or ()
+    answers: list[Answer] = []
+    for row, record in enumerate(run.table):
+        columns = {
+            "measured_s": readings.measured_s[row],
+            "position_m": readings.position_m[row],
+            "tracker_from_station": readings.tracker_from_station[row],
+            "quality": readings.quality[row] if {40, 76} & set(wire.items) else np.nan,
+        }
+        values = {name: np.round(value, 9).tolist() for name, value in columns.items() if np.all(np.isfinite(value))}
+        controls: Answer = {name: record[name].tolist() for name in _CONTROLS if name in names}
+        answers.append({"kind": "record", "station": chr(record["station"]), **values, **controls})
+    return answers

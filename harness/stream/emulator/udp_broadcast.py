@@ -1,0 +1,79 @@
+"""The packets that a device broadcasts by UDP while `MEthUdp` is on (docs/is900.md 9). No I/O; time is an argument."""
+
+from harness.stream.codec.datagram import Datagram
+from harness.stream.codec.records import RecordValues, yaw_pitch_roll_deg
+from harness.stream.emulator.device_state import DeviceState
+
+TRACKER_MODEL = 4
+"""Number that InterSense's library takes for an IS-900 (docs/is900.md 9)."""
+_ANALOGUE_CHANNELS = 8
+
+
+class UdpBroadcast:
+    """Makes a packet of each reading of each active station, whether the serial line streams or not.
+
+    Units are those of the packet, whatever the settings; alignment, boresight and tip offset count. The sequence number
+    counts all packets.
+    """
+
+    def __init__(self, device: DeviceState, now_s: float) -> None:
+        """Begin to broadcast if the device is set to it."""
+        self._device = device
+        self._sequence = 0
+        self._next: tuple[int, int] | None = None
+        """Round and station row of the next reading; None while the device does not broadcast."""
+        self._began_s = float("nan")
+        """When the motion began in which that round is counted [s]."""
+        self._values: tuple[int, RecordValues] | None = None
+        """The latest round and its values."""
+        self._follow_device(now_s)
+
+    @property
+    def next_s(self) -> float:
+        """When the next packet is due [s]; inf while the device does not broadcast."""
+        if self._next is None:
+            return float("inf")
+        return self._device.rounds.player.time_s(*self._next) + self._device.samples.ready_s
+
+    def packets(self, now_s: float) -> list[bytes]:
+        """Return the packets that are due by now."""
+        self._follow_device(now_s)
+        device, packets = self._device, list[bytes]()
+        while self._next is not None and self.next_s <= now_s:
+            number, row = self._next
+            if device.settings.stations[row].active:
+                packets.append(self._packet(number, row))
+            self._next = (number, row + 1) if row + 1 < len(device.rounds.plugged) else (number + 1, 0)
+        return packets
+
+    def _follow_device(self, now_s: float) -> None:
+        """Start, stop, or begin anew where the device has restarted its motion."""
+        player = self._device.rounds.player
+        if not self._device.settings.udp:
+            self._next = None
+        elif self._next is None or self._began_s != player.epoch[0]:
+            self._next, self._began_s = (player.first_from(now_s), 0), player.epoch[0]
+
+    def _packet(self, number: int, row: int) -> bytes:
+        values = self._round_values(number)
+        yaw, pitch, roll = yaw_pitch_roll_deg(values.tracker_from_station[row : row + 1])[0].tolist()
+        x, y, z = values.position_m[row].tolist()
+        one = values.rows([row])
+        joystick = [127, 127] if isinstance(one.joystick, int) else one.joystick[0].tolist()
+        self._sequence = (self._sequence + 1) % 256
+        return Datagram(
+            sequence=self._sequence,
+            model=TRACKER_MODEL,
+            station=1 + row,
+            quality=round(255 * min(max(float(values.quality[row]), 0.0), 1.0)),
+            buttons=0 if isinstance(one.buttons, int) else int(one.buttons[0]),
+            analogue=(*joystick, *[0] * (_ANALOGUE_CHANNELS - 2)),
+            yaw_pitch_roll_deg=(yaw, pitch, roll),
+            position_m=(x, y, z),
+            time_s=float(values.measured_s[row]),
+        ).packet()
+
+    def _round_values(self, number: int) -> RecordValues:
+        if self._values is None or self._values[0] != number:
+            self._values = number, self._device.rounds.values(number, self._device.settings)
+        return self._values[1]

@@ -1,0 +1,101 @@
+"""Recording of single commands and what a device answers, without any other set-up."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from harness.errors import BadInput
+from harness.stream.codec.blocks import RECEIVED
+from harness.stream.codec.command_table import find_danger, parse_command
+from harness.stream.codec.reader import WireFormat
+from harness.stream.driver import DriverConfig, DriverTiming
+from harness.stream.driver.connection import WAKE_UP, DeviceConnection
+from harness.stream.driver.detection import NoAnswer, candidate_baud_rates, detect_device
+from harness.stream.driver.exchange import Exchange, exchange, read_wire_format
+from harness.stream.driver.host import Host
+from harness.stream.driver.transport import LineLost
+from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
+from harness.stream.recording.recording import RecordingWriter
+
+STREAM, STOP, POLL = "C", "c", "P"
+
+
+def check_commands(texts: Sequence[str], allowed: bool) -> None:
+    """Raise BadInput for a text that is no command, and for one that a person must allow, unless `allowed`."""
+    for text in texts:
+        danger = find_danger(parse_command(text))
+        if danger and not allowed:
+            raise BadInput(f"--send {text!r} {danger}.", "Add --allow-writes to send it all the same.")
+
+
+def record_commands(
+    port: str,
+    texts: Sequence[str],
+    config: DriverConfig,
+    writer: RecordingWriter,
+    *,
+    seconds: float | None = None,
+    log: Callable[[str], None] = lambda line: None,
+    progress: Callable[[str], None] = lambda line: None,
+    timing: DriverTiming | None = None,
+    host: Host | None = None,
+) -> list[Exchange]:
+    """Send commands one after another, record everything that passes, and return the commands with their answers.
+
+    The device is stopped before the first command and after the last. A device that streams at the end is
+    recorded until Ctrl-C; `seconds` [s] limits that, and otherwise waits for late answers. Of `config`, the baud rate
+    and the rate count. Raises BadInput when no IS-900 answers.
+    """
+    used_timing, used_host = timing or DriverTiming(), host or Host()
+
+    def connect(baud: int | None) -> DeviceConnection:
+        return DeviceConnection(used_host.open(port, baud or 115200), used_host, writer, used_timing)
+
+    exchanges: list[Exchange] = []
+    streaming = False
+    detected = detect_device(port, candidate_baud_rates(port, config), connect, used_timing.answer_s)
+    line = detected.line
+    log(f"{detected.status.identification or 'a device'} at {port}, firmware {detected.status.firmware}")
+    try:
+        with suppress(KeyboardInterrupt):
+            wire: WireFormat | None = None
+            for text in texts:
+                if text in (STREAM, POLL) and not streaming:
+                    wire = _announce_format(line, writer, config.rate_hz, log)
+                streaming = text == STREAM or (streaming and text != STOP)
+                answer = exchange(line, text, wire)
+                exchanges.append(answer)
+                writer.on_answer(answer.as_dict())
+            _listen(line, math.inf if seconds is None and streaming else seconds or 0.0, writer, progress)
+    except LineLost as lost:
+        raise NoAnswer(f"Port {port}: {lost.why}.", "What arrived before is recorded.") from lost
+    finally:
+        progress("")
+        with suppress(LineLost):
+            line.stop(WAKE_UP)
+        line.transport.close()
+    return exchanges
+
+
+def _announce_format(
+    line: DeviceConnection, writer: RecordingWriter, rate_hz: float | None, log: Callable[[str], None]
+) -> WireFormat | None:
+    """Write the format of the records that follow, so that `harness replay` decodes them."""
+    try:
+        wire = read_wire_format(line, rate_hz)
+    except BadInput as error:
+        log(f"{error} Every byte is recorded, but no frames can be replayed.")
+        return None
+    writer.on_configured(wire)
+    return wire
+
+
+def _listen(
+    line: DeviceConnection, duration_s: float, writer: RecordingWriter, progress: Callable[[str], None]
+) -> None:
+    """Record what arrives for this long [s]."""
+    until_s = time.monotonic() + duration_s
+    while (left_s := until_s - time.monotonic()) > 0.0:
+        line.listen(min(left_s, PROGRESS_INTERVAL_S))
+        progress(f"{1e-3 * writer.counts[RECEIVED]:.0f} kB")
