@@ -66,6 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
     sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
+    os.environ["PYTHONSAFEPATH"] = "1"  # children import nothing from the working folder; MuJoCo starts one too
     try:
         check_command_line(sys.argv[1:] if argv is None else argv)
         check_words(list(vars(args).values()))

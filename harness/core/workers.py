@@ -12,6 +12,8 @@ from multiprocessing.connection import Connection
 from threading import Thread, current_thread, main_thread
 from typing import Any, TypeVar
 
+from harness.core.python_process import safe_import_path
+
 R = TypeVar("R")
 
 
@@ -127,11 +129,12 @@ class _WorkerProcess:
     def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         if self._last is not None:
             return self.pool.submit(function, *task)
-        with ignore_sigint():  # inherited by the process, so that it ignores Ctrl-C even while it imports
+        with safe_import_path(), ignore_sigint():  # inherited, so that the process ignores Ctrl-C even while it imports
             return self.pool.submit(function, *task)
 
     def _fresh(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, (self._alive,))
+        with safe_import_path():  # its locks start a process too
+            return ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, (self._alive,))
 
 
 def _initialise_worker(alive: Connection) -> None:

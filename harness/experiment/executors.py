@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from threading import Lock
 from typing import Any, Protocol, TypeVar
 
+from harness.core.python_process import safe_import_path
 from harness.core.workers import Pool, ignore_sigint, schedule_tasks
 from harness.errors import BadInput, MissingExtra
 from harness.results.manifest import source_hash
@@ -36,7 +37,7 @@ LOCAL_CLUSTER_CONFIG = {
     "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed
     "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
-        ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), 1
+        ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONSAFEPATH"), 1
     ),
 }
 """Dask settings of a local cluster."""
@@ -115,7 +116,7 @@ def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
     from distributed import LocalCluster
 
     with config.set(LOCAL_CLUSTER_CONFIG):
-        with ignore_sigint():
+        with safe_import_path(), ignore_sigint():
             cluster = LocalCluster(
                 n_workers=workers or os.cpu_count() or 1,
                 threads_per_worker=1,

@@ -13,6 +13,7 @@ from typing import Any
 
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.core.arrays import Floats
+from harness.core.python_process import safe_import_path
 from harness.core.skeleton import Skeleton
 from harness.core.workers import ignore_sigint
 from harness.errors import BadFile, BadInput, MissingExtra
@@ -45,13 +46,13 @@ class ViewerOutput:
         if kind == "frames":
             _prepare_folder(out, force)
         context = get_context("spawn")
-        self._shared = SharedPose(context)
-        self._pipe, viewer_pipe = context.Pipe()
         config = ViewerConfig(kind, skeleton.bone_m, str(out or ""), _RATE_HZ[kind])
-        self._process = context.Process(
-            target=_run_viewer_process, args=(config, self._shared, viewer_pipe), name="view", daemon=True
-        )
-        with ignore_sigint():  # Ctrl-C ends the session, and the session ends the viewer
+        with safe_import_path(), ignore_sigint():  # Ctrl-C ends the session, and the session ends the viewer
+            self._shared = SharedPose(context)  # its lock starts a process too
+            self._pipe, viewer_pipe = context.Pipe()
+            self._process = context.Process(
+                target=_run_viewer_process, args=(config, self._shared, viewer_pipe), name="view", daemon=True
+            )
             self._process.start()
         viewer_pipe.close()
         try:

@@ -197,7 +197,10 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
         (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
         (["[ablate]\n[[condition]]\nname = 'a'\n[[condition]]\nname = 'a'"], "distinct names"),
         (["[ablate]\n[[claim]]\ntext = 't'\nsource = 's'\nset = ['knee']"], "has 'knee'"),
-        (["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"], "along = 2.0 must be a number from 0 to 1"),
+        (
+            ["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"],
+            "along = 2.0 must be a number from 0 to 1",
+        ),
         (["[[candidate]]\nname = 'x'\nbone = 'headd'\n[ablate]"], "Did you mean 'head'"),
         (["[abblate]"], "Did you mean 'ablate'"),
     ],
