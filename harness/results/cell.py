@@ -229,7 +229,6 @@ def read_content(folder: Path) -> dict[str, Any]:
     metrics = content.get("metrics")
     if not isinstance(metrics, dict):
         raise BadFile(text, "no metrics", f"{expected} of this version of the harness", _ADVICE)
-    check_cell_types(text, content, _ADVICE)
     if found := find_impossible_metric(metrics):
         raise BadFile(text, found, "possible values", _ADVICE)
     return content
@@ -238,6 +237,7 @@ def read_content(folder: Path) -> dict[str, Any]:
 def read_cell(folder: Path) -> Cell:
     """Read a finished cell; BadFile when one of its files is missing, damaged, edited or malformed."""
     frames, content = folder / "frames.npz", read_content(folder)
+    check_cell_types(folder / "cell.json", content, _ADVICE)
     arrays = read_npz(frames, "the frames of a cell", _ADVICE, limit_bytes=MAX_FRAMES_BYTES)
     if fault := _find_wrong_array(arrays) or _find_impossible_pose(arrays):
         raise BadFile(frames, fault, "the frames of a cell of this version of the harness", _ADVICE)
@@ -285,7 +285,9 @@ def _find_impossible_pose(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
 
 def read_row(folder: Path) -> dict[str, Any]:
     """Read the row of a finished cell, without its frames; BadFile as for `read_content`."""
-    return row_of_content(folder, read_content(folder))
+    content = read_content(folder)
+    check_cell_types(folder / "cell.json", content, _ADVICE)
+    return row_of_content(folder, content)
 
 
 def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:

@@ -53,7 +53,7 @@ from harness.stream.recording.summary import StreamSummary
 from harness.study.placement.config import base_scenario, load_placement_study
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
-from tests.fuzz.mending import mend_findings, mend_index, mend_run
+from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip
 from tests.mocap.test_fuzz import _c3d
 from tests.reconstruct.database.test_motion_database import make_take
