@@ -9,6 +9,7 @@ from typing import Any
 
 from harness.results.digests import insert_digest
 from harness.results.index import _content_digest
+from harness.results.integrity import compute_digests
 
 
 def _mend_json(path: Path, **digests: Any) -> None:
@@ -32,18 +33,18 @@ def mend_run(folder: Path) -> None:
     for cell in (run / "cells").iterdir():
         _mend_json(cell / "cell.json", frames_sha256=_sha256(cell / "frames.npz"))
     _mend_json(run / "manifest.json")
-    _mend_json(run / "summary.json", digests={name: _sha256(run / name) for name in ("manifest.json", "summary.csv")})
+    _mend_json(run / "summary.json")
     mend_index(folder)
 
 
 def mend_index(folder: Path) -> None:
     """Mend the digests in the index of `folder`/x."""
-    db = sqlite3.connect(folder / "x" / "index.sqlite")
-    summary = folder / "x" / "summary.json"
+    run = folder / "x"
+    db = sqlite3.connect(run / "index.sqlite")
     with contextlib.suppress(sqlite3.DatabaseError, OverflowError), db:
         if db.execute("SELECT 1 FROM digests WHERE file = 'index.sqlite'").fetchone():
-            if summary.exists():
-                db.execute("INSERT OR REPLACE INTO digests VALUES (?, ?)", ("summary.json", _sha256(summary)))
+            digests = compute_digests(run) if (run / "summary.json").exists() else {}
+            db.executemany("INSERT OR REPLACE INTO digests VALUES (?, ?)", digests.items())
             db.execute("INSERT OR REPLACE INTO digests VALUES (?, ?)", ("index.sqlite", _content_digest(db)))
     db.close()
 
