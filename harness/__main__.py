@@ -1,4 +1,4 @@
-"""`python -m harness` is the command `harness`."""
+"""`python -m harness` is the command `harness`. `python -P -m harness` never looks into the working folder."""
 
 import os
 import sys
@@ -6,6 +6,7 @@ import time
 from threading import Thread
 
 from harness.core.interrupts import hold_interrupts, ignore_interrupts
+from harness.core.python_process import leave_working_folder_out
 from harness.core.standard_streams import repair_streams
 
 END_S = 60.0
@@ -42,4 +43,5 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
+    leave_working_folder_out()
     sys.exit(main())

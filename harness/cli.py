@@ -83,6 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
+    os.environ["PYTHONSAFEPATH"] = "1"  # children import nothing from the working folder; MuJoCo starts one too
     try:
         sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     except OSError as error:

@@ -4,7 +4,8 @@ There is a type for each thing that the reader can do about it. A message names 
 `super().__init__` gets the fields instead of the text, so that an error can be pickled out of a worker process.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 
@@ -31,6 +32,20 @@ class Outcome(Enum):
         return int(self.value[1])
 
 
+MAX_TEXT = 400
+"""Most characters of one part of a message, such as a name from a file."""
+
+
+def shorten(text: str, limit: int = MAX_TEXT) -> str:
+    """One printable line of at most `limit` characters; of a longer text the middle is left out."""
+    if len(text) > limit:
+        head = limit * 2 // 3
+        text = f"{text[:head]}...{text[head + 3 - limit :]}"
+    if not text.isprintable():
+        text = "".join(sign if sign.isprintable() else " " if sign.isspace() else ascii(sign)[1:-1] for sign in text)
+    return text if len(text) <= limit else shorten(text, limit)
+
+
 def was_interrupted(error: BaseException | None) -> bool:
     """Whether Ctrl-C caused an error: interrupted code may raise another error while it cleans up."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
@@ -42,6 +57,23 @@ class HarnessError(Exception):
     """Base class of the errors that the package raises on purpose; the command line prints them without a traceback."""
 
     outcome = Outcome.REFUSED
+    file = ""
+    """The file that caused the error, where the text itself does not name it (see `name_file`)."""
+
+    @property
+    def place(self) -> str:
+        """The beginning of the message that names the file; empty without one."""
+        return f"{shorten(self.file)}: " if self.file else ""
+
+
+@contextmanager
+def name_file(path: Path) -> Iterator[None]:
+    """Messages about names, keys and values that are raised in the block begin with the file that holds them."""
+    try:
+        yield
+    except (UnknownName, RenamedKey, BadInput) as error:
+        error.file = error.file or str(path)
+        raise
 
 
 class SystemFault(HarnessError):
@@ -67,9 +99,11 @@ class UnknownName(HarnessError):
     def __str__(self) -> str:
         import difflib  # only for a message: the pytest plugin is loaded by every pytest
 
-        near = difflib.get_close_matches(self.name, self.known, n=1)
+        name, known = shorten(self.name, 100), [shorten(each, 100) for each in self.known]
+        near = difflib.get_close_matches(name, known[:1000], n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        return f"no {self.kind} called {self.name!r}.{hint} Known: {', '.join(self.known) or 'none'}."
+        choices = shorten(", ".join(known) or "none", 2 * MAX_TEXT)
+        return f"{self.place}no {shorten(self.kind)} called {name!r}.{hint} Known: {choices}."
 
 
 class RenamedKey(HarnessError):
@@ -80,7 +114,7 @@ class RenamedKey(HarnessError):
         self.where, self.old, self.new = self.args
 
     def __str__(self) -> str:
-        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Use the new name."
+        return f"{self.place}{shorten(self.where)}: the key {self.old!r} is now called {self.new!r}. Use the new name."
 
 
 class ShapeError(HarnessError):
@@ -102,8 +136,9 @@ class BadFile(HarnessError):
         self.path, self.found, self.expected, self.advice, self.line = self.args
 
     def __str__(self) -> str:
-        where = self.path if self.line is None else f"{self.path}, line {self.line}"
-        return f"{where}: {self.found}; expected {self.expected}. {self.advice}"
+        path, found, expected, advice = map(shorten, (self.path, self.found, self.expected, self.advice))
+        where = path if self.line is None else f"{path}, line {self.line}"
+        return f"{where}: {found}; expected {expected}. {advice}".rstrip()
 
 
 class BadInput(HarnessError):
@@ -114,7 +149,7 @@ class BadInput(HarnessError):
         self.what, self.advice = self.args
 
     def __str__(self) -> str:
-        return f"{self.what} {self.advice}"
+        return f"{self.place}{shorten(self.what, 2 * MAX_TEXT)} {shorten(self.advice, 2 * MAX_TEXT)}"
 
 
 class MissingExtra(HarnessError):

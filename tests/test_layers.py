@@ -154,7 +154,7 @@ def test_one_module_writes_files_atomically_and_one_reads_toml() -> None:
         calls = {ast.unparse(node.func) for node in ast.walk(tree_of(file)) if isinstance(node, ast.Call)}
         if place not in RENAMES_FILES:
             assert not calls & {"os.replace", "os.rename", "os.fsync", "tempfile.NamedTemporaryFile"}, place
-        if place not in ("core/files.py", "core/options.py"):  # values of options are parsed as TOML's
+        if place != "core/parsing.py":
             assert "tomllib" not in imports_of(file), place
 
 

@@ -1,18 +1,18 @@
 """How long `harness --help` takes, beside a bare interpreter."""
 
 import subprocess
-import sys
 import time
 
 import numpy as np
 
 from harness.bench.rows import BenchmarkRow
+from harness.core.python_process import python_command, python_environment
 
 
 def bench_startup(repeats: int = 7) -> list[BenchmarkRow]:
     """Medians of interleaved runs, so that load on the machine affects both equally."""
-    bare = [sys.executable, "-c", "pass"]
-    help_text = [sys.executable, "-m", "harness.cli", "--help"]
+    bare = python_command("-c", "pass")
+    help_text = python_command("-m", "harness.cli", "--help")
     seconds = np.array([[_time_command(bare), _time_command(help_text)] for _ in range(repeats)])
     bare_s, help_s = np.median(seconds, axis=0)
     return [
@@ -23,5 +23,5 @@ def bench_startup(repeats: int = 7) -> list[BenchmarkRow]:
 
 def _time_command(command: list[str]) -> float:
     start = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(command, env=python_environment(), check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - start

@@ -11,7 +11,6 @@ import os
 import resource
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -23,6 +22,7 @@ import numpy as np
 
 from harness.bench.rows import BenchmarkRow
 from harness.core.arrays import Floats
+from harness.core.python_process import python_command, python_environment
 from harness.core.split import ClipPart
 from harness.experiment.cells import ClipTask, evaluate_cell, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
@@ -201,7 +201,8 @@ def _time_sweep(sweep: Path, out: Path, seed: int, jobs: int = 1) -> Floats:
 
 
 def _run_harness(*words: str) -> None:
-    done = subprocess.run([sys.executable, "-m", "harness.cli", *words], capture_output=True, text=True)
+    command = python_command("-m", "harness.cli", *words)
+    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"harness {' '.join(words)}: {done.stderr.strip()[-2000:]}")
 

@@ -8,7 +8,6 @@ The operating system's scheduling jitter is measured at the same time.
 import csv
 import json
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ import numpy as np
 from harness.bench.rows import BenchmarkRow
 from harness.bench.wire_cases import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
+from harness.core.python_process import python_command, python_environment
 from harness.experiment.playback import prepare_playback
 from harness.stream.codec import ascii_records
 from harness.stream.codec.decoder import Decoder
@@ -86,7 +86,8 @@ def _bench_line(case: WireCase, seconds: float, seed: int, folder: Path) -> list
     pace = "paced" if case.kind == "pty" else "unpaced"
     arguments = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
     device = subprocess.Popen(
-        [sys.executable, "-m", "harness.bench.wire_device", *arguments],
+        python_command("-m", "harness.bench.wire_device", *arguments),
+        env=python_environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -102,10 +103,11 @@ def _bench_line(case: WireCase, seconds: float, seed: int, folder: Path) -> list
 
 
 def _run_live(port: str, case: WireCase, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
-    command = [sys.executable, "-m", "harness.cli", "live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP]
+    command = python_command("-m", "harness.cli", "live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP)
     command += ["--stations", str(case.stations), "--rate", str(case.rate_hz), "--method", METHOD]
     command += ["--items", ",".join(map(str, case.items)), "--seconds", str(seconds), "--seed", str(seed)]
-    done = subprocess.run([*command, "--poses", str(poses), "--json"], capture_output=True, text=True)
+    command += ["--poses", str(poses), "--json"]
+    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"harness live: {done.stderr.strip()[-2000:]}")
     return dict(json.loads(done.stdout))

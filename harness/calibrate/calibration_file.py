@@ -143,7 +143,7 @@ def _calibration(content: _FileContent) -> Calibration:
         if station.bone not in BONES:
             raise ValueError(f"station.{name}.bone = {station.bone!r} is not one of the bones {', '.join(BONES)}")
         _require_unit(f"station.{name}.bone_from_station", station.bone_from_station)
-        if np.linalg.norm(station.mount_m) > _LONGEST_M:
+        if max(map(abs, station.mount_m)) > _LONGEST_M or np.linalg.norm(station.mount_m) > _LONGEST_M:
             raise ValueError(f"station.{name}.mount_m is more than {_LONGEST_M:g} m from its bone")
     _require_unit("room.world_from_tracker", content.room.world_from_tracker)
     stations = content.station.values()
@@ -165,6 +165,9 @@ def _skeleton(content: _FileContent) -> Skeleton | None:
     if set(content.bone_m) != set(BONES):
         wrong = sorted(set(content.bone_m) ^ set(BONES))
         raise ValueError(f"bone_m: {', '.join(wrong)}: missing, or not one of the body's {len(BONES)} bones")
+    for name, vector_m in content.bone_m.items():
+        if max(map(abs, vector_m)) > 1e6:  # squares of much more are too large for a number
+            raise ValueError(f"bone_m.{name} is more than 1000 km long")
     skeleton = standard_skeleton().with_bones(np.array([content.bone_m[name] for name in BONES]))
     for name, length_m in zip(BONES, skeleton.length_m, strict=True):
         if not 0.0 < length_m < _LONGEST_M:
@@ -173,7 +176,7 @@ def _skeleton(content: _FileContent) -> Skeleton | None:
 
 
 def _require_unit(key: str, quaternion: Sequence[float]) -> None:
-    length = float(np.linalg.norm(quaternion))
+    length = float(np.linalg.norm(np.clip(quaternion, -2.0, 2.0)))  # squares of more may be too large for a number
     if abs(length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"{key} is not a unit quaternion: its length is {length:.6g}")
 

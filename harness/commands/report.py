@@ -24,7 +24,7 @@ def run_report(args: argparse.Namespace) -> Outcome:
     from harness.report.paper.writer import FINDINGS
     from harness.results.storage import read_kind
 
-    if (args.run / FINDINGS).is_file():
+    if (args.run / FINDINGS).exists():
         return _report_findings(args)
     if args.readme:
         raise BadInput(

@@ -41,13 +41,13 @@ def run_status(args: argparse.Namespace) -> Outcome:
 
 
 def _status_lines(found: "RunStatus") -> list[str]:
+    from harness.report.kit.text import last_line
+
     counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
     state = "running" if found.running else "finished" if not found.remaining else "not running"
     left = f", about {_format_duration(found.left_s)} left" if found.left_s is not None else ""
     lines = [f"{found.kind} {found.name}: {state}, {counted}{left}"]
-    lines += [f"FAILED {cell}: {text.strip().splitlines()[-1]}" for cell, text in found.failures.items()][
-        :_MAX_FAILURES
-    ]
+    lines += [f"FAILED {cell}: {last_line(text)}" for cell, text in found.failures.items()][:_MAX_FAILURES]
     if len(found.failures) > _MAX_FAILURES:
         lines.append(f"and {len(found.failures) - _MAX_FAILURES:,} more")
     if found.failures and found.kind == "sweep":

@@ -140,6 +140,19 @@ def _may_be_infinite(hint: Any, value: float) -> bool:
     return kind is float and all(rule.accepts(value) for rule in constraints_of(hint))
 
 
+def check_entries(content: Any, hints: Mapping[str, Any], where: str) -> None:
+    """TypeError unless a mapping has every entry of `hints`, with a value that fits its annotation; others may follow.
+
+    UnknownName for a value that is none of the choices.
+    """
+    if not isinstance(content, Mapping):
+        raise TypeError(f"{where}: expected a table, found {content!r}")
+    for name, hint in hints.items():
+        if name not in content:
+            raise TypeError(f"{where}: no {name}")
+        convert(hint, content[name], f"{where}.{name}")
+
+
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
     if type(None) in kinds and value in (None, NONE):
         return None

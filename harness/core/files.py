@@ -4,7 +4,6 @@ import hashlib
 import json
 import math
 import os
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from enum import Enum
@@ -14,13 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.core import parsing
+from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile
 
 TEMPORARY = ".unfinished-"
 """Prefix of the names of files and folders that are still being written; a killed process leaves them behind."""
 JSON_ADVICE = "Is this a folder written by `harness run`?"
-MAX_TOML_BYTES = 4_000_000
-"""Larger files are refused before they are parsed [choice]: the largest that the harness writes has some 10 kB."""
+MAX_TOML_BYTES = MEGABYTE
+"""Largest TOML file that is read [choice]: the largest that the harness writes has some 10 kB."""
+MAX_JSON_BYTES = 64 * MEGABYTE
+"""Largest JSON file that is read, where the reader gives no other limit [choice]."""
 
 
 def to_json_types(value: Any) -> Any:
@@ -138,23 +141,17 @@ def to_json(content: Any) -> str:
     return json.dumps(to_json_types(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def read_json(path: Path, expected: str, advice: str = JSON_ADVICE) -> dict[str, Any]:
+def read_json(
+    path: Path, expected: str, advice: str = JSON_ADVICE, limit_bytes: int = MAX_JSON_BYTES
+) -> dict[str, Any]:
     """Read a JSON object; BadFile, which says what was expected and what to try, when the file holds none."""
-    return parse_json(path, read_bytes(path, expected, advice), expected, advice)
-
-
-def read_bytes(path: Path, expected: str, advice: str) -> bytes:
-    """Content of a file; BadFile, which says what was expected and what to try, when it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise BadFile(path, f"cannot be read ({error.strerror})", expected, advice) from error
+    return parse_json(path, read_input_file(path, expected, limit_bytes, advice), expected, advice)
 
 
 def parse_json(path: Path, data: bytes, expected: str, advice: str) -> dict[str, Any]:
     """The JSON object in the content of a file; BadFile when there is none."""
     try:
-        content = json.loads(data.decode("utf-8"))
+        content = parsing.parse_json(data.decode("utf-8"))
     except ValueError as error:
         raise BadFile(path, f"not JSON: {error}", expected, advice) from error
     if not isinstance(content, dict):
@@ -167,14 +164,8 @@ def read_toml(path: Path, expected: str, advice: str) -> dict[str, Any]:
 
     `expected` and `advice` complete the message: what the file should be, and what to try.
     """
+    data = read_input_file(path, expected, MAX_TOML_BYTES, advice)
     try:
-        with open(path, "rb") as file:
-            data = file.read(MAX_TOML_BYTES + 1)
-        if len(data) > MAX_TOML_BYTES:
-            raise BadFile(path, f"more than {MAX_TOML_BYTES} bytes", expected, advice)
-        return tomllib.loads(data.decode("utf-8").replace("\r\n", "\n"))
-    except OSError as error:
-        raise BadFile(path, f"it cannot be read ({error.strerror})", expected, advice) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise BadFile(path, f"not TOML: {reason}", expected, advice) from error
+        return parsing.parse_toml(data.decode("utf-8").replace("\r\n", "\n"))
+    except ValueError as error:
+        raise BadFile(path, f"not TOML: {error}", expected, advice) from error

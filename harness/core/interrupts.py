@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from threading import current_thread, main_thread
 from types import FrameType
 
+from harness.core.python_process import safe_import_path
+
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 REPEAT_S = 0.5
 """A signal that follows another within this time is the same request: a closed terminal sends several [s, choice]."""
@@ -120,9 +122,10 @@ def defer_interrupts() -> Iterator[None]:
 def shield_children() -> Iterator[None]:
     """Processes that are started in the block never see a signal, not even while they start; it also defers interrupts.
 
-    The signals are blocked, which children inherit. Those that are sent to this process meanwhile are not lost.
+    The signals are blocked, which children inherit. Those that are sent to this process meanwhile are not lost. The
+    processes import nothing from the working folder.
     """
-    with defer_interrupts():
+    with defer_interrupts(), safe_import_path():
         if not hasattr(signal, "pthread_sigmask"):  # Windows
             yield
             return

@@ -4,9 +4,9 @@ Values are those of TOML (numbers, true, "text", [lists]), or plain words. Dots 
 """
 
 import itertools
-import tomllib
 from typing import Any
 
+from harness.core.parsing import parse_toml
 from harness.errors import BadInput
 
 _ADVICE = "Write it as NAME[OPTION=VALUE,OPTION=VALUE]."
@@ -62,8 +62,8 @@ def _add(options: dict[str, Any], option: str, text: str) -> None:
 
 def _parse_value(text: str) -> Any:
     try:
-        table = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        table = parse_toml(f"value = {text}")
+    except ValueError:
         return text
     return table["value"] if set(table) == {"value"} else text
 

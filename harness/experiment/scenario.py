@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from harness.core.fields import NONE, build, replace_fields
-from harness.core.files import read_toml
+from harness.core.files import MAX_TOML_BYTES, read_toml
+from harness.core.input_file import check_input_file, names_input_file
 from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range, check_fields
 from harness.core.split import ClipPart
-from harness.errors import BadFile, BadInput, UnknownName
+from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
 from harness.results.cell import varied_text
@@ -174,15 +175,17 @@ def load_scenario(path: Path | str) -> Scenario:
     if content.get("kind") == "placement":
         raise BadFile(path, "a placement study", "a scenario", "Run it with `harness placement`.")
     content.setdefault("name", path.stem)
-    try:
-        if "stations" in content:
-            content["stations"] = expand_station_set(content["stations"])
-        scenario = build(Scenario, content, "scenario")
-        scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in expand_alternatives(text)))
-    except (TypeError, ValueError) as error:
-        raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
-    check_scenario(path, scenario)
-    check_expected_orders(path, scenario)
+    with name_file(path):
+        try:
+            if "stations" in content:
+                content["stations"] = expand_station_set(content["stations"])
+            scenario = build(Scenario, content, "scenario")
+            methods = tuple(name for text in scenario.methods for name in expand_alternatives(text))
+            scenario = replace(scenario, methods=methods)
+        except (TypeError, ValueError) as error:
+            raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
+        check_scenario(path, scenario)
+        check_expected_orders(path, scenario)
     return scenario
 
 
@@ -299,14 +302,15 @@ def find_scenario(path: Path | str) -> Path:
     """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile."""
     given = Path(path)
     check_words(given)
-    if given.is_file():
+    if names_input_file(given):
         return given
     shipped = {file.stem: file for file in shipped_scenarios()}
     if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
         raise UnknownName("scenario", str(path), shipped)
-    raise BadFile(given, "no such file", "a scenario in TOML", "`harness list` names the shipped ones.")
+    check_input_file(given, "a scenario in TOML", MAX_TOML_BYTES, "`harness list` names the shipped ones.")
+    return given
 
 
 def shipped_scenarios() -> list[Path]:

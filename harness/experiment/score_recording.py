@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
+from harness.core.fields import check_entries
 from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
-from harness.errors import BadInput
+from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
@@ -30,6 +31,7 @@ from harness.score.timing import step_times_ms
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.frame import TrackerFrame
+from harness.stream.recording.recording import EXPECTED_FILE
 from harness.stream.recording.replay import RecordingStream
 
 POSITION_TOLERANCE_M = 0.01
@@ -71,7 +73,7 @@ def find_playback(
     Values given here take precedence over the recording's note, and that over what the driver read. BadInput when
     nothing names the scenario; UnknownName and BadFile as for a run of it.
     """
-    note = stream.recording.note if scenario is None else {}
+    note = _checked_note(stream) if scenario is None else {}
     played = scenario or note.get("scenario")
     if played is None:
         raise BadInput(
@@ -96,6 +98,19 @@ def find_playback(
         folder=folder,
         posing=bool(note.get("posing")),
     )
+
+
+_NOTE_TYPES = {"scenario": str, "clip": str, "noise": str, "rate_hz": float, "seed": int, "posing": bool}
+
+
+def _checked_note(stream: RecordingStream) -> dict[str, Any]:
+    """The recording's note; BadFile when an entry that names the playback has another type."""
+    note = {name: value for name, value in stream.recording.note.items() if value is not None}
+    try:
+        check_entries(note, {name: kind for name, kind in _NOTE_TYPES.items() if name in note}, "note")
+    except (TypeError, HarnessError) as error:
+        raise BadFile(stream.recording.path, str(error), EXPECTED_FILE, "Name the scenario with --scenario.") from error
+    return note
 
 
 def name_recorded_stations(

@@ -40,7 +40,7 @@ def read_status(out: Path) -> RunStatus:
 
     BadFile for a folder that the harness did not write, and for one whose files are damaged or edited.
     """
-    if (out / INDEX_FILE).is_file() or (out / "manifest.json").is_file():
+    if (out / INDEX_FILE).exists() or (out / "manifest.json").exists():
         return _read_index_status(out)
     runs = [_read_index_status(file.parent) for file in sorted(out.glob(f"*/{INDEX_FILE}"))]
     running = is_running(out) or any(run.running for run in runs)

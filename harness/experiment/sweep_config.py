@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from harness.core.fields import build
-from harness.core.files import read_toml
+from harness.core.files import MAX_TOML_BYTES, read_toml
+from harness.core.input_file import check_input_file, names_input_file
 from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range
-from harness.errors import BadFile, BadInput, UnknownName
+from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.scenario import (
     SCHEMA,
     Scenario,
@@ -51,7 +52,8 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
         raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
     content.setdefault("name", path.stem)
     try:
-        sweep = build(Sweep, content, "sweep")
+        with name_file(path):
+            sweep = build(Sweep, content, "sweep")
     except (TypeError, ValueError) as error:
         raise BadFile(path, str(error), _EXPECTED, _ADVICE) from error
     if sweep.schema != SCHEMA:
@@ -70,14 +72,15 @@ def find_sweep(path: Path | str) -> Path:
     """Path of a sweep, given as a file or as the name of a shipped one; BadFile, UnknownName."""
     given = Path(path)
     check_words(given)
-    if given.is_file():
+    if names_input_file(given):
         return given
     shipped = {file.stem: file for file in shipped_sweeps()}
     if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/sweeps")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
         raise UnknownName("sweep", str(path), shipped)
-    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/sweeps/.")
+    check_input_file(given, "a sweep in TOML", MAX_TOML_BYTES, "Shipped ones are in scenarios/sweeps/.")
+    return given
 
 
 def shipped_sweeps() -> list[Path]:
@@ -92,18 +95,19 @@ def expand_sweep(
     `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName
     for values that do not fit.
     """
-    loaded = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
-    clips = dict.fromkeys(clip for scenario in loaded for clip in scenario.motion.test)
-    for clip in sweep.clips:
-        if clip not in clips:
-            raise UnknownName("test clip of these scenarios", clip, clips)
-    out = []
-    for scenario in loaded:
-        seeds = sweep.seeds or (scenario.seed,)
-        for number in seeds if seed is None else (seed,):
-            expanded = replace(_apply_sweep(scenario, sweep), seed=number)
-            check_scenario(path, expanded)
-            out.append(expanded)
+    with name_file(path):
+        loaded = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
+        clips = dict.fromkeys(clip for scenario in loaded for clip in scenario.motion.test)
+        for clip in sweep.clips:
+            if clip not in clips:
+                raise UnknownName("test clip of these scenarios", clip, clips)
+        out = []
+        for scenario in loaded:
+            seeds = sweep.seeds or (scenario.seed,)
+            for number in seeds if seed is None else (seed,):
+                expanded = replace(_apply_sweep(scenario, sweep), seed=number)
+                check_scenario(path, expanded)
+                out.append(expanded)
     names = [scenario.name for scenario in loaded]
     if len(set(names)) < len(names):
         raise BadFile(path, f"scenarios called {', '.join(names)}", "names of their own", "Rename one.")
@@ -137,6 +141,6 @@ def _merge_vary(scenario: Mapping[str, Any], sweep: Mapping[str, Any]) -> dict[s
 
 def _scenario_file(name: str, beside: Path) -> Path:
     for file in (beside / name, beside / f"{name}.toml"):
-        if file.is_file():
+        if names_input_file(file):
             return file
     return find_scenario(name)

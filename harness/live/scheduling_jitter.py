@@ -13,6 +13,8 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any
 
+from harness.core.python_process import python_command, python_environment
+
 _SLEEP_S = 0.02
 
 
@@ -50,7 +52,8 @@ class JitterProbe:
 
     def __enter__(self) -> "JitterProbe":
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "harness.live.scheduling_jitter"],
+            python_command("-m", "harness.live.scheduling_jitter"),
+            env=python_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -4,8 +4,10 @@ Columns: path (relative to the folder), subject, trial, behaviour, frames, fps a
 """
 
 import csv
+import io
 from pathlib import Path
 
+from harness.core.input_file import read_input_file
 from harness.errors import BadFile, BadInput
 from harness.mocap.read.file_checks import check_size
 
@@ -18,12 +20,14 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
     if not path.exists():
         return {}
     check_size(path, "an index of motion files", _LIMIT_BYTES)
-    with path.open(encoding="utf-8", newline="") as file:
-        try:
-            reader = csv.DictReader(file, strict=True)
-            rows = [(reader.line_num, row) for row in reader]
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise BadFile(path, str(error), "a table of comma-separated values", "Repair or remove it.") from error
+    data = read_input_file(path, "an index of motion files", _LIMIT_BYTES)
+    if b"\0" in data:
+        raise BadFile(path, "binary data", "a table of comma-separated values", "Repair or remove it.")
+    try:
+        reader = csv.DictReader(io.StringIO(data.decode("utf-8"), newline=""), strict=True)
+        rows = [(reader.line_num, row) for row in reader]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise BadFile(path, str(error), "a table of comma-separated values", "Repair or remove it.") from error
     for line, row in rows:
         if not row.get("path"):
             raise BadFile(path, "a row without a path", "columns path, subject, behaviour, ...", "Repair it.", line)
@@ -38,7 +42,7 @@ def rate_from_index(path: Path, folders: tuple[Path, ...] = ()) -> float | None:
     None if no index names a rate for the file.
     """
     file = path.resolve()
-    above = [folder for folder in file.parents if (folder / INDEX_NAME).is_file()]
+    above = [folder for folder in file.parents if (folder / INDEX_NAME).exists()]
     for folder in [folder.resolve() for folder in folders] or above[:1]:
         if file.is_relative_to(folder):
             row = read_index(folder / INDEX_NAME).get(file.relative_to(folder).as_posix(), {})

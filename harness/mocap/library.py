@@ -16,6 +16,7 @@ from harness.errors import BadInput, UnknownName
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
 from harness.mocap.folder_scan import scan_folder
 from harness.mocap.index import INDEX_NAME, read_index
+from harness.mocap.read.file_checks import check_size
 
 LibraryFolders = Path | str | Sequence[Path | str]
 """One folder, or several."""
@@ -99,6 +100,8 @@ class MotionLibrary:
     def _add(self, entry: LibraryEntry, folder: Path) -> None:
         other = self._entries.get(entry.name)
         motions = other is not None and "c3d" not in (entry.format, other.format)
+        if other is not None and motions:
+            check_size(entry.path, "a motion file")
         if other is not None and motions and not cmp(other.path, entry.path, shallow=False):
             raise BadInput(
                 f"The clip {entry.name} differs between two folders: {other.path} and {entry.path}.",

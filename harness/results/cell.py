@@ -18,7 +18,10 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.files import flush, move_into_place, temporary_path, to_json, to_json_types
+from harness.core.input_file import MEGABYTE
+from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
+from harness.results.content_types import check_cell_types
 from harness.results.digests import check_file, insert_digest, read_result_json
 from harness.results.plausibility import find_impossible_frames, find_impossible_metric
 from harness.score.metrics import FRAME_METRICS, VERSIONS
@@ -50,6 +53,12 @@ _TEXTS = (
 _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "step_cpu_ms", "reference_cpu_ms", "quality")
 _INTS = ("frame_index", "status", "origin")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
+MAX_FRAMES_BYTES = 1024 * MEGABYTE
+"""Largest frames.npz that is read: some 600,000 frames."""
+MAX_POSE_VALUE, MIN_QUATERNION = 1e6, 1e-6
+"""Values of poses [m, rad] and sizes of quaternions beyond these are damage [choice]."""
+ROOT_QUATERNION = slice(3, 7)
+"""Columns of the root's orientation in a configuration."""
 _ERROR_PREFIX = "error."
 _ADVICE = "Delete the cell's folder and run again; finished cells are kept."
 
@@ -229,11 +238,10 @@ def read_content(folder: Path) -> dict[str, Any]:
 def read_cell(folder: Path) -> Cell:
     """Read a finished cell; BadFile when one of its files is missing, damaged, edited or malformed."""
     frames, content = folder / "frames.npz", read_content(folder)
-    try:
-        with open(frames, "rb") as file, np.load(file, allow_pickle=False) as columns:
-            arrays = {name: columns[name] for name in columns.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", _ADVICE) from error
+    check_cell_types(folder / "cell.json", content, _ADVICE)
+    arrays = read_npz(frames, "the frames of a cell", _ADVICE, limit_bytes=MAX_FRAMES_BYTES)
+    if fault := _find_wrong_array(arrays) or _find_impossible_pose(arrays):
+        raise BadFile(frames, fault, "the frames of a cell of this version of the harness", _ADVICE)
     try:
         per_frame = {name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS}
         if found := find_impossible_frames(per_frame):
@@ -242,7 +250,7 @@ def read_cell(folder: Path) -> Cell:
         return Cell(
             scores=scores,
             **{name: content[name] for name in _TEXTS},
-            **{name: arrays[name] for name in (*_FLOATS, *_INTS, *_BOOLS)},
+            **dict[str, Any]({name: arrays[name] for name in (*_FLOATS, *_INTS, *_BOOLS)}),
         )
     except (KeyError, TypeError, ValueError) as error:
         found = f"no {error}" if isinstance(error, KeyError) else str(error)
@@ -251,9 +259,36 @@ def read_cell(folder: Path) -> Cell:
         raise BadFile(frames, str(error), "arrays that agree", _ADVICE) from error
 
 
+def _find_wrong_array(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    """The first array that is missing, of another type, or of another number of frames; "" if there is none."""
+    errors = tuple(_ERROR_PREFIX + name for name in FRAME_METRICS)
+    for names, kinds in (((*_FLOATS, *errors), "f"), (_INTS, "iu"), ((*_BOOLS, "scored"), "b")):
+        for name in names:
+            if name not in arrays:
+                return f"no {name!r}"
+            if arrays[name].dtype.kind not in kinds or arrays[name].shape[:1] != arrays["time_s"].shape[:1]:
+                return f"{name} of {arrays[name].dtype} {arrays[name].shape}"
+    return ""
+
+
+def _find_impossible_pose(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    """What no pose or time can be; "" if nothing is."""
+    for name in ("time_s", "truth_qpos", "estimate_qpos"):
+        values = arrays[name]
+        if name == "estimate_qpos":
+            values = values[arrays["scored"]]  # others may be anything: a method answered NaN there
+        if not np.all(np.abs(values) < MAX_POSE_VALUE):
+            return f"a value of {name} that is not a number below {MAX_POSE_VALUE:g}"
+        if values.ndim == 2 and not np.all(np.abs(values[:, ROOT_QUATERNION]).sum(axis=1) > MIN_QUATERNION):
+            return f"a root orientation of {name} that is no quaternion"
+    return ""
+
+
 def read_row(folder: Path) -> dict[str, Any]:
     """Read the row of a finished cell, without its frames; BadFile as for `read_content`."""
-    return row_of_content(folder, read_content(folder))
+    content = read_content(folder)
+    check_cell_types(folder / "cell.json", content, _ADVICE)
+    return row_of_content(folder, content)
 
 
 def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:

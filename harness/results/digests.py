@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from harness.core import files
+from harness.core.input_file import MEGABYTE, check_input_file, read_input_file
 from harness.errors import BadFile
 
+MAX_DIGESTED_BYTES = 1024 * MEGABYTE
+"""Largest file whose digest is computed [choice]."""
 _KEY = "sha256"
 _LINE = re.compile(rb'{\n "sha256": "([0-9a-f]{64})",\n')
 
@@ -28,12 +31,12 @@ def write_result_json(path: Path, content: Any) -> None:
     files.write_text(path, insert_digest(files.to_json(content)))
 
 
-def read_result_json(path: Path, expected: str, advice: str) -> dict[str, Any]:
+def read_result_json(path: Path, expected: str, advice: str, limit_bytes: int = files.MAX_JSON_BYTES) -> dict[str, Any]:
     """Read a JSON object and check its digest, which is left out; `expected` and `advice` complete a refusal.
 
     BadFile when the file cannot be read, is no JSON object, has no digest or does not fit it.
     """
-    data = files.read_bytes(path, expected, advice)
+    data = read_input_file(path, expected, limit_bytes, advice)
     content = files.parse_json(path, data, expected, advice)
     line = _LINE.match(data)
     if line is None or content.pop(_KEY, None) != line[1].decode():
@@ -47,6 +50,7 @@ def read_result_json(path: Path, expected: str, advice: str) -> dict[str, Any]:
 
 def file_digest(path: Path, expected: str, advice: str) -> str:
     """SHA-256 of a file, 64 hex digits; BadFile when it cannot be read."""
+    check_input_file(path, expected, MAX_DIGESTED_BYTES, advice)
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

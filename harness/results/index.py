@@ -17,6 +17,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from harness.core.files import TEMPORARY, content_key, to_json_types
+from harness.core.input_file import check_input_file
+from harness.core.parsing import parse_json
 from harness.errors import BadFile
 from harness.results.cell import IDENTITY, TRAILING_COLUMNS, read_row
 from harness.score.metrics import DEFINITIONS
@@ -38,6 +40,14 @@ _ADVICE = "Give its command again; finished cells are kept."
 _PLAN_COLUMNS = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
 _STORAGE_ERRORS = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY", "SQLITE_CANTOPEN")
 """Beginnings of the names of errors that lie in the disk or the folder and not in the file."""
+_DECLARATIONS = {"key": "TEXT PRIMARY KEY", "seed": "INTEGER", "rate_hz": "REAL", "seconds": "REAL"}
+_FACTS = {
+    **dict.fromkeys(("kind", "name", "command"), str),
+    **dict.fromkeys(("made", "started_s", "seen_s"), int | float),
+}
+"""Types of the facts that readers use."""
+_MAX_BYTES = 2**34
+"""Largest index that is opened; it is not read into memory."""
 _KEYS_PER_QUERY = 500
 """Number of keys in one SQL query."""
 
@@ -63,7 +73,7 @@ class CellIndex:
             try:
                 self._db = self._open()
             except sqlite3.DatabaseError as error:  # damaged, edited or of another version: it is rebuilt
-                if getattr(error, "sqlite_errorname", "").startswith(_STORAGE_ERRORS):
+                if _is_storage_error(error):
                     raise
                 self._remove()
                 self._db = self._open()
@@ -144,17 +154,17 @@ class CellIndex:
 
     def counts(self) -> CellCounts:
         """Counts of the planned cells, as far as outcomes were recorded."""
-        row = self._db.execute("SELECT count(*), count(key), count(failure) FROM plan").fetchone()
+        (row,) = self._select("SELECT count(*), count(key), count(failure) FROM plan")
         return CellCounts(*row)
 
     def failures(self) -> dict[str, str]:
         """Failed cell -> reason, in planned order."""
-        question = "SELECT cell, failure FROM plan WHERE failure IS NOT NULL ORDER BY place"
-        return dict(self._db.execute(question).fetchall())
+        self._check_types("plan", ("cell", "key", "failure"))
+        return dict(self._select("SELECT cell, failure FROM plan WHERE failure IS NOT NULL ORDER BY place"))
 
     def unwritten(self) -> int:
         """Number of finished cells in the folder that the index lacks, because a process runs or was killed."""
-        known = {key for (key,) in self._db.execute("SELECT key FROM cells")}
+        known = {key for (key,) in self._select("SELECT key FROM cells")}
         return len(self.folders() - known)
 
     def rows(self, **where: Any) -> Iterator[dict[str, Any]]:
@@ -163,7 +173,7 @@ class CellIndex:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = "".join(f" AND {name} = ?" for name in where)
         question = f"SELECT cells.* FROM plan JOIN cells USING (key) WHERE 1{chosen} ORDER BY place"  # noqa: S608  # known names
-        return map(_as_row, self._db.execute(question, tuple(where.values())))
+        return map(self._as_row, self._select(question, tuple(where.values())))
 
     def rows_of(self, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
         """Rows of these cells in this order; KeyError for a cell that the index lacks."""
@@ -171,7 +181,7 @@ class CellIndex:
             some = keys[start : start + _KEYS_PER_QUERY]
             question = f"SELECT * FROM cells WHERE key IN ({', '.join('?' * len(some))})"  # noqa: S608  # holes alone
             found = {columns[0]: columns for columns in self._db.execute(question, some)}
-            yield from (_as_row(found[key]) for key in some)
+            yield from (self._as_row(found[key]) for key in some)
 
     def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
         """Columns of the plan's finished cells in planned order; `varied` and `stations` are JSON."""
@@ -179,7 +189,8 @@ class CellIndex:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = ", ".join(f"cells.{name}" for name in names)
         question = f"SELECT {chosen} FROM plan JOIN cells USING (key) ORDER BY place"  # noqa: S608  # known names
-        return iter(self._db.execute(question))
+        self._check_types("cells", names)
+        return self._select(question)
 
     def note(self, **facts: Any) -> None:
         """Store facts about the work, as values of JSON's types."""
@@ -213,7 +224,54 @@ class CellIndex:
         return digests if digests.pop(INDEX_FILE, None) else None
 
     def facts(self) -> dict[str, Any]:
-        return {name: json.loads(value) for name, value in self._db.execute("SELECT name, value FROM facts")}
+        self._check_types("facts", ("name", "value"))
+        facts = {name: self._parse(value) for name, value in self._select("SELECT name, value FROM facts")}
+        for name, kind in _FACTS.items():
+            if name in facts and (not isinstance(facts[name], kind) or isinstance(facts[name], bool)):
+                raise self._damage(f"the fact {name} is {facts[name]!r:.40}")
+        return facts
+
+    def _select(self, question: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+        """Rows of a query; BadFile for a damaged file, also in the middle of the rows."""
+        try:
+            for row in self._db.execute(question, values):  # noqa: UP028  # `yield from` closes cursors of a closed index
+                yield row
+        except sqlite3.DatabaseError as error:
+            if _is_storage_error(error):
+                raise
+            raise self._damage(str(error)) from error
+
+    def _check_types(self, table: str, columns: Sequence[str]) -> None:
+        """BadFile when a value of these columns has another type than its column; SQLite itself allows any."""
+        faults = " OR ".join(f"typeof({name}) NOT IN ({_column_types(name)})" for name in columns)
+        found = list(self._select(f"SELECT {', '.join(columns)} FROM {table} WHERE {faults} LIMIT 1"))  # noqa: S608  # known names
+        if found:
+            raise self._damage(f"a row of {table} with values of another type")
+        for name in (name for name in _JSON_COLUMNS if name in columns):
+            for (text,) in self._select(f"SELECT DISTINCT {name} FROM {table}"):  # noqa: S608  # known names
+                if not isinstance(self._parse(text or "[]"), dict if name == "varied" else list):
+                    raise self._damage(f"a row of {table} whose {name} is {text!r:.40}")
+
+    def _parse(self, text: Any) -> Any:
+        try:
+            return parse_json(text)
+        except (ValueError, TypeError) as error:
+            raise self._damage(str(error)) from error
+
+    def _as_row(self, columns: Sequence[Any]) -> dict[str, Any]:
+        """The row as it was added, and `seconds`."""
+        values = dict(zip(_COLUMNS, columns, strict=True))
+        rest = self._parse(values.pop("rest"))
+        values |= {name: self._parse(values[name] or "null") for name in _JSON_COLUMNS}
+        if not isinstance(rest, dict):
+            raise self._damage(f"the row of cell {values['key']!s:.40} has no table")
+        values |= rest
+        if missing := [name for name in _ROW_KEYS if name not in values]:
+            raise self._damage(f"the row of cell {values['key']!s:.40} has no {missing[0]}")
+        return {name: values[name] for name in _ROW_KEYS}
+
+    def _damage(self, found: str) -> BadFile:
+        return BadFile(self.path, f"damaged ({found})", "the index of a run or sweep", _ADVICE)
 
     def _open(self) -> sqlite3.Connection:
         db = sqlite3.connect(self.path, timeout=30.0)
@@ -239,8 +297,10 @@ class CellIndex:
 
     def _open_read_only(self) -> sqlite3.Connection:
         expected = "the index of a run or sweep of this version of the harness"
-        if not self.path.is_file():
-            raise BadFile(self.path, "no such file", expected, _ADVICE)
+        check_input_file(self.path, expected, _MAX_BYTES, _ADVICE)
+        for end in ("-wal", "-shm"):  # SQLite would open these too
+            if os.path.lexists(beside := self.path.with_name(self.path.name + end)):
+                check_input_file(beside, expected, _MAX_BYTES, _ADVICE)
         # Of a folder that cannot be written, SQLite reads the file alone; nobody can be writing there.
         alone = "" if os.access(self.path.parent, os.W_OK) or self._has_log() else "&immutable=1"
         db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro{alone}", uri=True, timeout=30.0)
@@ -273,11 +333,22 @@ def _content_digest(db: sqlite3.Connection) -> str:
     return state.hexdigest()
 
 
+def _is_storage_error(error: sqlite3.DatabaseError) -> bool:
+    """Whether the disk or the folder is at fault, and not the content of the file."""
+    return getattr(error, "sqlite_errorname", "").startswith(_STORAGE_ERRORS)
+
+
 def _column_declaration(column: str) -> str:
     if column in DEFINITIONS:
         return f"{column} {'INTEGER' if DEFINITIONS[column].unit == 'frames' else 'REAL'}"
-    kinds = {"key": "TEXT PRIMARY KEY", "seed": "INTEGER", "rate_hz": "REAL", "seconds": "REAL"}
-    return f"{column} {kinds.get(column, 'TEXT')}"
+    return f"{column} {_DECLARATIONS.get(column, 'TEXT')}"
+
+
+def _column_types(column: str) -> str:
+    """The SQLite types that values of a column may have, as a list in SQL."""
+    if column in DEFINITIONS or column in ("rate_hz", "seconds"):
+        return "'integer', 'real', 'null'"
+    return "'integer', 'null'" if column == "seed" else "'text', 'null'"
 
 
 def _as_columns(row: Mapping[str, Any], seconds: float | None) -> tuple[Any, ...]:
@@ -285,14 +356,6 @@ def _as_columns(row: Mapping[str, Any], seconds: float | None) -> tuple[Any, ...
     texts = {name: _json(row[name]) for name in _JSON_COLUMNS if name in row}
     values = {**row, **texts, "seconds": seconds, "rest": rest}
     return tuple(values.get(name) for name in _COLUMNS)
-
-
-def _as_row(columns: Sequence[Any]) -> dict[str, Any]:
-    """The row as it was added, and `seconds`."""
-    values = dict(zip(_COLUMNS, columns, strict=True))
-    values |= json.loads(values.pop("rest"))
-    values |= {name: json.loads(values[name] or "null") for name in _JSON_COLUMNS}
-    return {name: values[name] for name in _ROW_KEYS}
 
 
 def _json(value: Any) -> str:

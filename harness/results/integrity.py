@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from harness.core.files import MAX_JSON_BYTES
 from harness.errors import BadFile
 from harness.results.cell import cell_folder
 from harness.results.digests import check_file, file_digest, read_result_json
@@ -15,6 +16,8 @@ from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
 
 SUMMARY = "summary.json"
+MAX_SUMMARY_BYTES = 4 * MAX_JSON_BYTES
+"""Largest summary that is read: that of a run of some 100,000 cells."""
 DIGESTED_FILES = ("manifest.json", SUMMARY, "summary.csv")
 """Files of a run or sweep whose digests stand in the index."""
 _ADVICE = "Give the command of the run again; finished cells are kept."
@@ -61,4 +64,4 @@ def check_row(path: Path, row: Mapping[str, Any], cell: Mapping[str, Any]) -> No
 
 def read_summary_json(out: Path) -> dict[str, Any]:
     """The content of summary.json; BadFile when it is missing, damaged or edited."""
-    return read_result_json(out / SUMMARY, "the summary of a run or sweep", _ADVICE)
+    return read_result_json(out / SUMMARY, "the summary of a run or sweep", _ADVICE, MAX_SUMMARY_BYTES)

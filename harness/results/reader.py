@@ -81,7 +81,7 @@ def load_results(where: Path | str) -> ResultSet:
         if str(where) not in known:
             raise UnknownName("folder or baseline", str(where), known)
         folder = BASELINES / folder
-    if (folder / CELLS_FILE).is_file():
+    if (folder / CELLS_FILE).exists():
         return _load_baseline(folder)
     check_folder(folder)
     manifest = Manifest.read(folder / "manifest.json")

@@ -4,7 +4,6 @@ A cell that is present is finished, so that running the same scenario again resu
 inputs, the method and the source of both, so that edited code never reuses stale results.
 """
 
-import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from harness.core.files import TEMPORARY, content_key, digest
 from harness.core.names import check_words
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
+from harness.results.content_types import check_summary_types
 from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.index import CellIndex
@@ -95,9 +95,8 @@ def read_summary(out: Path) -> dict[str, Any]:
     advice = "Give the command of the run again."
     if missing := [name for name in _SUMMARY_KEYS if name not in content]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
+    check_summary_types(path, content, advice)
     for row in content["cells"]:
-        if not re.fullmatch(r"\w+", str(row.get("key"))):
-            raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)
         if found := find_impossible_metric(row):
             raise BadFile(path, found, "possible values", advice)
     if found := find_impossible_statistic([*content["methods"], *content["behaviours"]]):

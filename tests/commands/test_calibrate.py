@@ -314,7 +314,7 @@ def test_a_calibration_that_is_no_file_nor_kind(capsys: pytest.CaptureFixture[st
     assert main([*words, "--calibration", "tposes"]) == 2
     assert "Did you mean 'tpose'" in capsys.readouterr().err
     assert main([*words, "--calibration", "no_such.toml"]) == 2
-    assert "no_such.toml: it cannot be read" in capsys.readouterr().err
+    assert "no_such.toml: no such file" in capsys.readouterr().err
 
 
 def test_simulated_performers(capsys: pytest.CaptureFixture[str]) -> None:

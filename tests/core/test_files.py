@@ -61,7 +61,7 @@ def test_a_folder_moves_where_nothing_is(tmp_path: Path) -> None:
         (b"a = ", "not TOML: Invalid value"),
         (b"a = \xff", "not TOML: 'utf-8' codec"),
         (b"a = " + 10_000 * b"[", "not TOML: "),
-        (b"#" * (files.MAX_TOML_BYTES + 1), "more than 4000000 bytes"),
+        (b"#" * (files.MAX_TOML_BYTES + 1), "1,048,577 bytes; expected a scenario of at most 1,048,576 bytes"),
     ],
 )
 def test_what_is_no_toml_is_refused_in_a_line(data: bytes, complaint: str, tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_what_is_no_toml_is_refused_in_a_line(data: bytes, complaint: str, tmp_p
 
 
 def test_no_file_is_refused_too(tmp_path: Path) -> None:
-    with pytest.raises(BadFile, match="No such file"):
+    with pytest.raises(BadFile, match="no such file"):
         files.read_toml(tmp_path / "a.toml", "a scenario", "Write one.")
 
 

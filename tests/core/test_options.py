@@ -59,7 +59,11 @@ def test_lists_of_names_are_cut_outside_brackets() -> None:
         split_outside_brackets("ik,map[k=1", ",")
 
 
-@given(st.dictionaries(st.from_regex(r"[a-z_]{1,8}", fullmatch=True), st.integers() | st.booleans(), min_size=1))
+@given(
+    st.dictionaries(
+        st.from_regex(r"[a-z_]{1,8}", fullmatch=True), st.integers(-(2**63), 2**63 - 1) | st.booleans(), min_size=1
+    )
+)
 def test_what_is_written_is_read(options: dict[str, int | bool]) -> None:
     text = "x[" + ",".join(f"{key}={str(value).lower()}" for key, value in options.items()) + "]"
     assert parse_name(text) == ("x", options)

@@ -9,18 +9,17 @@ So the motion is applied to the mean skeleton of the 24 bones, and the root is p
 constant vector of up to 0.25 m away). The model's rest pose is taken to have legs straight down and arms along x.
 """
 
-import lzma
-import math
-import struct
-import zipfile
-import zlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
+from harness.core.npz_file import read_npz
 from harness.errors import BadFile
 from harness.mocap.read.asf import WORLD_FROM_ASF
 from harness.mocap.read.file_checks import LIMIT_BYTES, MAX_VALUE, check_size
@@ -53,11 +52,6 @@ JOINTS: tuple[tuple[str, int], ...] = (
 """Name and parent of the joints that SMPL, SMPL-H and SMPL-X share, in the order of `poses`."""
 
 _FORMAT = "an AMASS npz"
-_ARCHIVE_ERRORS = (
-    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
-    *(OSError, EOFError, ValueError, OverflowError, NotImplementedError, RuntimeError),
-)
-"""Known exceptions of zipfile for damaged archives."""
 _POSE_WIDTHS = (72, 156, 165)
 _RATE_KEYS = ("mocap_framerate", "mocap_frame_rate")
 
@@ -105,13 +99,10 @@ def read_amass(path: Path | str) -> JointClip:
     """
     path = Path(path)
     check_size(path, _FORMAT)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            poses = _read_array(path, archive, "poses")
-            trans = _read_array(path, archive, "trans")
-            rate_hz = _rate_hz(path, archive)
-    except _ARCHIVE_ERRORS as error:
-        raise BadFile(path, f"a broken archive ({error})", _FORMAT, "Fetch it again.") from error
+    names = ("poses", "trans", *_RATE_KEYS)
+    arrays = read_npz(path, _FORMAT, "Fetch it again.", limit_bytes=LIMIT_BYTES, names=names)
+    poses, trans = (_numbers(path, arrays, name) for name in ("poses", "trans"))
+    rate_hz = _rate_hz(path, arrays)
     frames = trans.shape[0] if trans.ndim else 0
     if (
         frames == 0
@@ -144,37 +135,23 @@ def read_amass_clip(path: Path | str) -> Clip:
     return to_clip(read_amass(path), SMPL_MAP)
 
 
-def _rate_hz(path: Path, archive: zipfile.ZipFile) -> float:
-    present = [key for key in _RATE_KEYS if f"{key}.npy" in archive.namelist()]
+def _rate_hz(path: Path, arrays: Mapping[str, NDArray[Any]]) -> float:
+    present = [key for key in _RATE_KEYS if key in arrays]
     if not present:
         raise BadFile(path, "no frame rate", " or ".join(_RATE_KEYS), "Is it another kind of npz?")
-    rate = _read_array(path, archive, present[0])
+    rate = _numbers(path, arrays, present[0])
     if rate.size != 1 or not 0.0 < float(rate.flat[0]) < 1e5:
         raise BadFile(path, f"{present[0]} of {rate.tolist()!s:.40}", "one rate above 0 Hz", "Fetch it again.")
     return float(rate.flat[0])
 
 
-def _read_array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
-    """Read one array of finite real numbers; BadFile unless its size agrees with its header and is within the limit."""
-    if f"{key}.npy" not in archive.namelist():
-        have = ", ".join(name.removesuffix(".npy") for name in archive.namelist()[:12])
-        raise BadFile(
-            path, f"no array {key} (but {have or 'none'})", f"poses, trans, {_RATE_KEYS[0]}", f"Is it {_FORMAT}?"
-        )
-    info = archive.getinfo(f"{key}.npy")
-    with archive.open(info) as file:
-        try:
-            version = np.lib.format.read_magic(file)
-            header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-            shape, fortran, dtype = header(file)
-        except (ValueError, KeyError) as error:
-            raise BadFile(path, f"array {key} without a readable header", _FORMAT, "Fetch it again.") from error
-        size = math.prod(shape) * dtype.itemsize
-        if dtype.kind not in "fiu" or size != info.file_size - file.tell() or size > LIMIT_BYTES:
-            found = f"array {key} of {dtype} {shape} in {info.file_size} bytes"
-            raise BadFile(path, found, f"plain numbers, at most {LIMIT_BYTES >> 20} MB", "Fetch it again.")
-        flat = np.frombuffer(file.read(), dtype=dtype)
-    values: Floats = flat.reshape(shape, order="F" if fortran else "C").astype(float)
+def _numbers(path: Path, arrays: Mapping[str, NDArray[Any]], key: str) -> Floats:
+    """One array of finite real numbers; BadFile."""
+    if key not in arrays:
+        raise BadFile(path, f"no array {key}", f"poses, trans, {_RATE_KEYS[0]}", f"Is it {_FORMAT}?")
+    if arrays[key].dtype.kind not in "fiu":
+        raise BadFile(path, f"array {key} of {arrays[key].dtype}", "plain numbers", "Fetch it again.")
+    values: Floats = arrays[key].astype(float)
     if not bool(np.all(np.abs(values) < MAX_VALUE)):
         raise BadFile(path, f"a value of {key} that is not a finite number", "finite numbers", "Fetch it again.")
     return values

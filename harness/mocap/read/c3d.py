@@ -7,7 +7,6 @@ up, which are the world's x and z.
 """
 
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,8 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, freeze
 from harness.core.motion import Clip
+from harness.core.npz_file import read_npz
+from harness.core.python_process import python_command, python_environment
 from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, MissingExtra
 from harness.mocap.read import ezc3d_process
@@ -104,9 +105,11 @@ def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
         timeout_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
-        command = [sys.executable, "-m", ezc3d_process.__name__, str(path), str(out)]
+        command = python_command(ezc3d_process.__file__, str(path.absolute()), str(out))
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s)
+            done = subprocess.run(
+                command, env=python_environment(), capture_output=True, text=True, timeout=timeout_s, cwd=folder
+            )
         except subprocess.TimeoutExpired as error:
             raise BadFile(
                 path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN
@@ -117,8 +120,7 @@ def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
             refused = done.returncode == ezc3d_process.UNREADABLE
             why = done.stderr.strip().splitlines()[-1:] if refused else ["it crashes"]
             raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _FORMAT, _FETCH_AGAIN)
-        with np.load(out, allow_pickle=False) as arrays:
-            return dict(arrays)
+        return read_npz(out, "what ezc3d read", _FETCH_AGAIN, limit_bytes=ezc3d_process.MEMORY_LIMIT_BYTES)
 
 
 @dataclass(frozen=True)

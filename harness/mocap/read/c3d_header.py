@@ -8,7 +8,9 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.core.input_file import read_input_file
 from harness.errors import BadFile
+from harness.mocap.read.file_checks import LIMIT_BYTES
 
 BLOCK_BYTES = 512
 MAX_MARKERS = 2000
@@ -32,7 +34,7 @@ class C3dHeader:
 
 def check_header(path: Path) -> C3dHeader:
     """Read the header; BadFile if header, parameters and file size contradict each other."""
-    data = path.read_bytes()
+    data = read_input_file(path, _FORMAT, LIMIT_BYTES)
     if len(data) < 2 * BLOCK_BYTES or data[1] != 0x50:
         raise BadFile(path, "no C3D header", _FORMAT, "Is it another format under this name?")
     start = (data[0] - 1) * BLOCK_BYTES

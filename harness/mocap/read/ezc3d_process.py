@@ -1,4 +1,4 @@
-"""Program that reads a C3D file with ezc3d: `python -m harness.mocap.read.ezc3d_process FILE OUT` writes an npz file.
+"""Program that reads a C3D file with ezc3d: `python -P ezc3d_process.py FILE OUT` writes an npz file.
 
 ezc3d is C++ that does not check its input. About one in 200 files with a few damaged bytes in the header crashes it,
 and some keep it busy for ever, so it runs in a process of its own. Exit code 3 means that ezc3d is not installed, 4

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from harness.core.input_file import check_input_file, read_input_file
 from harness.errors import BadFile
 
 LIMIT_BYTES = 256 * 2**20
@@ -13,15 +14,8 @@ MAX_VALUE = 1e6
 
 def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> None:
     """Raise BadFile unless `path` is a file that is neither empty nor larger than the limit; reads nothing."""
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "no regular file" if path.exists() else "no such file"
-        raise BadFile(path, found, expected, "Check the path.")
-    size = path.stat().st_size
-    if size == 0:
+    if check_input_file(path, expected, limit_bytes) == 0:
         raise BadFile(path, "an empty file", expected, "Fetch or export it again.")
-    if size > limit_bytes:
-        advice = "Cut the clip into shorter ones."
-        raise BadFile(path, f"{size / 2**20:.0f} MB", f"{expected} of at most {limit_bytes / 2**20:.0f} MB", advice)
 
 
 def check_last_line(path: Path) -> None:
@@ -39,7 +33,7 @@ def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> lis
     Latin-1, so that any byte of a capture machine's path in a comment is readable; a NUL byte is not text.
     """
     check_size(path, expected, limit_bytes)
-    data = path.read_bytes()
+    data = read_input_file(path, expected, limit_bytes)
     if b"\0" in data:
         raise BadFile(path, "binary data", expected, "Is it another format under this name?")
     if not data.strip():

@@ -16,13 +16,18 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from harness.core.arrays import Singles
-from harness.core.files import flush, move_into_place, temporary_path, write_text
+from harness.core.files import MAX_JSON_BYTES, flush, move_into_place, temporary_path, write_text
+from harness.core.input_file import check_input_file, read_input_file
+from harness.core.npz_file import read_npy_header
+from harness.core.parsing import parse_json
 from harness.errors import BadFile, BadInput
 from harness.reconstruct.database.frames import MotionFrames, TakeSegment
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 FORMAT, VERSION = "tracker-harness motion database", 1
 COLUMNS = {"posture": POSTURE_SIZE, "step": 3}
+_MAX_ARRAY_BYTES = 2**40
+"""Largest array that is mapped; it is not read into memory."""
 _HEADER_FILE = "database.json"
 _REBUILD_ADVICE = "Build the database again."
 
@@ -147,10 +152,9 @@ def open_database(folder: Path) -> MotionFrames:
 
 def _read_header(path: Path) -> dict[str, Any]:
     expected = f"the header of a motion database, version {VERSION}"
+    data = read_input_file(path, expected, MAX_JSON_BYTES, "Is this a motion database?")
     try:
-        card = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadFile(path, f"cannot be read ({error.strerror})", expected, "Is this a motion database?") from error
+        card = parse_json(data.decode("utf-8"))
     except ValueError as error:
         raise BadFile(path, f"not JSON: {error}", expected, _REBUILD_ADVICE) from error
     if not isinstance(card, dict) or card.get("format") != FORMAT:
@@ -195,12 +199,17 @@ def _read_segments(path: Path, card: dict[str, Any]) -> tuple[TakeSegment, ...]:
 
 def _map_array(path: Path, shape: tuple[int, int]) -> Singles:
     expected = f"an array of {shape[0]} x {shape[1]} float32"
+    size = check_input_file(path, expected, _MAX_ARRAY_BYTES, _REBUILD_ADVICE)
     try:
-        array: Singles = np.load(path, mmap_mode="r", allow_pickle=False)
+        with open(path, "rb") as file:
+            found, fortran, dtype = read_npy_header(file)
+            start = file.tell()
     except OSError as error:
         raise BadFile(path, f"cannot be read ({error.strerror or error})", expected, _REBUILD_ADVICE) from error
-    except (ValueError, EOFError) as error:
+    except ValueError as error:
         raise BadFile(path, f"damaged: {error}", expected, _REBUILD_ADVICE) from error
-    if array.dtype != np.dtype("<f4") or array.shape != shape or not array.flags.c_contiguous:
-        raise BadFile(path, f"{' x '.join(map(str, array.shape))} {array.dtype}", expected, _REBUILD_ADVICE)
-    return array
+    if dtype != np.dtype("<f4") or found != shape or fortran:
+        raise BadFile(path, f"{' x '.join(map(str, found))} {dtype}", expected, _REBUILD_ADVICE)
+    if size != start + shape[0] * shape[1] * dtype.itemsize:
+        raise BadFile(path, f"damaged: {size} bytes", expected, _REBUILD_ADVICE)
+    return np.memmap(path, dtype, "r", start, shape)

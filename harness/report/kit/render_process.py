@@ -1,6 +1,5 @@
 """Rendering in a separate process, because VTK may crash without a working OpenGL."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -17,6 +16,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.files import TEMPORARY
 from harness.core.interrupts import shield_children
+from harness.core.python_process import python_command, python_environment
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
@@ -117,10 +117,10 @@ class RenderProcess:
 
 def start_renderer(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
     """Start a rendering module with arguments; it works without a screen and writes errors to stderr."""
-    environment = dict(os.environ)
+    environment = python_environment()
     if sys.platform == "linux" and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    command, devnull = [sys.executable, "-m", module, *arguments], subprocess.DEVNULL
+    command, devnull = python_command("-m", module, *arguments), subprocess.DEVNULL
     with shield_children():  # a signal ends this process, which ends the renderer
         return subprocess.Popen(
             command, env=environment, stdin=devnull, stdout=devnull, stderr=subprocess.PIPE, text=True

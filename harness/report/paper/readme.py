@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from harness.core.files import write_text
+from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile
 from harness.report.paper.text import statements_text
 from harness.results.findings import PaperFindings
@@ -17,9 +18,10 @@ def update_readme(readme: Path, findings: PaperFindings) -> None:
     BadFile if the file cannot be read, or if the two markers are not there exactly once and in order.
     """
     expected = "a text file with both markers or none"
+    data = read_input_file(readme, expected, 16 * MEGABYTE, "Name results/README.md.")
     try:
-        text = readme.read_bytes().decode("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
         raise BadFile(readme, f"cannot be read ({error})", expected, "Name results/README.md.") from error
     start, end = _markers(findings)
     section = f"{start}\n{_section(findings)}\n{end}"

@@ -25,8 +25,10 @@ from typing import Any
 
 from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
+from harness.core.input_file import MEGABYTE, read_input_file
 from harness.core.interrupts import defer_interrupts
-from harness.errors import BadFile, HarnessError, SystemFault
+from harness.core.parsing import parse_json
+from harness.errors import BadFile, HarnessError, SystemFault, shorten
 from harness.stream.codec.blocks import (
     ANSWERED,
     CONFIGURED,
@@ -51,6 +53,8 @@ EXPECTED_FILE = "a recording by `harness record`"
 _WRITABLE_FILE = "a file to record into"
 _MAX_ANSWER_BYTES = 8192
 """Most bytes of an answer that are repeated next to its decoded values."""
+MAX_BYTES = 2048 * MEGABYTE
+"""Largest recording that is read: some two days of a full serial line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +100,7 @@ class Recording:
     def events(self) -> list[dict[str, Any]]:
         """Events on the line: kind, text and time on the host's clock [s]."""
         event_blocks = [block for block in self.blocks() if block.kind == EVENT]
-        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in event_blocks]
+        return [{"monotonic_s": block.monotonic_s, **self._event(block)} for block in event_blocks]
 
     @property
     def answers(self) -> list[dict[str, Any]]:
@@ -116,9 +120,15 @@ class Recording:
         except (TypeError, HarnessError) as error:
             raise BadFile(self.path, f"an unusable wire format ({error})", EXPECTED_FILE, "") from error
 
+    def _event(self, block: RecordingBlock) -> dict[str, str]:
+        content = self._json(block)
+        if not all(isinstance(content.get(name), str) for name in ("kind", "text")):
+            raise BadFile(self.path, "an event without kind and text", EXPECTED_FILE, "Record again.")
+        return {name: shorten(content[name]) for name in ("kind", "text")}
+
     def _json(self, block: RecordingBlock) -> dict[str, Any]:
         try:
-            content = json.loads(block.payload)
+            content = parse_json(block.payload.decode("utf-8"))
         except ValueError as error:
             raise BadFile(self.path, f"a {block.kind} block that is not JSON", EXPECTED_FILE, "") from error
         return content if isinstance(content, dict) else {}
@@ -133,10 +143,7 @@ def read_recording(path: Path | str) -> Recording:
     Raises BadFile for a file that is no recording, or one of a newer version.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _file_error(path, error) from error
+    data = read_input_file(path, EXPECTED_FILE, MAX_BYTES, "`harness record PORT FILE` makes one.")
     if not data:
         raise BadFile(path, "an empty file", EXPECTED_FILE, "Nothing was recorded into it.")
     _check_kind(path, data)
@@ -292,7 +299,7 @@ class RecordingWriter:
                 raise BadFile(self.path, "no regular file", _WRITABLE_FILE, advice)
             if not os.access(self.path, os.W_OK):
                 raise PermissionError("you may not write to it")
-            data = self.path.read_bytes()
+            data = read_input_file(self.path, EXPECTED_FILE, MAX_BYTES)
         except FileNotFoundError:
             if not self.path.parent.is_dir():
                 raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None

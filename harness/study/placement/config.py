@@ -7,12 +7,13 @@ from typing import Annotated, Any, Literal
 
 from harness.compare.margins import MARGINS
 from harness.core.fields import build, replace_fields
-from harness.core.files import read_toml
+from harness.core.files import MAX_TOML_BYTES, read_toml
+from harness.core.input_file import check_input_file, names_input_file
 from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range
-from harness.errors import BadFile, BadInput, UnknownName
+from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
@@ -153,7 +154,7 @@ def find_placement_study(path: Path | str) -> Path:
     """Find a study by path, or a shipped one by name; BadFile, UnknownName."""
     given = Path(path)
     check_words(given)
-    if given.is_file():
+    if names_input_file(given):
         return given
     shipped = {file.stem: file for file in shipped_placements()}
     folders = (Path(), Path("scenarios/placement"))
@@ -164,7 +165,8 @@ def find_placement_study(path: Path | str) -> Path:
         raise BadInput(f"The placement study {given.stem} is now called {new}.", f"Type: harness placement {new}")
     if given.parent == Path() and not given.suffix:
         raise UnknownName("placement study", str(path), shipped)
-    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are in scenarios/placement/.")
+    check_input_file(given, "a placement study in TOML", MAX_TOML_BYTES, "Shipped ones are in scenarios/placement/.")
+    return given
 
 
 def shipped_placements() -> list[Path]:
@@ -180,14 +182,15 @@ def load_placement_study(path: Path | str) -> PlacementStudy:
     if content.get("kind") != "placement":
         raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)
     content.setdefault("name", path.stem)
-    try:
-        study = build(PlacementStudy, content, "study")
-        study = replace(study, methods=tuple(name for text in study.methods for name in expand_alternatives(text)))
-    except (TypeError, ValueError) as error:
-        raise BadFile(path, str(error), expected, advice) from error
-    if fault := _find_fault(study):
-        raise BadFile(path, *fault)
-    _check_names(study)
+    with name_file(path):
+        try:
+            study = build(PlacementStudy, content, "study")
+            study = replace(study, methods=tuple(name for text in study.methods for name in expand_alternatives(text)))
+        except (TypeError, ValueError) as error:
+            raise BadFile(path, str(error), expected, advice) from error
+        if fault := _find_fault(study):
+            raise BadFile(path, *fault)
+        _check_names(study)
     return study
 
 
@@ -283,6 +286,6 @@ def _scenario_file(name: str, beside: Path) -> Path | str:
     """The scenario's file in the folder of the study, or the shipped one."""
     for folder in (beside, data_folder("scenarios")):
         file = folder / (name if name.endswith(".toml") else f"{name}.toml")
-        if file.is_file():
+        if names_input_file(file):
             return file
     return name

@@ -202,7 +202,7 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
         file.truncate(file_checks.LIMIT_BYTES + 1)  # a hole: it takes no room on the disk
     skeleton = standard_skeleton()
     tracemalloc.start()
-    with pytest.raises(BadFile, match="at most 256 MB"):
+    with pytest.raises(BadFile, match="at most 268,435,456 bytes"):
         read_amc(huge, skeleton, rate_hz=120.0)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()

@@ -207,7 +207,7 @@ def test_a_bent_elbow_bends_the_elbow(tmp_path: Path) -> None:
         ({"trans": np.array(1.0)}, "trans ()"),
         ({"poses": np.zeros((24, 63))}, "poses (24, 63)"),
         ({"poses": np.full((24, 156), np.nan)}, "a value of poses that is not a finite number"),
-        ({"poses": np.array([object()])}, "array poses of object"),
+        ({"poses": np.array([object()])}, "array poses: object"),
         ({"trans": np.array(["a", "b"])}, "array trans of <U1"),
         ({"trans": np.zeros((0, 3)), "poses": np.zeros((0, 156))}, "poses (0, 156)"),
     ],

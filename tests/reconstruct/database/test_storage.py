@@ -97,7 +97,7 @@ def test_a_card_that_lies_is_refused(saved: Path, changes: dict[str, Any], found
 
 
 def test_missing_and_damaged_files_are_refused(saved: Path) -> None:
-    with pytest.raises(BadFile, match=r"database\.json: cannot be read"):
+    with pytest.raises(BadFile, match=r"database\.json: no such file"):
         MotionDatabase.open(saved.parent)
     whole = (saved / "step.npy").read_bytes()
     for damaged in (b"", whole[:50], whole[:-1], b"x" + whole[1:]):
@@ -105,7 +105,7 @@ def test_missing_and_damaged_files_are_refused(saved: Path) -> None:
         with pytest.raises(BadFile, match=r"step\.npy"):
             MotionDatabase.open(saved)
     (saved / "step.npy").unlink()
-    with pytest.raises(BadFile, match=r"step\.npy: cannot be read"):
+    with pytest.raises(BadFile, match=r"step\.npy: no such file"):
         MotionDatabase.open(saved)
     (saved / "database.json").write_text("{")
     with pytest.raises(BadFile, match="not JSON"):
