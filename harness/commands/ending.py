@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.core.fault_report import describe_fault, save_traceback
-from harness.core.names import excerpt
 from harness.core.standard_streams import discard_stdout
-from harness.errors import HarnessError, Outcome, SystemFault, was_interrupted
+from harness.errors import HarnessError, Outcome, SystemFault, shorten, was_interrupted
 
 ENDLESS_VERBS = ("emulate", "live", "record")
 """Verbs that run until Ctrl-C, which is then the normal end."""
+_MAX_LINE = 1000
+"""Most characters of the line that says why a command ended."""
 _KEPT = "Files are written whole or not at all; those that were finished are kept."
 
 
@@ -43,10 +44,10 @@ def describe_ending(words: Sequence[str], error: BaseException) -> tuple[Outcome
         print(f"harness: stopped{advice}", file=sys.stderr)
         return Outcome.PASS if endless else Outcome.INTERRUPTED, {}
     if isinstance(error, HarnessError) and error.outcome is not Outcome.FAILED:
-        print(f"harness: {excerpt(error)}", file=sys.stderr)
-        return error.outcome, {"error": excerpt(error)}
+        print(f"harness: {shorten(str(error), _MAX_LINE)}", file=sys.stderr)
+        return error.outcome, {"error": shorten(str(error), _MAX_LINE)}
     cause, advice = describe_fault(error)
-    line = excerpt(f"{cause} {kept or _KEPT} {advice} ({save_traceback(error)})")
+    line = shorten(f"{cause} {kept or _KEPT} {advice} ({save_traceback(error)})", _MAX_LINE)
     print(f"harness: failed: {line}", file=sys.stderr)
     return Outcome.FAILED, {"error": line}
 

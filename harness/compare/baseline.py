@@ -23,8 +23,7 @@ from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
 from harness.core.files import content_key, move_into_place, temporary_path, to_json, to_json_types, write_text
 from harness.core.interrupts import defer_interrupts
-from harness.core.names import excerpt
-from harness.errors import BadInput
+from harness.errors import BadInput, shorten
 from harness.results.digests import file_digest, insert_digest, write_result_json
 from harness.results.integrity import read_summary_json
 from harness.results.reader import (
@@ -50,7 +49,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", name):
         raise BadInput(
-            f"'{excerpt(name, 60)}' is not a valid name of a baseline.",
+            f"'{shorten(name, 60)}' is not a valid name of a baseline.",
             "Use up to 100 letters, digits, - _ and ., as in main_2.",
         )
     if not run.is_dir():

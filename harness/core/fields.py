@@ -6,9 +6,8 @@ import types
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from harness.core.names import excerpt
 from harness.core.ranges import constraints_of
-from harness.errors import HarnessError, RenamedKey, UnknownName
+from harness.errors import HarnessError, RenamedKey, UnknownName, shorten
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -26,7 +25,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
     ValueError for numbers outside the range of their field (`core.ranges`).
     """
     if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {excerpt(repr(content), 60)}")
+        raise TypeError(f"{where}: expected a table, found {shorten(repr(content), 60)}")
     hints = get_type_hints(kind, include_extras=True)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _refuse_unknown_keys(kind, content, fields, where)
@@ -103,7 +102,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return value
     if origin is tuple:
         if not isinstance(value, list):
-            raise TypeError(f"{where}: expected a list, found {excerpt(repr(value), 60)}")
+            raise TypeError(f"{where}: expected a list, found {shorten(repr(value), 60)}")
         if args[-1] is not Ellipsis and len(args) != len(value):
             raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
@@ -111,9 +110,9 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
     if origin is dict:
         if not isinstance(value, Mapping):
-            raise TypeError(f"{where}: expected a table, found {excerpt(repr(value), 60)}")
+            raise TypeError(f"{where}: expected a table, found {shorten(repr(value), 60)}")
         return {
-            convert(args[0], str(key), where): convert(args[1], item, f"{where}.{excerpt(key, 60)}")
+            convert(args[0], str(key), where): convert(args[1], item, f"{where}.{shorten(key, 60)}")
             for key, item in value.items()
         }
     if dataclasses.is_dataclass(hint):
@@ -121,7 +120,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
-        raise TypeError(f"{where}: expected {hint.__name__}, found {excerpt(repr(value), 60)}")
+        raise TypeError(f"{where}: expected {hint.__name__}, found {shorten(repr(value), 60)}")
     if isinstance(value, float) and not math.isfinite(value):
         raise TypeError(f"{where}: expected a finite number, found {value}")
     return value
@@ -131,7 +130,7 @@ def _require(hint: Any, value: Any, where: str) -> Any:
     """The value, if it obeys the rules of an annotation; ValueError."""
     for rule in constraints_of(hint):
         if not rule.accepts(value):
-            raise ValueError(f"{where} = {excerpt(repr(value), 60)} must be {rule}")
+            raise ValueError(f"{where} = {shorten(repr(value), 60)} must be {rule}")
     return value
 
 

@@ -1,11 +1,11 @@
-"""Names that users choose, for things and for files, and excerpts of them for messages of one bounded line."""
+"""Names that users choose, for things and for files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from harness.errors import BadInput
+from harness.errors import BadInput, shorten
 
 _MOST_FILE_BYTES = 255
 """Longest name of a file or folder on the usual file systems."""
@@ -41,21 +41,12 @@ MethodName = Annotated[str, Label(most=1000)]
 Text = Annotated[str, Label(most=1000, fewest=0)]
 
 
-def excerpt(text: object, most: int = 1000) -> str:
-    """A text as one line of at most `most` characters: the middle of a longer one is left out."""
-    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in str(text))
-    if len(line) <= most:
-        return line
-    head = 2 * (most - 5) // 3
-    return f"{line[:head]} ... {line[len(line) - (most - 5 - head) :]}"
-
-
 def check_command_line(words: Sequence[str]) -> None:
     """BadInput for an empty word of a command line, which would name the working folder."""
     for before, word in zip(("", *words), words, strict=False):
         option = before if not word else word.removesuffix("=")
         if not word or (word.startswith("--") and option != word):
-            raise BadInput(f"The argument after '{excerpt(option, 60)}' is empty.", "Give it a value, or leave it out.")
+            raise BadInput(f"The argument after '{shorten(option, 60)}' is empty.", "Give it a value, or leave it out.")
 
 
 def check_words(words: object) -> None:
@@ -66,11 +57,11 @@ def check_words(words: object) -> None:
     if isinstance(words, str | Path):
         text = str(words)
         if not text.isprintable():
-            raise BadInput(f"'{excerpt(text, 60)}' contains a control character.", "Names and paths have none.")
+            raise BadInput(f"'{shorten(text, 60)}' contains a control character.", "Names and paths have none.")
         longest = max(Path(text).parts, key=len, default="") if isinstance(words, Path) else ""
         if len(longest.encode()) > _MOST_FILE_BYTES:
             advice = f"A name in a path has at most {_MOST_FILE_BYTES} bytes."
-            raise BadInput(f"'{excerpt(text, 60)}' is too long.", advice)
+            raise BadInput(f"'{shorten(text, 60)}' is too long.", advice)
     elif isinstance(words, list | tuple):
         for word in words:
             check_words(word)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
-from harness.core.names import Label, excerpt
-from harness.errors import BadInput
+from harness.core.names import Label
+from harness.errors import BadInput, shorten
 
 
 class Constraint(Protocol):
@@ -63,7 +63,7 @@ def check_fields(record: object, **more: Range) -> None:
 
 
 def _error(record: object, name: str, value: Any, broken: Constraint) -> BadInput:
-    return BadInput(f"{type(record).__name__}.{name} = {excerpt(repr(value), 60)}.", f"Give {broken}.")
+    return BadInput(f"{type(record).__name__}.{name} = {shorten(repr(value), 60)}.", f"Give {broken}.")
 
 
 @cache

@@ -6,7 +6,7 @@ import pytest
 
 from harness.cli import main
 from harness.compare.baseline import write_baseline
-from harness.core.names import Label, check_words, excerpt
+from harness.core.names import Label, check_words
 from harness.errors import BadInput, HarnessError
 from harness.experiment.scenario import load_scenario
 from harness.experiment.sweep_config import load_sweep
@@ -103,14 +103,6 @@ def test_a_bad_word_of_the_command_line_is_refused(
     assert shown.out == "refused\n"
     assert one_line(shown.err.removesuffix("\n"))
     assert not list(tmp_path.iterdir())
-
-
-def test_an_excerpt_is_one_bounded_line_and_keeps_both_ends() -> None:
-    assert excerpt("a\nb\0") == "a\\nb\\x00"
-    short = excerpt("begin" + "x" * 5000 + "end", 60)
-    assert len(short) == 60
-    assert (short[:5], short[-3:]) == ("begin", "end")
-    assert excerpt("as it is") == "as it is"
 
 
 def test_ordinary_words_are_accepted() -> None:
