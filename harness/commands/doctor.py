@@ -10,7 +10,7 @@ def add_doctor(verbs: Verbs) -> None:
     add_verb(
         verbs,
         "doctor",
-        "check this installation: scores, optional parts, the library of real motion",
+        "check this installation: scores, streams, results, optional parts, the library of real motion",
         run_doctor,
         "mocap",
     )

@@ -32,6 +32,7 @@ from harness.score.score import Scores, score_estimate
 from harness.simulate import noise
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.testing.device_checks import check_emulated_device, describe_serial_ports
+from harness.testing.results_checks import check_results
 
 OPTIONAL_PACKAGES = {
     "plotly": "the interactive view of the report (extra viz)",
@@ -74,7 +75,7 @@ class InstallationCheck:
 
 
 def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]:
-    """Check the scores on true motion, the stream against the truth, and the optional parts.
+    """Check the scores on true motion, the stream against the truth, results on disk, and the optional parts.
 
     A missing optional part is listed and is not a failure. A named library that cannot be read is a failure.
     """
@@ -83,6 +84,7 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
     return [
         *check_scores(takes),
         _check_stream(clips[0]),
+        *(InstallationCheck(*check) for check in check_results()),
         *_check_device(),
         *_check_optional_parts(),
         _check_library(folder),
