@@ -34,9 +34,8 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     """By the very command; `demo` is a shorter one here, a file of that name."""
     short_demo(tmp_path / "demo")
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    (gate,) = re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)
     assert len(code.splitlines()) <= 40
-    assert 'harness_gate("upright:Upright"' in gate  # tests/testing/test_regression_gate.py runs one
+    assert 'harness_gate("upright:Upright"' in OWN_METHOD  # tests/testing/test_regression_gate.py runs one
     (tmp_path / "upright.py").write_text(code)
     command = next(c for c in commands(README) if c.startswith("run demo --methods"))
     monkeypatch.chdir(tmp_path)

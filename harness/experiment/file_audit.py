@@ -12,6 +12,9 @@ from pathlib import Path
 from harness.errors import HarnessError
 from harness.reconstruct.source_files import SourceFiles, foreign_folders, is_below
 
+_METADATA = (".dist-info", ".egg-info")
+"""Folders that an installer puts beside a method; Python reads its entry points there."""
+
 
 class UndeclaredFile(HarnessError):
     """A method reads a file below its own folder that its key does not cover, or that has changed since."""
@@ -58,7 +61,7 @@ class FileAudit:
             self._check(path, _file_state(path))
 
     def _check(self, path: str, state: tuple[int, ...]) -> None:
-        if self._folders is None or os.sep + "__pycache__" + os.sep in path:
+        if self._folders is None or any(part == "__pycache__" or part.endswith(_METADATA) for part in Path(path).parts):
             return
         names = [Path(name) for name in _names(path)]
         if not any(is_below(name, self._folders) for name in names):

@@ -1,7 +1,7 @@
 """The process that forks the workers of methods. It imports what they need, once, and nothing of a user's.
 
-`worker_process` starts it and asks it: `fork MODULE` with two descriptors, or `poll PID`. It ends with the program that
-started it.
+`worker_process` starts it and asks it: `fork MODULE FOLDER` with two descriptors, or `poll PID`. It ends with the
+program that started it.
 """
 
 import gc
@@ -27,10 +27,11 @@ def main(number: str) -> None:
 
 def _answer(server: socket.socket) -> bool:
     """Answer one request; False when there are no more."""
-    text, descriptors, _, _ = socket.recv_fds(server, 4096, 2)
-    word, _, argument = text.decode().partition(" ")
+    text, descriptors, _, _ = socket.recv_fds(server, 8192, 2)
+    word, _, argument = os.fsdecode(text).partition(" ")
     if word == "fork":
-        server.send(str(_fork(server, argument, descriptors)).encode())
+        module, _, folder = argument.partition(" ")
+        server.send(str(_fork(server, module, folder, descriptors)).encode())
     elif word == "poll":
         server.send(_poll(int(argument)).encode())
     return bool(text)
@@ -45,14 +46,15 @@ def _poll(pid: int) -> str:
     return str(os.waitstatus_to_exitcode(status)) if ended else "running"
 
 
-def _fork(server: socket.socket, module: str, descriptors: list[int]) -> int:
-    """Fork a worker, which is the leader of a process group of its own; its number."""
+def _fork(server: socket.socket, module: str, folder: str, descriptors: list[int]) -> int:
+    """Fork a worker, which works in a folder and is the leader of a process group of its own; its number."""
     pid = os.fork()
     if pid == 0:
         code = 1
         try:
             server.close()
             os.setpgid(0, 0)
+            os.chdir(folder)
             import_module(module).main(*map(str, descriptors))
             code = 0
         except BaseException:

@@ -132,7 +132,8 @@ class _ForkServer:
         answers, their_answers = os.pipe()
         worker = _ForkedWorker(self, 0, os.fdopen(requests, "wb"), os.fdopen(answers, "rb"))
         try:
-            socket.send_fds(self._socket, [f"fork {module}".encode()], [their_requests, their_answers])
+            request = os.fsencode(f"fork {module} {os.getcwd()}")
+            socket.send_fds(self._socket, [request], [their_requests, their_answers])
             worker.pid = int(self._receive())
         finally:
             os.close(their_requests)

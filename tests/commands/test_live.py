@@ -137,7 +137,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--vmc", "nowhere"], "is not an address"),
         (["--view", "frames"], "needs a folder"),
         (["--bvh", "/no/such/folder/x.bvh"], "cannot be written"),
-        (["--lsl", ""], "needs a name"),
+        (["--lsl", ""], "The argument after '--lsl' is empty"),
         (["--out", "there"], "--out without --view frames"),
         (["--lsl-network"], "--lsl-network without --lsl"),
         (["--seconds", "soon"], "not a positive number"),
@@ -146,7 +146,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--clip", "walking_p1_01", "--items", "40,18,19,21,1"], "carries positions up to 3 m"),
         (["--quality", "best"], "invalid choice"),
         (["--port", "tcp://127.0.0.1:1", "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
-        (["--stations", ""], "names no station"),
+        (["--stations", ""], "The argument after '--stations' is empty"),
     ],
 )
 def test_refusals(changed: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -152,7 +152,7 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
         (["record", str(tmp_path / "b.rec"), "/dev/null"], "The port comes first"),
         (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--seed", "3"], "--seed with tcp://127.0.0.1:1"),
         (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
-        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--stations", ""], "names no station"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--stations", ""], "'--stations' is empty"),
         (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--items", "2,11,21,1"], "(--quality mp)"),
         (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "a,,b"], "names no station"),
         (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "²"], "no station called '²'"),

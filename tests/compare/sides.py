@@ -18,6 +18,15 @@ from harness.score.metrics import DEFINITIONS, VERSIONS
 
 SIZES = {"joint_angle_mean_deg": 2.0, "mpjpe_mm": 12.0, "jitter_m_s3": 700.0}
 
+UNUSED: Mapping[str, Any] = {
+    **dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS), ""),
+    "stations": [],
+    "rate_hz": 40.0,
+    "health": {},
+    "calibration_errors": {},
+}
+"""Columns that comparisons do not read."""
+
 
 def manifest(**circumstances: Any) -> Manifest:
     return Manifest({"name": "made_up", "seed": 1}, VERSIONS, {"commit": "abc", **circumstances})
@@ -77,7 +86,7 @@ def write_run(out: Path, judged: ResultSet) -> Path:
     for cell in judged.cells:
         identity = {name: value for name, value in vars(cell).items() if name not in ("metrics", "defined_by")}
         key = content_key(identity)
-        rows.append({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **identity, **cell.metrics, "key": key})
+        rows.append({**UNUSED, **identity, **cell.metrics, "key": key})
         write_cell_files(out / "cells" / key, rows[-1], cell)
     names = [f"{row['method']} on {row['clip']} of {row['key']}" for row in rows]
     with CellIndex(out) as index:

@@ -111,5 +111,5 @@ def test_cells_of_an_older_version_are_refused(
     content = read_json(folder / "cell.json")
     del content["scenario"]
     write_json(folder / "cell.json", content)
-    with pytest.raises(BadFile, match=r"'scenario'.*expected a cell of this version.*Delete the cell's folder"):
+    with pytest.raises(BadFile, match=r"no scenario; expected a cell of this version.*Delete the cell's folder"):
         read(folder)

@@ -35,8 +35,12 @@ def run(made: Path, tmp_path: Path) -> Path:
     return out
 
 
-def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> None:
+def index(source: Path, out: Path, count: int, planned: int, **facts: Any) -> None:
+    """A folder with some cells of a run, and an index that plans more."""
     out.mkdir(exist_ok=True)
+    rows = [as_row(cell) for cell in read_cells(source)][:count]
+    for row in rows:
+        shutil.copytree(source / "cells" / row["key"], out / "cells" / row["key"])
     with CellIndex(out) as found:
         found.expect([f"cell {n}" for n in range(planned)])
         found.add(rows)
@@ -46,8 +50,8 @@ def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> 
 
 
 def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path: Path) -> None:
-    out, rows = tmp_path / "sweep", [as_row(cell) for cell in read_cells(made)]
-    index(out, rows[:3], 10, started_s=1000.0, seen_s=1030.0, made=3)
+    out = tmp_path / "sweep"
+    index(made, out, 3, 10, started_s=1000.0, seen_s=1030.0, made=3)
     (out / "cells" / "finished_but_not_in_the_index").mkdir(parents=True)
     (out / "cells" / ".unfinished-1-abc").mkdir()
     found = read_status(out)
@@ -61,7 +65,7 @@ def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path
 
 def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "sweep"
-    index(out, [as_row(cell) for cell in read_cells(made)][:3], 4, started_s=1000.0, seen_s=1030.0, made=3)
+    index(made, out, 3, 4, started_s=1000.0, seen_s=1030.0, made=3)
     assert main(["status", str(out)]) == 4
     assert capsys.readouterr().out.splitlines() == [
         "sweep tiny: finished, 3 of 4 cells finished, 1 failed",

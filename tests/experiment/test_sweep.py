@@ -5,6 +5,7 @@ import os
 import shlex
 import shutil
 import signal
+import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import replace
@@ -15,6 +16,7 @@ import pytest
 
 from harness.cli import main
 from harness.core.files import TEMPORARY
+from harness.core.interrupts import REPEAT_S
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
 from harness.experiment.cells import ClipTask
@@ -214,6 +216,7 @@ def test_the_first_ctrl_c_lets_cells_finish(
 def test_the_second_ctrl_c_stops_at_once(made_up: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def struck(*asked: Any) -> Any:
         os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.2 * REPEAT_S)  # earlier, it would belong to the first
         os.kill(os.getpid(), signal.SIGINT)
         return judge(*asked)
 

@@ -73,7 +73,8 @@ def test_a_sound_stream_passes_and_its_frames_are_given_back() -> None:
 
 def writable() -> Frames:
     frames = sound_frames()
-    frames[2].position_m.flags.writeable = True
+    changeable = frames[2].position_m.copy()
+    object.__setattr__(frames[2], "position_m", changeable)
     return frames
 
 

@@ -31,8 +31,8 @@ def library(tmp_path: Path) -> PaperStudy:
         ("93_01", "golf", 360),
     ):
         motion = clip(frames, name=name)
-        still = replace(motion, angles_rad=motion.angles_rad * (1.0 + 0.1 * int(name[:2])))
-        write_clip(folder, still)
+        scale = 1.0 + 0.1 * int(name[:2]) + 0.5 * int(name[3:])  # another motion in each clip
+        write_clip(folder, replace(motion, angles_rad=motion.angles_rad * scale))
         rows.append(f"{name[:2]}/{name}.amc,{name[:2]},{name[3:]},{behaviour},{frames},120")
     (folder / "manifest.csv").write_text("\n".join(rows) + "\n")
     motion_of = replace(WORN.motion, test=("91_01", "91_02@0.2-0.6"), behaviours=("walking",), examples=())
