@@ -15,6 +15,7 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.features.example_features import ExampleFeatures, Query
 from harness.reconstruct.solver.anchor_frame import AnchorFrame
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.stream.frame import TrackerFrame
@@ -31,8 +32,9 @@ class QueryFeatures:
         self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
+        self._time = DeviceTime()
         self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
-        """(S, 3) positions of the last query, measured or filled in, and its time [s]."""
+        """(S, 3) positions of the last query, measured or filled in, and its time by the device's clock [s]."""
 
     def compute(self, frame: TrackerFrame, last_qpos: Floats) -> Query:
         """The query of a frame; the last estimate (55,) supplies missing values.
@@ -52,12 +54,13 @@ class QueryFeatures:
         if not complete:
             position_m, turned, facing = self._completed_readings(last_qpos)
         filled = bool((moving | ~residuals.measured[: len(moving)]).all())
-        gap_s = frame.received_s - self._shown_s
+        now_s = self._time.frame_time_s(frame)
+        gap_s = now_s - self._shown_s
         if 0.0 < gap_s <= self._longest_gap_s:
             velocity_m_s[~moving] = (position_m[~moving] - self._shown_m[~moving]) / gap_s
         else:
             filled = False
-        self._shown_m, self._shown_s = np.array(position_m), frame.received_s
+        self._shown_m, self._shown_s = np.array(position_m), now_s
         w, _, _, z = facing.tolist()
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))

@@ -1,5 +1,7 @@
 """Neighbours of a query whose velocities are unknown, against a search through all examples."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,15 @@ def test_a_silent_station_has_the_velocity_of_the_last_estimates(station: int) -
         for q in made[22:]
     ]
     assert np.mean(found) >= 0.9 * COUNT
+
+
+def test_a_host_that_receives_frames_late_changes_no_query() -> None:
+    """Velocities of filled-in positions are by the device's clock."""
+    frames = unseen("walking")[0].frames[:40]
+    silent = [drop_stations(f, [2]) if i >= 20 else f for i, f in enumerate(frames)]
+    late = [replace(f, received_s=f.received_s + 0.004 * (i % 3)) for i, f in enumerate(silent)]
+    for punctual, delayed in zip(queries(silent)[1], queries(late)[1], strict=True):
+        np.testing.assert_array_equal(punctual.features, delayed.features)
 
 
 def test_a_station_that_reports_again_has_no_velocity_in_the_first_frame() -> None:
