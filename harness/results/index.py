@@ -48,6 +48,8 @@ _FACTS = {
 """Types of the facts that readers use."""
 _MAX_BYTES = 2**34
 """Largest index that is opened; it is not read into memory."""
+_DAMAGE = (sqlite3.DatabaseError, UnicodeDecodeError)
+"""What a damaged file raises; the second one for the name of a column that is not UTF-8."""
 _KEYS_PER_QUERY = 500
 """Number of keys in one SQL query."""
 
@@ -72,7 +74,7 @@ class CellIndex:
         else:
             try:
                 self._db = self._open()
-            except sqlite3.DatabaseError as error:  # damaged, edited or of another version: it is rebuilt
+            except _DAMAGE as error:  # damaged, edited or of another version: it is rebuilt
                 if _is_storage_error(error):
                     raise
                 self._remove()
@@ -217,7 +219,7 @@ class CellIndex:
             digests = dict(self._db.execute("SELECT file, sha256 FROM digests").fetchall())
             fits = digests.get(INDEX_FILE) in (None, _content_digest(self._db))
             self._db.rollback()
-        except sqlite3.DatabaseError as error:
+        except _DAMAGE as error:
             raise BadFile(self.path, f"damaged: {error}", expected, _ADVICE) from error
         if not fits:
             raise BadFile(self.path, "damaged or edited: its content does not fit its digest", expected, _ADVICE)
@@ -236,7 +238,7 @@ class CellIndex:
         try:
             for row in self._db.execute(question, values):  # noqa: UP028  # `yield from` closes cursors of a closed index
                 yield row
-        except sqlite3.DatabaseError as error:
+        except _DAMAGE as error:
             if _is_storage_error(error):
                 raise
             raise self._damage(str(error)) from error
@@ -290,7 +292,7 @@ class CellIndex:
                 if own and own[0] != _content_digest(db):
                     raise sqlite3.DatabaseError("edited")
                 db.execute("DELETE FROM digests")
-        except sqlite3.DatabaseError:
+        except _DAMAGE:
             db.close()
             raise
         return db
@@ -306,7 +308,7 @@ class CellIndex:
         db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro{alone}", uri=True, timeout=30.0)
         try:
             version = db.execute("PRAGMA user_version").fetchone()[0]
-        except sqlite3.DatabaseError as error:
+        except _DAMAGE as error:
             db.close()
             raise BadFile(self.path, str(error), expected, _ADVICE) from error
         if version != _VERSION:
@@ -333,7 +335,7 @@ def _content_digest(db: sqlite3.Connection) -> str:
     return state.hexdigest()
 
 
-def _is_storage_error(error: sqlite3.DatabaseError) -> bool:
+def _is_storage_error(error: Exception) -> bool:
     """Whether the disk or the folder is at fault, and not the content of the file."""
     return getattr(error, "sqlite_errorname", "").startswith(_STORAGE_ERRORS)
 

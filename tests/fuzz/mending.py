@@ -41,7 +41,7 @@ def mend_index(folder: Path) -> None:
     """Mend the digests in the index of `folder`/x."""
     run = folder / "x"
     db = sqlite3.connect(run / "index.sqlite")
-    with contextlib.suppress(sqlite3.DatabaseError, OverflowError), db:
+    with contextlib.suppress(sqlite3.DatabaseError, UnicodeDecodeError, OverflowError), db:
         if db.execute("SELECT 1 FROM digests WHERE file = 'index.sqlite'").fetchone():
             digests = compute_digests(run) if (run / "summary.json").exists() else {}
             db.executemany("INSERT OR REPLACE INTO digests VALUES (?, ?)", digests.items())

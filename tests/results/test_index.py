@@ -103,6 +103,20 @@ def test_a_damaged_or_older_index_is_made_anew(run: Path, tmp_path: Path, damage
         assert list(index.rows()) == []
 
 
+def test_a_column_whose_name_is_no_text_is_damage(run: Path, tmp_path: Path) -> None:
+    filled(tmp_path, rows_of(run))
+    with CellIndex(tmp_path) as index:
+        index.write_digest({})
+    path = tmp_path / INDEX_FILE
+    path.write_bytes(path.read_bytes().replace(b"failure TEXT", b"fail\xe6re TEXT"))
+    with CellIndex(tmp_path, read_only=True) as index, pytest.raises(BadFile, match="damaged"):
+        index.check_digest()
+    with CellIndex(tmp_path, read_only=True) as index, pytest.raises(BadFile, match="damaged"):
+        index.failures()
+    with CellIndex(tmp_path) as index:
+        assert index.counts() == CellCounts(0, 0, 0)
+
+
 def test_a_folder_without_an_index_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="no such file"):
         CellIndex(tmp_path, read_only=True)
