@@ -132,6 +132,14 @@ def test_mocap_may_be_given_more_than_once() -> None:
     assert mocap_words((Path("a"), Path("b"))) == ["--mocap", "a", "--mocap", "b"]
 
 
+def test_demo_has_all_options_of_run() -> None:
+    """Both are one function."""
+    demo, run = (vars(build_parser().parse_args(words)) for words in (["demo"], ["run", "demo"]))
+    assert demo.keys() == run.keys()
+    differing = {name for name in run if demo[name] != run[name]} - {"verb"}
+    assert differing <= {"jobs"}
+
+
 def test_the_package_is_a_program(tmp_path: Path) -> None:
     ended = subprocess.run(
         [sys.executable, "-m", "harness", "--version"], cwd=tmp_path, capture_output=True, text=True, check=True

@@ -8,3 +8,4 @@ def add_demo(verbs: Verbs) -> None:
     text = "run the main job on synthetic motion and write its report: nothing to download, a minute"
     verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
     verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True, jobs=2)
+    verb.set_defaults(isolate=False, time_limit=None, memory_limit=None)
