@@ -35,6 +35,7 @@ from harness.commands.sweep import add_sweep
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
+from harness.core.python_process import safe_import_path
 from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
@@ -83,7 +84,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
-    os.environ["PYTHONSAFEPATH"] = "1"  # children import nothing from the working folder; MuJoCo starts one too
     try:
         sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     except OSError as error:
@@ -91,7 +91,8 @@ def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
     try:
         check_command_line(words)
         check_words(list(vars(args).values()))
-        outcome: Outcome = args.action(args)
+        with safe_import_path():  # MuJoCo starts a process too
+            outcome: Outcome = args.action(args)
     except SystemExit as ended:  # of a method or a library: its code is none of ours
         raise RuntimeError(f"a part of the program asked to exit with {ended.code!r}") from ended
     return outcome
