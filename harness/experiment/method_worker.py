@@ -149,10 +149,13 @@ def _limit_time(limit_s: float) -> None:
 
 
 def _limit_memory(limit_bytes: int) -> None:
-    """Let allocations fail beyond a size of this process; Linux alone enforces it."""
+    """Let allocations fail beyond a size of this process, or beyond a smaller limit of its user; Linux enforces it."""
     if sys.platform == "linux":
         import resource
 
+        _, most_bytes = resource.getrlimit(resource.RLIMIT_DATA)
+        if most_bytes != resource.RLIM_INFINITY:
+            limit_bytes = min(limit_bytes, most_bytes)
         resource.setrlimit(resource.RLIMIT_DATA, (limit_bytes, limit_bytes))
 
 

@@ -1,6 +1,9 @@
 """Methods cannot touch each other, the scores or the program, whatever they do."""
 
+import os
 import re
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -140,3 +143,18 @@ def test_methods_of_the_package_have_the_same_results_in_processes_of_their_own(
     for name in names:
         assert_same(apart[name], here[name])
         assert apart[name].key == here[name].key
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
+def test_a_smaller_memory_limit_of_the_user_holds(tmp_path: Path) -> None:
+    """A method from outside runs where the user's limit, as of `ulimit -d`, is below that of the harness."""
+    limit = f"{8 * 2**30}"
+    program = (
+        "import resource, sys; from pathlib import Path\n"
+        f"resource.setrlimit(resource.RLIMIT_DATA, ({limit}, {limit}))\n"
+        "from harness.experiment.isolation import Isolation\n"
+        "from tests.experiment.test_isolation import HONEST, run\n"
+        "assert run(Path(sys.argv[1]), HONEST, isolation=Isolation(memory_limit_gb=12.0)).keys() == {HONEST}\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    subprocess.run([sys.executable, "-c", program, tmp_path / "run"], env=environment, check=True, timeout=300)
