@@ -211,6 +211,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
         (["[exhaustive]\nmost = 13"], "from 1 to 12"),
         (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 stations are 12 cells"),
         (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base has 'knee'"),
+        (["[add]\nbase = ['pelvis']\nof = ['pelvis']"], "add.of: 0 stations"),
         (["[refine]\nset = ['pelvis']\nalong = []"], "equally many of both"),
         (["[refine]\nset = ['pelvis']"], "with 2 clips, none of 4 moves .* 8 clips or more"),
         (["[refine]\nset = ['pelvis']\nalong = [0.1, 0.0]"], "steps above 0"),
