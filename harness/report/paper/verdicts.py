@@ -22,7 +22,7 @@ MARKS: Mapping[ClaimVerdict, str] = {
 MEANINGS: Mapping[ClaimVerdict, str] = {
     "reproduced": "the 95 % interval of the paired difference lies on the published side, and its p after Holm is at "
     "most 0.05; or a printed value is met (an error within 25 %)",
-    "same": "the whole interval lies within the margin of `harness compare`: the difference is too small to matter",
+    "same": "the whole interval lies within the margin of a comparison: the difference is too small to matter",
     "not reproduced": "the interval lies on the other side; or a printed value is not met",
     "cannot tell": "the interval contains zero, there are too few clips, or the difference is not significant among "
     "the printed statements (Holm)",

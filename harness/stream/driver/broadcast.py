@@ -17,8 +17,8 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import NoAnswer
+from harness.stream.driver.health import describe_health
 from harness.stream.driver.host import Host
-from harness.stream.driver.is900 import arrival_rate_hz
 from harness.stream.driver.rate_measurement import MIN_RECORDS, estimate_rate_hz
 from harness.stream.driver.transport import LineLost
 from harness.stream.frame import TrackerFrame
@@ -105,9 +105,7 @@ class Is900Broadcast:
 
         `rate_hz` is absent until enough frames have arrived to tell it.
         """
-        rate_hz = arrival_rate_hz(list(self._recent_s))
-        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
-        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
+        return describe_health(self.counts, self._recent_s, self._host.monotonic_s() - self._last_byte_s)
 
     def wall_s(self, received_s: float) -> float:
         """Convert a time on the host's monotonic clock to seconds since 1970."""

@@ -16,6 +16,7 @@ from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.configurator import DeviceConfigurator
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
+from harness.stream.driver.health import describe_health
 from harness.stream.driver.host import Host
 from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
 from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
@@ -28,10 +29,6 @@ _RATE_WINDOW_FRAMES = 50
 """Number of frames over which the present frame rate is computed."""
 MAX_EMITTERS = 200
 """More emitters than any constellation has."""
-_TOGETHER_S = 1e-6
-"""Frames of one read get times that differ by less than this [s]."""
-_SHORTEST_RATE_WINDOW_S = 0.2
-"""Shortest time over which it is computed [s]; USB adapters deliver frames in bursts 0.016 s apart."""
 
 
 class Is900:
@@ -136,9 +133,7 @@ class Is900:
 
         `rate_hz` is absent until enough frames have arrived to tell it.
         """
-        rate_hz = arrival_rate_hz(list(self._recent_s))
-        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
-        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
+        return describe_health(self.counts, self._recent_s, self._host.monotonic_s() - self._last_byte_s)
 
     def wall_s(self, received_s: float) -> float:
         """Convert a time on the host's monotonic clock to seconds since 1970."""
@@ -377,13 +372,3 @@ class Is900:
             if self._closing.is_set():
                 raise DriverClosed
             self._host.sleep(min(left_s, self._timing.poll_s))
-
-
-def arrival_rate_hz(received_s: list[float]) -> float | None:
-    """Frames per second of frames received at these times [s]; None for too short a time.
-
-    Frames that arrived together with the first are left out: nothing tells how long they waited.
-    """
-    later = sum(1 for at_s in received_s if at_s - received_s[0] > _TOGETHER_S)
-    span_s = received_s[-1] - received_s[0] if received_s else 0.0
-    return later / span_s if span_s >= _SHORTEST_RATE_WINDOW_S else None
