@@ -30,6 +30,7 @@ from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
 from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
@@ -52,6 +53,8 @@ class CleanUp:
     """Standard deviation of each hinge about the other method's pose, as a share of its spread over the examples."""
     prior_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
     """Standard deviation of each hinge about the pose of a method that has no examples [rad]."""
+    align: bool = False
+    """Move the readings of all stations to one instant first (`temporal_alignment`)."""
 
     @property
     def name(self) -> str:
@@ -94,6 +97,7 @@ class CleanUpSession:
         self._inner = inner
         self._residuals = Residuals(fitted.body, calibration, fitted.options.loss)
         self._gate = OutlierGate(len(calibration.stations))
+        self._alignment = TemporalAlignment(len(calibration.stations)) if fitted.options.align else None
         self._limits = HingeLimits(fitted.body)
         self._solver = IKSolver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
@@ -104,6 +108,8 @@ class CleanUpSession:
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return estimate
         self._gate.read(frame, self._residuals)
+        if self._alignment is not None:
+            self._alignment.align(frame, self._residuals)
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)

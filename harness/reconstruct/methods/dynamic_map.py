@@ -130,6 +130,8 @@ class DynamicMap:
     """Scales and robust loss of the residuals."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
+    align: bool = False
+    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
     lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
@@ -249,7 +251,12 @@ class DynamicMapSession(HistorySession):
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
         solver_options = SolverOptions(
-            options.loss, True, options.jump_m, lost_after_s=options.lost_after_s, stopping=options.stopping
+            options.loss,
+            True,
+            options.jump_m,
+            lost_after_s=options.lost_after_s,
+            stopping=options.stopping,
+            align=options.align,
         )
         posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         super().__init__(

@@ -58,6 +58,8 @@ class Ik:
     """Keep hinges within the body's limits."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
+    align: bool = False
+    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
     lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
@@ -118,6 +120,11 @@ class FittedIk:
     def begin(self, calibration: Calibration) -> IKSession:
         options = self.options
         solver_options = SolverOptions(
-            options.loss, options.limits, options.jump_m, lost_after_s=options.lost_after_s, stopping=options.stopping
+            options.loss,
+            options.limits,
+            options.jump_m,
+            lost_after_s=options.lost_after_s,
+            stopping=options.stopping,
+            align=options.align,
         )
         return IKSession(self.body, calibration, solver_options, self.posture_prior)

@@ -89,6 +89,8 @@ class LocalPca:
     """Scales and robust loss of the residuals."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
+    align: bool = False
+    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
     lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
     """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
@@ -165,7 +167,13 @@ class LocalPcaSession(HistorySession):
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
         solver_options = SolverOptions(
-            options.loss, True, options.jump_m, options.restart, options.lost_after_s, options.stopping
+            options.loss,
+            True,
+            options.jump_m,
+            options.restart,
+            options.lost_after_s,
+            options.stopping,
+            options.align,
         )
         posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         super().__init__(fitted.body, calibration, solver_options, posture_prior, _HISTORY, windows.database.rate_hz)

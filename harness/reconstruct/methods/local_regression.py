@@ -45,6 +45,7 @@ from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
 from harness.stream.frame import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
@@ -72,6 +73,8 @@ class LocalRegression(ABC):
     """Longest time between two readings or examples from which a velocity is computed [s]."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
+    align: bool = False
+    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
     alpha: Annotated[float, Range(0.0, 1.0)] = 0.3
     """alpha of eq. 6: share of the frame before last in the blend of the last two."""
     beta: Annotated[float, Range(0.0, 1.0)] = 0.4
@@ -146,6 +149,7 @@ class LocalRegressionSession:
         self._residuals = Residuals(fitted.body, calibration, Loss())
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
         self._monitor, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
+        self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
         self._examples = fitted.example_features(calibration)
         self._lookup = self._examples.index.begin_search()
         self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
@@ -167,6 +171,8 @@ class LocalRegressionSession:
             self._last_rows, self._last_poses = _NO_ROWS, []
             return Estimate(self._estimate, status, Origin.BRIDGED)
         self._gate.read(frame, self._residuals)
+        if self._alignment is not None:
+            self._alignment.align(frame, self._residuals)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._estimate, status, Origin.BRIDGED)
         query = self._features.compute(frame, self._estimate)

@@ -20,6 +20,7 @@ from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierG
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S, StatusMonitor
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
 from harness.stream.frame import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
@@ -76,6 +77,8 @@ class SolverOptions:
     lost_after_s: float = LOST_AFTER_S
     """Time without enough stations after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
+    align: bool = False
+    """Move the readings of all stations to one instant (`temporal_alignment`)."""
 
 
 class IKSession:
@@ -96,6 +99,7 @@ class IKSession:
         self._restart = options.restart
         self._monitor = StatusMonitor(options.lost_after_s)
         self._gate = OutlierGate(len(calibration.stations), options.jump_m)
+        self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
         self._time, self.now_s = DeviceTime(), 0.0
         """Time of this frame [s]."""
         self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
@@ -129,6 +133,8 @@ class IKSession:
         self.now_s = self._time.frame_time_s(frame)
         if any_valid:
             self._gate.read(frame, self.residuals)
+            if self._alignment is not None:
+                self._alignment.align(frame, self.residuals)
             cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
             if cold:
                 solution = self.solve_cold()

@@ -115,6 +115,14 @@ class Residuals:
         arguments = *_frame_arguments(frame), self.measured, self.confidence
         self._update_targets(self._measurement, self.targets, *arguments)
 
+    def targets_of(self, frame: TrackerFrame) -> tuple[Floats, Floats, Bools]:
+        """Targets (S, 3) [m] and (S, 4), and which rows (2S,) are measured, of another frame than that read last."""
+        count = len(self.bones)
+        other = StationTargets(*(np.empty_like(array) for array in self.targets))
+        measured = np.empty(2 * count, bool)
+        self._update_targets(self._measurement, other, *_frame_arguments(frame), measured, np.empty(2 * count))
+        return other.target_m, other.world_from_target, measured
+
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
         self.measured = self.measured & ~rows

@@ -1,0 +1,252 @@
+"""Temporal alignment: the readings of all stations at one instant, the mean of their sampling times.
+
+A tracker samples its stations in turn, at 40 Hz up to 16 ms apart (`TrackerFrame.measured_s`). A hand at 3 m/s is then
+2.5 cm from where it was when the head was sampled. Each reading is moved to the frame's instant t from its own time
+t_1, by the station's last readings p_1, p_0, p_-1:
+
+- Position: p_1 + (t - t_1) v + (t - t_1) (t - t_0) c, with the divided differences v = (p_1 - p_0) / (t_1 - t_0) and c.
+  Where t lies between readings, this is the parabola through the last three (Newton's form). Beyond the last one it is
+  the line through two of them, c = 0, because extrapolated curvature is mostly noise (docs/notes/tuning.md).
+- Orientation: the last rotation vector, in proportion to the time.
+
+The stage follows the outlier gate and works on what the gate let through. A loss, an outlier, a suspect record or a gap
+clears the history of the station, and its next readings stay as they are. Known slots of the stations keep the instant
+in place while one of them is silent. Readings of one time stay the same to the bit.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, immutable
+from harness.core.compiled import compiled, specialise
+from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_product, rotation_vector
+from harness.reconstruct.solver.residuals import Residuals
+from harness.stream.frame import TrackerFrame
+
+MAX_STEP_S = 0.04
+"""Longest time between two readings of a station that still describe one motion [s]."""
+MAX_BEND_M = 0.06
+"""Largest second difference of three positions that counts as motion [m]: 96 m/s^2 at 40 Hz. Echoes are larger."""
+MAX_TURN_RAD = 0.6
+"""Largest rotation between two readings that counts as motion [rad]: 24 rad/s at 40 Hz."""
+_MIN_SHIFT_S = 1e-6
+"""A reading that is nearer to the instant stays as it is: stamps of one time differ by rounding [s]."""
+
+
+class AlignmentHistory(NamedTuple):
+    """The last readings of S stations, as measured."""
+
+    slot_s: Floats
+    """(S,) sampling time of each station relative to the frame's instant; NaN before its first record [s]."""
+    last_s: Floats
+    """(S,) time of the last record [s]."""
+    before_s: Floats
+    """(S,) time of the record before it [s]."""
+    last_m: Floats
+    """(S, 3) last position [m]."""
+    before_m: Floats
+    """(S, 3) the position before it [m]."""
+    positions: Ints
+    """(S,) number of positions in a row up to the last record."""
+    last_turn: Floats
+    """(S, 4) last orientation."""
+    orientations: Ints
+    """(S,) number of orientations in a row up to the last record."""
+
+
+class FollowingReadings(NamedTuple):
+    """The readings of the frame after the one that is aligned, for a fixed lag of one frame."""
+
+    measured_s: Floats
+    """(S,) time of each record; NaN where there is none or it is suspect [s]."""
+    target_m: Floats
+    """(S, 3) positions in the world [m]."""
+    world_from_target: Floats
+    """(S, 4) orientations."""
+    measured: Bools
+    """(2S,) which rows were measured."""
+
+
+class TemporalAlignment:
+    """Moves the readings of S stations to one instant per frame, for one session."""
+
+    def __init__(self, stations: int) -> None:
+        self._history = AlignmentHistory(
+            slot_s=np.full(stations, np.nan),
+            last_s=np.full(stations, np.nan),
+            before_s=np.full(stations, np.nan),
+            last_m=np.zeros((stations, 3)),
+            before_m=np.zeros((stations, 3)),
+            positions=np.zeros(stations, np.int64),
+            last_turn=np.tile(rotations.IDENTITY, (stations, 1)),
+            orientations=np.zeros(stations, np.int64),
+        )
+        self._nothing = FollowingReadings(
+            np.full(stations, np.nan),
+            np.zeros((stations, 3)),
+            np.zeros((stations, 4)),
+            np.zeros(2 * stations, bool),
+        )
+        readings = np.zeros(2 * stations, bool), np.zeros((stations, 3)), np.zeros((stations, 4))
+        record = immutable(np.zeros(stations)), immutable(np.zeros(stations), bool)
+        self._align = specialise(align_readings, *record, *readings, self._nothing, self._history)
+
+    def align(self, frame: TrackerFrame, residuals: Residuals, following: TrackerFrame | None = None) -> None:
+        """Move the targets of residuals, which have read this frame, to the frame's instant, in place.
+
+        Only rows that are measured and not left out count. With the `following` frame (a fixed lag of one frame) a
+        reading is interpolated towards the next one of its station instead of extrapolated.
+        """
+        ahead = self._nothing if following is None else _following(following, residuals)
+        self._align(
+            *(frame.measured_s, frame.suspect, residuals.measured, residuals.target_m, residuals.world_from_target),
+            *(ahead, self._history),
+        )
+
+
+def _following(frame: TrackerFrame, residuals: Residuals) -> FollowingReadings:
+    target_m, world_from_target, measured = residuals.targets_of(frame)
+    measured_s = np.where(frame.suspect, np.nan, frame.measured_s)
+    return FollowingReadings(measured_s, target_m, world_from_target, measured)
+
+
+@compiled
+def align_readings(
+    measured_s: Floats,
+    suspect: Bools,
+    measured: Bools,
+    target_m: Floats,
+    world_from_target: Floats,
+    following: FollowingReadings,
+    history: AlignmentHistory,
+) -> None:
+    """Move positions (S, 3) and orientations (S, 4), of which rows (2S,) are measured, to the instant, in place.
+
+    `measured_s` (S,) are the times of the records, NaN where none arrived.
+    """
+    count = len(measured_s)
+    instant_s = _find_instant(measured_s, suspect, history.slot_s)
+    for s in range(count):
+        now_s = measured_s[s]
+        if suspect[s] or np.isnan(now_s):
+            history.positions[s] = history.orientations[s] = 0
+            continue
+        if not 0.0 < now_s - history.last_s[s] <= MAX_STEP_S:
+            history.positions[s] = history.orientations[s] = 0
+        shift_s = instant_s - now_s
+        moves = _MIN_SHIFT_S <= abs(shift_s) <= MAX_STEP_S
+        if measured[s]:
+            x, y, z = target_m[s, 0], target_m[s, 1], target_m[s, 2]
+            if moves:
+                _move_position(target_m[s], s, now_s, shift_s, following, history)
+            history.before_m[s] = history.last_m[s]
+            history.last_m[s, 0], history.last_m[s, 1], history.last_m[s, 2] = x, y, z
+            history.positions[s] += 1
+        else:
+            history.positions[s] = 0
+        if measured[count + s]:
+            w, x, y, z = as_tuple(world_from_target[s])
+            if moves:
+                _move_orientation(world_from_target[s], s, now_s, shift_s, count, following, history)
+            turn = history.last_turn[s]
+            turn[0], turn[1], turn[2], turn[3] = w, x, y, z
+            history.orientations[s] += 1
+        else:
+            history.orientations[s] = 0
+        history.before_s[s], history.last_s[s] = history.last_s[s], now_s
+
+
+@compiled
+def _find_instant(measured_s: Floats, suspect: Bools, slot_s: Floats) -> float:
+    """The instant of a frame [s]: the mean sampling time of the stations known so far, whose slots (S,) are updated."""
+    instant_s, records, everyone = 0.0, 0, True
+    for s in range(len(measured_s)):
+        here = not suspect[s] and not np.isnan(measured_s[s])
+        if not np.isnan(slot_s[s]):
+            everyone = everyone and here
+            if here:
+                instant_s, records = instant_s + measured_s[s] - slot_s[s], records + 1
+    if records == 0:
+        for s in range(len(measured_s)):
+            if not suspect[s] and not np.isnan(measured_s[s]):
+                instant_s, records = instant_s + measured_s[s], records + 1
+    instant_s /= records
+    centre_s, known = 0.0, 0
+    for s in range(len(measured_s)):
+        if not suspect[s] and not np.isnan(measured_s[s]) and (everyone or np.isnan(slot_s[s])):
+            slot_s[s] = measured_s[s] - instant_s
+        if not np.isnan(slot_s[s]):
+            centre_s, known = centre_s + slot_s[s], known + 1
+    centre_s /= known
+    for s in range(len(measured_s)):
+        slot_s[s] -= centre_s
+    return instant_s + centre_s
+
+
+@compiled
+def _move_position(
+    reading_m: Floats, s: int, now_s: float, shift_s: float, following: FollowingReadings, history: AlignmentHistory
+) -> None:
+    """Move a position (3,) of station s by a time, where its neighbours in time make one motion of it."""
+    step_s, earlier_s = now_s - history.last_s[s], history.last_s[s] - history.before_s[s]
+    later_s = following.measured_s[s] - now_s
+    if following.measured[s] and history.positions[s] >= 1 and 0.0 < later_s <= MAX_STEP_S:
+        later_m, last_m = following.target_m[s], history.last_m[s]
+        bend_m = 0.0
+        for i in range(3):
+            change = (later_m[i] - reading_m[i]) / later_s - (reading_m[i] - last_m[i]) / step_s
+            bend_m += (step_s * change) ** 2
+        if bend_m > MAX_BEND_M**2:
+            return
+        for i in range(3):
+            velocity, before = (later_m[i] - reading_m[i]) / later_s, (reading_m[i] - last_m[i]) / step_s
+            curvature = (velocity - before) / (later_s + step_s)
+            reading_m[i] += shift_s * (velocity + (shift_s - later_s) * curvature)
+        return
+    if history.positions[s] < 2:
+        return
+    last_m, before_m = history.last_m[s], history.before_m[s]
+    bend_m = 0.0
+    for i in range(3):
+        change = (reading_m[i] - last_m[i]) / step_s - (last_m[i] - before_m[i]) / earlier_s
+        bend_m += (step_s * change) ** 2
+    if bend_m > MAX_BEND_M**2:
+        return
+    for i in range(3):
+        velocity, before = (reading_m[i] - last_m[i]) / step_s, (last_m[i] - before_m[i]) / earlier_s
+        curvature = (velocity - before) / (step_s + earlier_s) if shift_s < 0.0 else 0.0
+        reading_m[i] += shift_s * (velocity + (shift_s + step_s) * curvature)
+
+
+@compiled
+def _move_orientation(
+    reading: Floats,
+    s: int,
+    now_s: float,
+    shift_s: float,
+    count: int,
+    following: FollowingReadings,
+    history: AlignmentHistory,
+) -> None:
+    """Turn an orientation (4,) of station s by a share of its rotation since the last one, or until the next one."""
+    w, x, y, z = as_tuple(reading)
+    later_s = following.measured_s[s] - now_s
+    if shift_s > 0.0 and following.measured[count + s] and 0.0 < later_s <= MAX_STEP_S:
+        turn = quaternion_product(as_tuple(following.world_from_target[s]), w, -x, -y, -z)
+        share = shift_s / later_s
+    elif history.orientations[s] >= 1:
+        last = history.last_turn[s]
+        turn = quaternion_product((w, x, y, z), last[0], -last[1], -last[2], -last[3])
+        share = shift_s / (now_s - history.last_s[s])
+    else:
+        return
+    a, b, c = rotation_vector(turn[0], turn[1], turn[2], turn[3])
+    angle_rad = np.sqrt(a * a + b * b + c * c)
+    if angle_rad > MAX_TURN_RAD or angle_rad == 0.0:
+        return
+    half = 0.5 * share * angle_rad
+    sine = np.sin(half) / angle_rad
+    moved = quaternion_product((np.cos(half), sine * a, sine * b, sine * c), w, x, y, z)
+    reading[0], reading[1], reading[2], reading[3] = moved
