@@ -4,9 +4,9 @@ A tracker samples its stations in turn, at 40 Hz up to 16 ms apart (`TrackerFram
 2.5 cm from where it was when the head was sampled. Each reading is moved to the frame's instant t from its own time
 t_1, by the station's last readings p_1, p_0, p_-1:
 
-- Position: p_1 + (t - t_1) v + (t - t_1) (t - t_0) c, with the divided differences v = (p_1 - p_0) / (t_1 - t_0) and c.
-  Where t lies between readings, this is the parabola through the last three (Newton's form). Beyond the last one it is
-  the line through two of them, c = 0, because extrapolated curvature is mostly noise (docs/notes/tuning.md).
+- Position: between readings, t < t_1, the parabola through the last three. Beyond the last one the mean velocity of
+  the last two steps, p_1 + (t - t_1) (p_1 - p_-1) / (t_1 - t_-1). The parabola, or the last step alone, would be as
+  accurate there and adds jitter (docs/notes/tuning.md).
 - Orientation: the last rotation vector, in proportion to the time.
 
 The stage follows the outlier gate and works on what the gate let through. A loss, an outlier, a suspect record or a gap
@@ -215,9 +215,11 @@ def _move_position(
     if bend_m > MAX_BEND_M**2:
         return
     for i in range(3):
-        velocity, before = (reading_m[i] - last_m[i]) / step_s, (last_m[i] - before_m[i]) / earlier_s
-        curvature = (velocity - before) / (step_s + earlier_s) if shift_s < 0.0 else 0.0
-        reading_m[i] += shift_s * (velocity + (shift_s + step_s) * curvature)
+        slope = (reading_m[i] - before_m[i]) / (step_s + earlier_s)
+        if shift_s < 0.0:
+            velocity, before = (reading_m[i] - last_m[i]) / step_s, (last_m[i] - before_m[i]) / earlier_s
+            slope = velocity + (shift_s + step_s) * (velocity - before) / (step_s + earlier_s)
+        reading_m[i] += shift_s * slope
 
 
 @compiled
