@@ -6,14 +6,11 @@ regresses.
 
 from typing import Protocol
 
-import numpy as np
-
-from harness.core import rotations
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Floats
 from harness.reconstruct.database import Windows
+from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression, ReducedRankSearch
 from harness.reconstruct.index import Index, Neighbours
-from harness.reconstruct.solver.anchor_frame import AnchorFrame, twist_rad
 from harness.reconstruct.solver.residuals import Residuals
 
 
@@ -59,65 +56,22 @@ class PoseHistorySearch:
 class FeatureSearch:
     """Search by the features of a `ReducedRankRegression`, from the last estimates and the readings."""
 
-    def __init__(self, windows: Windows, regression: ReducedRankRegression, residuals: Residuals, index: str) -> None:
-        self._windows, self._regression, self._residuals, self._index_name = windows, regression, residuals, index
-        self._measured_before: Bools = np.zeros(2 * regression.count, bool)
-        """(2 S,) readings that this session has had. A station that appears later only takes part in the solver."""
+    def __init__(self, regression: ReducedRankRegression, residuals: Residuals, index: str) -> None:
+        self._query, self._residuals, self._index_name = PredictorQuery(regression, residuals), residuals, index
         self._search: tuple[ReducedRankSearch, Index]
-        """The search, and this session's use of its index."""
-        self._usual: Bools = np.zeros(2 * regression.count, bool)
-        """(2 S,) readings for which `_search` was made."""
-        self._fixed = False
-        """Whether `_search` stays, as it does once there is a history."""
-        self._by_orientation = regression
-        """The regression whose heading is that of the anchor's orientation."""
-        self._identity = np.tile(rotations.IDENTITY, (regression.count, 1))
+        """The search for the usual readings, and this session's use of its index."""
 
     def nearest(self, past: Floats, count: int, history: bool = True) -> Neighbours:
-        residuals = self._residuals
-        if not self._fixed:
-            self._prepare(count)
-            self._fixed = history
-        window = self._windows.query(past)
-        predictors = self._regression.predictors(
-            window, residuals.target_m, residuals.world_from_target, self._anchor_frame(past[0])
-        )
-        return self._search[0].nearest(predictors, residuals.measured, count, self._search[1], history)
-
-    def _prepare(self, count: int) -> None:
-        """Make the search for the readings that this session has had so far, unless it is there."""
-        usual = self._measured_before | self._residuals.measured
-        if not np.array_equal(usual, self._usual):
-            self._usual, self._regression = usual, self._by_orientation.with_usual_heading(usual)
-            search = self._regression.search(self._regression.columns(usual), self._index_name, count)
+        query = self._query
+        if query.prepare(history):
+            regression = query.regression
+            search = regression.search(regression.columns(query.usual), self._index_name, count)
             self._search = search, search.index.begin_search()
+        predictors = query.predictors(past)
+        return self._search[0].nearest(predictors, self._residuals.measured, count, self._search[1], history)
 
     def readings_suffice(self) -> bool:
-        measured, count, heading = self._residuals.measured, self._regression.count, self._regression.heading
-        places, anchor = measured[:count], self._regression.anchor
-        if not self._fixed:
-            heading = self._by_orientation.with_usual_heading(self._measured_before | measured).heading
-        return bool(places[anchor] and measured[count + anchor] if heading is None else places[heading.stations].all())
+        return self._query.readings_suffice()
 
     def record(self) -> None:
-        self._measured_before |= self._residuals.measured
-
-    def _anchor_frame(self, last: Floats) -> AnchorFrame:
-        """Anchor frame of the readings; the last estimate (55,) supplies what was not measured."""
-        residuals, anchor, heading = self._residuals, self._regression.anchor, self._regression.heading
-        has_position, has_orientation = (
-            residuals.measured[: len(residuals.bones)],
-            residuals.measured[len(residuals.bones) + anchor],
-        )
-        at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
-        if not (has_position[anchor] and has_orientation if heading is None else has_position[heading.stations].all()):
-            residuals.kinematics.set(last)
-            last_m, last_orientation = residuals.kinematics.station_poses(
-                residuals.bones, residuals.mount_m, self._identity
-            )
-            at_m, turned = (
-                np.where(has_position[:, None], at_m, last_m),
-                (turned if has_orientation else last_orientation[anchor]),
-            )
-        yaw = twist_rad(turned) if heading is None else heading.heading_rad(at_m)
-        return AnchorFrame(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))
+        self._query.record()

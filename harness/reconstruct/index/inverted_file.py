@@ -13,9 +13,6 @@ on. So the scan adds up one axis for all vectors of a cell in a contiguous loop,
 """
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +20,7 @@ from numpy.typing import NDArray
 from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
+from harness.reconstruct.index.clustering import single_threaded_faiss
 from harness.reconstruct.index.principal_axes import PrincipalAxes, chunks
 from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
@@ -58,7 +56,7 @@ class InvertedFile(StatelessIndex):
         projected = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
             projected[rows] = self._principal.project(vectors.gather(sample[rows]))
-        with _faiss() as faiss:
+        with single_threaded_faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
             clustering.seed, clustering.niter = 1, _CLUSTERING_ROUNDS
@@ -200,21 +198,3 @@ def _gather_offsets(
         for i in range(width):
             out[k, i] = (codes[begin + i * (last - first)] - target[i]) * step
     return out
-
-
-@contextmanager
-def _faiss() -> Iterator[Any]:
-    """The faiss module, imported at its first use, with one thread so that equal input gives equal cells.
-
-    Vectors are compared with centroids in blocks of 256, for which a megabyte of memory suffices.
-    """
-    import faiss
-
-    threads, block_size = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
-    faiss.omp_set_num_threads(1)
-    faiss.cvar.distance_compute_blas_query_bs = 256
-    try:
-        yield faiss
-    finally:
-        faiss.omp_set_num_threads(threads)
-        faiss.cvar.distance_compute_blas_query_bs = block_size

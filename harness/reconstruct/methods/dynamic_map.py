@@ -266,7 +266,7 @@ class DynamicMapSession(HistorySession):
         self._neighbours: NeighbourSearch
         if fitted.index is None:
             regression = fitted.regression(calibration)
-            self._neighbours = FeatureSearch(windows, regression, self.residuals, options.index)
+            self._neighbours = FeatureSearch(regression, self.residuals, options.index)
         else:
             self._neighbours = PoseHistorySearch(windows, fitted.index)
         sigma = np.zeros(POSTURE_SIZE + 3)

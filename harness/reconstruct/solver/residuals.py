@@ -123,6 +123,11 @@ class Residuals:
         self._update_targets(self._measurement, other, *_frame_arguments(frame), measured, np.empty(2 * count))
         return other.target_m, other.world_from_target, measured
 
+    def set_sigma(self, position_m: float, orientation_rad: float) -> None:
+        """Set the standard deviations of readings [m], [rad], from the next frame on."""
+        count = len(self.bones)
+        self._measurement.precision[:count], self._measurement.precision[count:] = position_m**-2, orientation_rad**-2
+
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
         self.measured = self.measured & ~rows

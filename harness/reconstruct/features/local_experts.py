@@ -1,0 +1,117 @@
+"""Local experts: Gaussians of the posture, given features of the readings and the history, from tabulated moments.
+
+Two experts judge a frame. The first knows features z of the readings and the last poses: the leading directions of a
+reduced-rank regression of the posture. The second knows features u of the last poses alone: their leading principal
+axes. The tables of an expert are made once for the mounts of a calibration (`moment_table`).
+
+Features of a frame carry errors: last poses are estimates, readings are noisy, and missing readings are imputed. The
+covariance of these errors enters the regression of the first expert (`moment_table.condition`). That of the second has
+a ridge instead, which was better on validation clips (docs/notes/tuning.md).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.reconstruct.features.moment_table import MomentTable, tabulate_moments
+from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+
+_HISTORY_AXES = 40
+"""Number of principal axes of the history."""
+_POSE_ERROR_RAD = float(np.deg2rad(2.0))
+"""Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureMap:
+    """Map from predictors (P,), of which some are known, to features, and the covariance of the features' errors."""
+
+    matrix: Floats
+    """(P, F) map; rows of unknown predictors are 0."""
+    origin: Floats
+    """(F,) image of the predictors' mean."""
+    fixed: Floats
+    """(F, F) covariance of the errors by the window's poses and by imputation."""
+    position: Floats
+    """(F, F) covariance of the errors for positions with a standard deviation of 1 m."""
+    orientation: Floats
+    """(F, F) covariance of the errors for orientations with a standard deviation of 1 rad."""
+
+    def error_covariance(self, position_m: float, orientation_rad: float) -> Floats:
+        """(F, F) covariance of the features' errors, for readings with these standard deviations [m], [rad]."""
+        out: Floats = self.fixed + position_m**2 * self.position + orientation_rad**2 * self.orientation
+        return out
+
+
+class LocalExperts:
+    """Moment tables of both experts, for the mounts of a calibration."""
+
+    def __init__(self, regression: ReducedRankRegression) -> None:
+        self.regression = regression
+        windows = regression.windows
+        self._known, self._maps = np.ones(regression.size, bool), dict[bytes, FeatureMap]()
+        self._directions = regression.directions(self._known)
+        length = windows.size
+        self.history_axes: Floats = np.linalg.eigh(regression.scatter[:length, :length])[1][:, ::-1][:, :_HISTORY_AXES]
+        """(D, H) principal axes of the windows."""
+        self.history_axes = np.ascontiguousarray(self.history_axes)
+        self.history_origin: Floats = regression.mean[:length] @ self.history_axes
+        """(H,) image of their mean."""
+        count, rows = len(windows), np.arange(len(windows))
+        z = np.empty((count, self._directions.shape[1]), np.float32)
+        u = np.empty((count, self.history_axes.shape[1]), np.float32)
+        targets, done = np.empty((count, POSTURE_SIZE), np.float32), 0
+        for predictors, after in regression.training_data(windows, rows):
+            some = slice(done, done + len(predictors))
+            z[some], targets[some] = (predictors - regression.mean) @ self._directions, after
+            u[some] = predictors[:, :length] @ self.history_axes - self.history_origin
+            done += len(predictors)
+        windows.database.release_memory()
+        self.table: MomentTable = tabulate_moments(z, targets)
+        """Moments of z and the posture."""
+        self.history_table: MomentTable = tabulate_moments(u, targets)
+        """Moments of u and the posture."""
+
+    def feature_map(self, measured: Bools, history: bool) -> FeatureMap:
+        """The map to z from the readings that are `measured` (2 S,), and from the window if there is a `history`."""
+        mask = np.append(measured, history).tobytes()
+        if mask not in self._maps:
+            known = self.regression.columns(measured, history)
+            if known.all():
+                self._maps[mask] = self._map(self._directions)
+            else:
+                self._maps[mask] = self._imputed_map(known)
+        return self._maps[mask]
+
+    def _imputed_map(self, known: Bools) -> FeatureMap:
+        """The map from the known predictors (P,): others are replaced by their regression."""
+        regression = self.regression
+        imputation = regression.imputation_map(known, self._known)
+        matrix = np.zeros_like(self._directions)
+        matrix[known] = imputation @ self._directions
+        out = self._map(matrix)
+        unknown = ~known
+        cross = regression.scatter[np.ix_(known, unknown)]
+        rest = regression.scatter[np.ix_(unknown, unknown)] - cross.T @ imputation[:, unknown]
+        along = self._directions[unknown]
+        return FeatureMap(out.matrix, out.origin, out.fixed + along.T @ rest @ along, out.position, out.orientation)
+
+    def _map(self, matrix: Floats) -> FeatureMap:
+        regression, window = self.regression, self.regression.windows
+        poses = window.length
+        posture = np.zeros((POSTURE_SIZE, matrix.shape[1]))
+        for age in range(poses):
+            start = (POSTURE_SIZE + 3) * age
+            posture += regression.options.window_weight * matrix[start : start + POSTURE_SIZE]
+        readings = matrix[window.size :].reshape(regression.count, 9, -1)
+        places, axes = readings[:, :3].reshape(-1, matrix.shape[1]), readings[:, 3:].reshape(-1, matrix.shape[1])
+        lever = regression.options.lever_m
+        return FeatureMap(
+            np.ascontiguousarray(matrix),
+            regression.mean @ matrix,
+            _POSE_ERROR_RAD**2 * posture.T @ posture,
+            places.T @ places,
+            lever**2 * axes.T @ axes,
+        )

@@ -1,0 +1,78 @@
+"""Predictors of a frame during a session: its readings and last estimates, seen from the anchor frame."""
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats
+from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
+from harness.reconstruct.solver.anchor_frame import AnchorFrame, twist_rad
+from harness.reconstruct.solver.residuals import Residuals
+
+
+class PredictorQuery:
+    """Predictors for a `ReducedRankRegression`, and the readings that one session usually has.
+
+    The view depends on them: without the anchor's orientation, its heading is estimated from the positions. The choice
+    stays once there is a history.
+    """
+
+    def __init__(self, regression: ReducedRankRegression, residuals: Residuals) -> None:
+        self._by_orientation, self._residuals = regression, residuals
+        self.regression = regression
+        """The regression whose heading is that of the usual readings."""
+        self.usual: Bools = np.zeros(2 * regression.count, bool)
+        """(2 S,) readings that the session has had. A station that appears later only takes part in the solver."""
+        self._measured_before: Bools = np.zeros(2 * regression.count, bool)
+        self._fixed = False
+        self._identity = np.tile(rotations.IDENTITY, (regression.count, 1))
+
+    def prepare(self, history: bool) -> bool:
+        """Choose the regression for the readings that were measured so far; returns whether they have changed.
+
+        With a `history` the choice is final.
+        """
+        if self._fixed:
+            return False
+        usual = self._measured_before | self._residuals.measured
+        changed = not np.array_equal(usual, self.usual)
+        if changed:
+            self.usual, self.regression = usual, self._by_orientation.with_usual_heading(usual)
+        self._fixed = history
+        return changed
+
+    def predictors(self, past: Floats) -> Floats:
+        """(D + 9 S,) predictors of the last estimates (m, 55), newest first, and of the readings."""
+        residuals, regression = self._residuals, self.regression
+        view = self._anchor_frame(past[0])
+        window = regression.windows.query(past)
+        return regression.predictors(window, residuals.target_m, residuals.world_from_target, view)
+
+    def readings_suffice(self) -> bool:
+        """Whether the current readings alone show the place and the heading."""
+        measured, count, heading = self._residuals.measured, self.regression.count, self.regression.heading
+        places, anchor = measured[:count], self.regression.anchor
+        if not self._fixed:
+            heading = self._by_orientation.with_usual_heading(self._measured_before | measured).heading
+        return bool(places[anchor] and measured[count + anchor] if heading is None else places[heading.stations].all())
+
+    def record(self) -> None:
+        """Note which readings the current frame had, after its estimate is made."""
+        self._measured_before |= self._residuals.measured
+
+    def _anchor_frame(self, last: Floats) -> AnchorFrame:
+        """Anchor frame of the readings; the last estimate (55,) supplies what was not measured."""
+        residuals, anchor, heading = self._residuals, self.regression.anchor, self.regression.heading
+        count = len(residuals.bones)
+        has_position, has_orientation = residuals.measured[:count], residuals.measured[count + anchor]
+        at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
+        if not (has_position[anchor] and has_orientation if heading is None else has_position[heading.stations].all()):
+            residuals.kinematics.set(last)
+            last_m, last_orientation = residuals.kinematics.station_poses(
+                residuals.bones, residuals.mount_m, self._identity
+            )
+            at_m, turned = (
+                np.where(has_position[:, None], at_m, last_m),
+                (turned if has_orientation else last_orientation[anchor]),
+            )
+        yaw = twist_rad(turned) if heading is None else heading.heading_rad(at_m)
+        return AnchorFrame(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))

@@ -1,0 +1,300 @@
+"""Maximum a posteriori pose under a product of two local experts (`expert_map`).
+
+For every frame:
+
+1. Bring the readings of all stations to one instant (`temporal_alignment`).
+2. Put two Gaussians of the posture together from tabulated moments of the examples (`local_experts`): one given the
+   readings and the last poses, one given the last poses alone.
+3. Solve for the pose that maximises the product of both and of the likelihood of the readings, by Levenberg-Marquardt.
+4. Update the scales of the readings' noise and of the prior from the residuals (`self_calibration`).
+
+Sources: Liu et al. 2011 (prediction times likelihood), Hinton 2002 (product of experts), Atkeson, Moore and Schaal 1997
+(locally weighted regression). docs/methods.md has the formulas, the constants and the clips that chose them.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
+from harness.core.estimate import Estimate, Origin
+from harness.core.motion import BodyMotion
+from harness.core.ranges import Range
+from harness.errors import BadInput
+from harness.reconstruct.database import MotionDatabase, Windows
+from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.features.local_experts import LocalExperts
+from harness.reconstruct.features.moment_table import condition, local_gaussian
+from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.features.predictor_query import PredictorQuery
+from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
+from harness.reconstruct.methods.ik import Ik
+from harness.reconstruct.solver.ground_frame import (
+    HINGES,
+    POSTURE_SIZE,
+    ground_from_qpos,
+    posture_from_qpos,
+    qpos_from_posture,
+)
+from harness.reconstruct.solver.history_session import HistorySession
+from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
+from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.residuals import Loss
+from harness.reconstruct.solver.root_placement import candidate_placements
+from harness.reconstruct.solver.self_calibration import Posterior, SelfCalibration, posterior
+from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
+from harness.reconstruct.solver.subspace_minimiser import Subspace
+from harness.stream.frame import TrackerFrame
+
+POSES = 3
+"""Number of past estimates among the predictors."""
+_LEAST_SIGMA_RAD, _LEAST_TILT_RAD, _LEAST_HEIGHT_M = 0.005, 0.01, 0.003
+"""Floors of the standard deviations of the experts."""
+_RIDGE = 1e-4
+"""Ridge of the expert of readings and history, as a share of the features' variance."""
+_HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
+"""Ridge and width of the expert of the history, and a further standard deviation of every hinge under it."""
+_DIRECTIONS = 32
+"""Number of features of readings and history."""
+
+
+@dataclass(frozen=True)
+class ExpertMap:
+    """Options of the product of local experts, a `Method`."""
+
+    name: str = "expert_map"
+    summary: str = "maximum a posteriori pose under tabulated local experts, with self-calibrated noise"
+    needs_examples: bool = True
+    neighbours: Annotated[int, Range(2, 1_000_000)] = 1800
+    """K: number of examples in the local model of readings and history."""
+    history_neighbours: Annotated[int, Range(2, 1_000_000)] = 400
+    """K of the local model of the history alone."""
+    width: Annotated[float, Range(1e-06, 1e6)] = 0.1
+    """Variance of the weights over the squared distance within which half of the K examples lie."""
+    history_weight: Annotated[float, Range(0.0, 1e3)] = 0.5
+    """Power of the expert of the history in the product; 0 leaves it out."""
+    widening: Annotated[float, Range(0.0, 1e6)] = 150.0
+    """For performers unlike the examples, the covariance grows by f = 1 + (widening d^2)^2, where d is the RMS
+    distance of the nearest examples per feature; the prior of `ik` takes part with the weight 1 - 1/f."""
+    align: bool = True
+    """Move the readings of all stations to one instant."""
+    jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
+
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedExpertMap":
+        """Build the database; BadInput without examples of more than three frames."""
+        if not any(len(take) > POSES for take in examples):
+            message = f"{self.name} needs examples of more than {POSES} frames, and there are none."
+            raise BadInput(message, "Name some in the scenario.")
+        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
+
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedExpertMap":
+        """Learn from a database, which may lie on disk."""
+        windows = database.windows(POSES, with_successor=True)
+        ik_prior = Ik().posture_prior(body, database)
+        return FittedExpertMap(self, body, windows, mean_posture(body, database), ik_prior)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedExpertMap:
+    """The windows of the examples, and the experts for the last calibration."""
+
+    options: ExpertMap
+    body: Body
+    windows: Windows
+    mean_qpos: Floats
+    """(55,) mean posture, the prior of frames without a history."""
+    ik_prior: PosturePrior
+    """Prior of `ik`."""
+    _cache: CalibrationCache[tuple[ReducedRankRegression, dict[int, LocalExperts]]] = field(
+        default_factory=CalibrationCache
+    )
+
+    def begin(self, calibration: Calibration) -> "ExpertMapSession":
+        return ExpertMapSession(self, calibration, *self._trained(calibration))
+
+    def _trained(self, calibration: Calibration) -> tuple[ReducedRankRegression, dict[int, LocalExperts]]:
+        """The regression for the mounts of a calibration, and its experts by the identity of their regression."""
+
+        def make() -> tuple[ReducedRankRegression, dict[int, LocalExperts]]:
+            regression = ReducedRankRegression(
+                self.body, self.windows, calibration, ReducedRankOptions(directions=_DIRECTIONS)
+            )
+            return regression, {id(regression): LocalExperts(regression)}
+
+        return self._cache.get(calibration, make)
+
+
+class ExpertMapSession(HistorySession):
+    """Follows one performer."""
+
+    def __init__(
+        self,
+        fitted: FittedExpertMap,
+        calibration: Calibration,
+        regression: ReducedRankRegression,
+        experts: dict[int, LocalExperts],
+    ) -> None:
+        options, loss = fitted.options, Loss()
+        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
+        solver_options = SolverOptions(loss, True, options.jump_m, align=options.align)
+        super().__init__(
+            fitted.body, calibration, solver_options, posture_prior, POSES, fitted.windows.database.rate_hz
+        )
+        self._options, self._ik_prior, self._made = options, fitted.ik_prior, experts
+        self._query = PredictorQuery(regression, self.residuals)
+        self._experts = experts[id(regression)]
+        self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
+        self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
+        self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
+        self._prior: Subspace | None = None
+        """Prior of the pose that was solved last; None when inverse kinematics answered."""
+        self.posterior: Posterior | None = None
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        self.residuals.set_sigma(self._scales.position_sigma_m, self._scales.orientation_sigma_rad)
+        return super().step(frame)
+
+    def solve_next(self) -> IKSolution:
+        self._prior = prior = self._predict(history=True)
+        ground = self._next_ground()
+        solution = self._solver.solve(prior, ground, prior.mean)
+        if solution.converged and self.outlier_share() == 0.0:
+            return solution
+        second = self._solver.solve(prior, ground, posture_from_qpos(self.past[0]))
+        best = second if second.cost < solution.cost else solution
+        self.residuals.evaluate(best.qpos)
+        return best
+
+    def solve_cold(self) -> IKSolution:
+        """The best pose under the expert of the readings, where they suffice; else by inverse kinematics."""
+        by_ik = super().solve_cold()
+        self._prior = None
+        if not self._query.readings_suffice():
+            return by_ik
+        self.cold_origin = Origin.MODEL
+        self._prior = prior = self._predict(history=False)
+        posture = qpos_from_posture(prior.mean, np.zeros(3))
+        starts = [by_ik.qpos, *candidate_placements(self.residuals, posture)]
+        solutions = [self._solver.solve(prior, ground_from_qpos(start), posture_from_qpos(start)) for start in starts]
+        best = min(solutions, key=lambda solution: solution.cost)
+        self.residuals.evaluate(best.qpos)
+        return best
+
+    def solve_without_history(self, frame: TrackerFrame) -> IKSolution:
+        """As `solve_cold`, but from the last estimate's place alone."""
+        if not self._query.readings_suffice():
+            self._prior = None
+            return super().solve_without_history(frame)
+        self._prior = prior = self._predict(history=False)
+        return self._solver.solve(prior, ground_from_qpos(self.qpos), posture_from_qpos(self.qpos))
+
+    def predict_gap(self) -> Floats:
+        prior = self._predict(history=True)
+        posture = prior.mean + np.linalg.solve(prior.curvature, prior.linear)
+        posture[HINGES] = self.limits.clip(posture[HINGES])
+        out: Floats = qpos_from_posture(posture, self._next_ground())
+        return out
+
+    def record(self, frame: TrackerFrame, cold: bool) -> None:
+        super().record(frame, cold)
+        self._query.record()
+        if self._prior is None:
+            self.posterior = None
+            return
+        residuals, prior = self.residuals, self._prior
+        residuals.evaluate(self.qpos)
+        z = np.concatenate([ground_from_qpos(self.qpos), posture_from_qpos(self.qpos)])
+        self.posterior = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+        if not cold:
+            self._scales.update(self.posterior)
+
+    def _next_ground(self) -> Floats:
+        """Ground frame (3,) after the last two, at the same speed."""
+        newest, before = ground_from_qpos(self.past[:2])
+        step = newest - before
+        step[2] -= 2.0 * np.pi * np.round(step[2] / (2.0 * np.pi))
+        out: Floats = newest + step
+        return out
+
+    def _predict(self, history: bool) -> Subspace:
+        """The product of the experts and, far from the examples, of the prior of `ik`."""
+        options, query = self._options, self._query
+        if query.prepare(history):
+            regression = query.regression
+            if id(regression) not in self._made:
+                self._made[id(regression)] = LocalExperts(regression)
+            self._experts = self._made[id(regression)]
+        experts, scales = self._experts, self._scales
+        predictors = query.predictors(self.past)
+        to_z = experts.feature_map(self.residuals.measured, history)
+        noise = to_z.error_covariance(scales.position_sigma_m, scales.orientation_sigma_rad)
+        z = predictors @ to_z.matrix - to_z.origin
+        local = local_gaussian(experts.table, z, options.neighbours, options.width)
+        mean, covariance = condition(local, z, noise, _RIDGE)
+        mean[HINGES] = self.limits.clip(mean[HINGES])
+        widened = 1.0 + (options.widening * local.nearest / len(z)) ** 2
+        other_mean, other, weight = mean, covariance, 0.0
+        if history and options.history_weight > 0.0:
+            u = predictors[: len(experts.history_axes)] @ experts.history_axes - experts.history_origin
+            around = local_gaussian(experts.history_table, u, options.history_neighbours, _HISTORY_WIDTH)
+            other_mean, other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
+            weight = options.history_weight / math.sqrt(widened)
+        precision, linear = self._ik_terms(mean, 1.0 - 1.0 / widened)
+        factors = widened * scales.prior, weight / scales.prior
+        return _product(mean, covariance, factors[0], other_mean, other, factors[1], precision, linear)
+
+    def _ik_terms(self, mean: Floats, weight: float) -> tuple[Floats, Floats]:
+        """Precision (P,) of the prior of `ik` with a weight, and its pull (P,) away from `mean`."""
+        by_ik = self._ik_prior.prior(self.limits, self.past[0])
+        if by_ik.precision is None:
+            raise ValueError("The prior of inverse kinematics has no precision.")
+        precision, linear = np.zeros(POSTURE_SIZE), np.zeros(POSTURE_SIZE)
+        precision[HINGES] = weight * by_ik.precision[6:]
+        linear[HINGES] = precision[HINGES] * (by_ik.qpos[7:] - mean[HINGES])
+        return precision, linear
+
+
+@compiled
+def _product(
+    mean: Floats,
+    covariance: Floats,
+    factor: float,
+    other_mean: Floats,
+    other: Floats,
+    weight: float,
+    precision: Floats,
+    linear: Floats,
+) -> Subspace:
+    """The prior about `mean`: two experts, the second with a power, and independent terms of each number.
+
+    `covariance` and `other` (P, P) are overwritten.
+    """
+    size = len(mean)
+    _add_floor(covariance, 0.0)
+    covariance *= factor
+    curvature = invert_positive_definite(covariance)
+    if weight > 0.0:
+        _add_floor(other, _HISTORY_SIGMA_RAD**2)
+        inverse = invert_positive_definite(other)
+        linear = linear + weight * np.dot(inverse, other_mean - mean)
+        curvature += weight * inverse
+    for i in range(size):
+        curvature[i, i] += precision[i]
+    return Subspace(mean, np.zeros((0, size)), curvature, linear, np.zeros(size))
+
+
+@compiled
+def _add_floor(covariance: Floats, hinges: float) -> None:
+    """Add the least variances to the diagonal of a posture's covariance (P, P), and `hinges` to those of hinges."""
+    covariance[0, 0] += _LEAST_HEIGHT_M**2
+    for i in range(1, 4):
+        covariance[i, i] += _LEAST_TILT_RAD**2
+    for i in range(4, len(covariance)):
+        covariance[i, i] += _LEAST_SIGMA_RAD**2 + hinges

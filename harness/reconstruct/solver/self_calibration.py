@@ -1,0 +1,117 @@
+"""Self-calibration: the scales of the readings' noise and of the prior, estimated on line by maximum likelihood.
+
+After each solve the expected squares of the whitened residuals are compared with their number. By expectation
+maximisation (Dempster, Laird and Rubin 1977; for a filter: Shumway and Stoffer 1982) the expected square of a residual
+is its square at the solution plus the share of the posterior's variance along it. A scale then moves towards the ratio
+by a small power, so that it follows slowly.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.compiled import compiled
+from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
+from harness.reconstruct.solver.normal_equations import StationTargets, normal_equations
+from harness.reconstruct.solver.subspace import invert_positive_definite
+from harness.reconstruct.solver.subspace_minimiser import Subspace, to_subspace
+
+_MIN_DIAGONAL = 1e-6
+"""Added to the diagonal of the normal equations, for a ground frame that no reading determines."""
+_MAX_SQUARE = 30.0
+"""Limit of a whitened square, so that outliers do not count as noise."""
+_NOISE_RATE, _PRIOR_RATE = 0.1, 0.1
+"""Powers of the ratios by which the standard deviations of the noise and the prior's variance move in a frame."""
+_PRIOR_FREEDOM = 36.0
+"""Number of directions whose squares the prior's ratio is taken over: a smaller one reacts more."""
+_MIN_NOISE, _MAX_NOISE = 0.1, 1.2
+"""Limits of the standard deviations of the noise, as shares of those of the loss."""
+_MIN_PRIOR, _MAX_PRIOR = 0.7, 100.0
+"""Limits of the factor on the prior's covariance."""
+
+
+class Posterior(NamedTuple):
+    """Gaussian approximation of the posterior at a solution, and the expected squares that it implies."""
+
+    variance: Floats
+    """(P,) variance of each number of the posture."""
+    position: float
+    """Mean expected whitened square of the measured positions' components."""
+    orientation: float
+    """The same of the orientations."""
+    prior: float
+    """Expected squared Mahalanobis distance from the prior's mean, less its number of directions."""
+
+
+@compiled
+def posterior(
+    tree: KinematicTree, targets: StationTargets, state: KinematicState, prior: Subspace, z: Floats
+) -> Posterior:
+    """The posterior at a solution z (3 + P,), for which `state` is evaluated: Laplace's approximation."""
+    count, directions, size = len(tree.station_body), len(tree.depth), len(z)
+    hessian, descent = np.zeros((directions, directions)), np.empty(directions)
+    total, of_positions = np.empty((size, size)), np.empty((size, size))
+    unused = np.empty(size)
+    normal_equations(tree, state, hessian, descent)
+    to_subspace(prior, z, hessian, descent, total, unused)
+    kept = state.weight[count:].copy()
+    state.weight[count:] = 0.0
+    normal_equations(tree, state, hessian, descent)
+    to_subspace(prior, z, hessian, descent, of_positions, unused)
+    state.weight[count:] = kept
+    for i in range(size):
+        total[i, i] += _MIN_DIAGONAL
+    covariance = invert_positive_definite(total)
+    by_positions, by_prior = 0.0, 0.0
+    for i in range(size):
+        for j in range(i + 1):
+            share = covariance[i, j] if i == j else 2.0 * covariance[i, j]
+            by_positions += share * of_positions[i, j]
+            if j >= 3:
+                by_prior += share * prior.curvature[i - 3, j - 3]
+    by_positions -= by_prior
+    by_orientations = size - by_positions - by_prior
+    squares, rows = np.zeros(2), np.zeros(2)
+    for row in range(2 * count):
+        precision = targets.precision[row]
+        if precision > 0.0:
+            kind = 0 if row < count else 1
+            squares[kind] += min(precision * state.squared[row], _MAX_SQUARE)
+            rows[kind] += 3.0
+    offset = z[3:] - prior.mean
+    pull = np.dot(prior.curvature, offset) - prior.linear
+    away = np.dot(offset, pull) - np.dot(offset, prior.linear)
+    variance = np.empty(size - 3)
+    for i in range(3, size):
+        variance[i - 3] = covariance[i, i]
+    return Posterior(
+        variance,
+        (squares[0] + by_positions) / max(rows[0], 1.0) if rows[0] > 0.0 else 1.0,
+        (squares[1] + by_orientations) / max(rows[1], 1.0) if rows[1] > 0.0 else 1.0,
+        away + by_prior - (size - 3),
+    )
+
+
+class SelfCalibration:
+    """Scales of one session."""
+
+    def __init__(self, position_sigma_m: float, orientation_sigma_rad: float) -> None:
+        self._nominal = position_sigma_m, orientation_sigma_rad
+        self.position_sigma_m, self.orientation_sigma_rad = self._nominal
+        """Standard deviations of the readings [m], [rad]."""
+        self.prior = 1.0
+        """Factor on the prior's covariance."""
+
+    def update(self, found: Posterior) -> None:
+        """Take the posterior of one frame."""
+        position_m, orientation_rad = self._nominal
+        self.position_sigma_m = _moved(self.position_sigma_m, found.position, position_m)
+        self.orientation_sigma_rad = _moved(self.orientation_sigma_rad, found.orientation, orientation_rad)
+        ratio = max(found.prior / _PRIOR_FREEDOM + 1.0, 1e-3)
+        self.prior = min(max(self.prior * math.pow(ratio, _PRIOR_RATE), _MIN_PRIOR), _MAX_PRIOR)
+
+
+def _moved(sigma: float, ratio: float, nominal: float) -> float:
+    return min(max(sigma * math.pow(max(ratio, 1e-3), _NOISE_RATE), _MIN_NOISE * nominal), _MAX_NOISE * nominal)
