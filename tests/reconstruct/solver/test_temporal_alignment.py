@@ -99,7 +99,7 @@ def test_uniform_motion_is_brought_to_one_instant(walk: Scene, rng: np.random.Ge
 
 
 def test_a_parabola_is_interpolated_and_a_mean_velocity_extrapolated(walk: Scene, rng: np.random.Generator) -> None:
-    """The mean velocity is that of one period T ago: a time x after the last reading, x (x + 2 T) p'' / 2 is missing."""
+    """The mean velocity is that of a period T ago: x after the last reading, x (x + 2 T) p'' / 2 is missing."""
     motion = Motion(rng, degree=2)
     found, wanted = align(walk, motion.frames(3))[2], read(walk, motion.at_one_instant(2))
     assert_same_pose(found, wanted, AFTER)
