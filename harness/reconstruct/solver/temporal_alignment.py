@@ -39,7 +39,7 @@ class AlignmentHistory(NamedTuple):
     """The last readings of S stations, as measured."""
 
     slot_s: Floats
-    """(S,) sampling time of each station relative to the frame's instant; NaN before its first record [s]."""
+    """(S,) sampling time of each station, relative to any time that all share; NaN before its first record [s]."""
     last_s: Floats
     """(S,) time of the last record [s]."""
     before_s: Floats
@@ -179,10 +179,7 @@ def _find_instant(measured_s: Floats, suspect: Bools, slot_s: Floats) -> float:
             slot_s[s] = measured_s[s] - instant_s
         if not np.isnan(slot_s[s]):
             centre_s, known = centre_s + slot_s[s], known + 1
-    centre_s /= known
-    for s in range(len(measured_s)):
-        slot_s[s] -= centre_s
-    return instant_s + centre_s
+    return instant_s + centre_s / known
 
 
 @compiled

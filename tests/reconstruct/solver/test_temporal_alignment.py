@@ -114,6 +114,36 @@ def test_with_the_following_frame_every_parabola_is_interpolated(walk: Scene, rn
         assert_same_pose(found, read(walk, motion.at_one_instant(index)), EVERY)
 
 
+def test_with_the_following_frame_orientations_are_interpolated(walk: Scene, rng: np.random.Generator) -> None:
+    """Towards the neighbour on the side of the instant, by the share of the step between the two."""
+    frames = Motion(rng, degree=0).frames(4)
+    turns = [rotations.exp(rng.normal(0.0, 0.1, (6, 3))) for _ in frames]
+    frames = [
+        replace(f, tracker_from_station=rotations.multiply(turn, f.tracker_from_station))
+        for f, turn in zip(frames, turns, strict=True)
+    ]
+    measured = [read(walk, frame)[1] for frame in frames]
+    neighbour = np.where(BEFORE[:, None], measured[3], measured[1])
+    step = rotations.log(rotations.multiply(neighbour, rotations.inverse(measured[2])))
+    wanted = rotations.multiply(rotations.exp(np.abs(SLOT_S)[:, None] / PERIOD_S * step), measured[2])
+    found = align(walk, frames, lookahead=True)[2][1]
+    assert rotations.angle_between_rad(found, wanted).max() < 1e-9
+
+
+def test_a_station_at_rest_stays_as_it_is(walk: Scene, rng: np.random.Generator) -> None:
+    still = Motion(rng, degree=0)
+    still.rate_rad_s[:] = 0.0
+    frames = still.frames(4)
+    for frame, (target_m, world_from_target) in zip(frames, align(walk, frames), strict=True):
+        np.testing.assert_array_equal(target_m, read(walk, frame)[0])
+        np.testing.assert_array_equal(world_from_target, read(walk, frame)[1])
+
+
+def test_what_counts_as_motion_is_documented() -> None:
+    """docs/methods.md, temporal alignment."""
+    assert (MAX_STEP_S, MAX_BEND_M, MAX_TURN_RAD) == (0.04, 0.06, 0.6)
+
+
 def test_uneven_periods_are_as_exact(walk: Scene, rng: np.random.Generator) -> None:
     motion, start_s = Motion(rng, degree=1), np.cumsum([0.0, 0.02, 0.035, 0.013, 0.03])
     found = align(walk, [motion.frame(t + SLOT_S) for t in start_s])
