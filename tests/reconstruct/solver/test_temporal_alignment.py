@@ -130,6 +130,25 @@ def test_with_the_following_frame_orientations_are_interpolated(walk: Scene, rng
     assert rotations.angle_between_rad(found, wanted).max() < 1e-9
 
 
+def test_a_station_that_the_following_frame_lacks_is_extrapolated(walk: Scene, rng: np.random.Generator) -> None:
+    frames = Motion(rng, degree=2).frames(4)
+    causal, ahead = align(walk, frames)[2], align(walk, frames, lookahead=True)[2]
+    frames[3] = drop_stations(frames[3], [1])
+    found, without = align(walk, frames, lookahead=True)[2], np.arange(6) == 1
+    for array, at_once, later in zip(found, causal, ahead, strict=True):
+        np.testing.assert_array_equal(array, np.where(without[:, None], at_once, later))
+    assert not (causal[0] == ahead[0])[BEFORE].any()
+
+
+def test_stations_that_never_report_together_are_aligned_among_themselves(
+    walk: Scene, rng: np.random.Generator
+) -> None:
+    motion = Motion(rng, degree=1)
+    frames = [drop_stations(f, [3, 4, 5] if i == 0 else [0, 1, 2]) for i, f in enumerate(motion.frames(4))]
+    theirs = motion.frame(np.full(6, 7.0 + PERIOD_S * 3 + SLOT_S[3:].mean()))
+    assert_same_pose(align(walk, frames)[3], read(walk, theirs), np.arange(6) > 2)
+
+
 def test_a_station_at_rest_stays_as_it_is(walk: Scene, rng: np.random.Generator) -> None:
     still = Motion(rng, degree=0)
     still.rate_rad_s[:] = 0.0
