@@ -39,7 +39,7 @@ class AlignmentHistory(NamedTuple):
     """The last readings of S stations, as measured."""
 
     slot_s: Floats
-    """(S,) sampling time of each station relative to the frame's instant; NaN before its first record [s]."""
+    """(S,) sampling time of each station, relative to any time that all share; NaN before its first record [s]."""
     last_s: Floats
     """(S,) time of the last record [s]."""
     before_s: Floats
@@ -179,47 +179,33 @@ def _find_instant(measured_s: Floats, suspect: Bools, slot_s: Floats) -> float:
             slot_s[s] = measured_s[s] - instant_s
         if not np.isnan(slot_s[s]):
             centre_s, known = centre_s + slot_s[s], known + 1
-    centre_s /= known
-    for s in range(len(measured_s)):
-        slot_s[s] -= centre_s
-    return instant_s + centre_s
+    return instant_s + centre_s / known
 
 
 @compiled
 def _move_position(
     reading_m: Floats, s: int, now_s: float, shift_s: float, following: FollowingReadings, history: AlignmentHistory
 ) -> None:
-    """Move a position (3,) of station s by a time, where its neighbours in time make one motion of it."""
-    step_s, earlier_s = now_s - history.last_s[s], history.last_s[s] - history.before_s[s]
+    """Move a position (3,) of station s by a time, where it makes one motion with two others of the station."""
     later_s = following.measured_s[s] - now_s
-    if following.measured[s] and history.positions[s] >= 1 and 0.0 < later_s <= MAX_STEP_S:
-        later_m, last_m = following.target_m[s], history.last_m[s]
-        bend_m = 0.0
-        for i in range(3):
-            change = (later_m[i] - reading_m[i]) / later_s - (reading_m[i] - last_m[i]) / step_s
-            bend_m += (step_s * change) ** 2
-        if bend_m > MAX_BEND_M**2:
-            return
-        for i in range(3):
-            velocity, before = (later_m[i] - reading_m[i]) / later_s, (reading_m[i] - last_m[i]) / step_s
-            curvature = (velocity - before) / (later_s + step_s)
-            reading_m[i] += shift_s * (velocity + (shift_s - later_s) * curvature)
+    ahead = following.measured[s] and 0.0 < later_s <= MAX_STEP_S
+    if history.positions[s] < (1 if ahead else 2):
         return
-    if history.positions[s] < 2:
-        return
-    last_m, before_m = history.last_m[s], history.before_m[s]
+    step_s = now_s - history.last_s[s]
+    other_s = later_s if ahead else history.last_s[s] - history.before_s[s]
+    last_m, before_m, later_m = history.last_m[s], history.before_m[s], following.target_m[s]
     bend_m = 0.0
     for i in range(3):
-        change = (reading_m[i] - last_m[i]) / step_s - (last_m[i] - before_m[i]) / earlier_s
-        bend_m += (step_s * change) ** 2
+        other = (later_m[i] - reading_m[i] if ahead else last_m[i] - before_m[i]) / other_s
+        bend_m += (other * step_s - (reading_m[i] - last_m[i])) ** 2
     if bend_m > MAX_BEND_M**2:
         return
+    lever_s = shift_s + step_s if ahead or shift_s < 0.0 else -other_s  # a parabola, or the mean velocity of two steps
     for i in range(3):
-        slope = (reading_m[i] - before_m[i]) / (step_s + earlier_s)
-        if shift_s < 0.0:
-            velocity, before = (reading_m[i] - last_m[i]) / step_s, (last_m[i] - before_m[i]) / earlier_s
-            slope = velocity + (shift_s + step_s) * (velocity - before) / (step_s + earlier_s)
-        reading_m[i] += shift_s * slope
+        velocity = (reading_m[i] - last_m[i]) / step_s
+        other = (later_m[i] - reading_m[i] if ahead else last_m[i] - before_m[i]) / other_s
+        curvature = (other - velocity if ahead else velocity - other) / (step_s + other_s)
+        reading_m[i] += shift_s * (velocity + lever_s * curvature)
 
 
 @compiled

@@ -99,7 +99,7 @@ def test_uniform_motion_is_brought_to_one_instant(walk: Scene, rng: np.random.Ge
 
 
 def test_a_parabola_is_interpolated_and_a_mean_velocity_extrapolated(walk: Scene, rng: np.random.Generator) -> None:
-    """The mean velocity is that of one period T ago: a time x after the last reading, x (x + 2 T) p'' / 2 is missing."""
+    """The mean velocity is that of a period T ago: x after the last reading, x (x + 2 T) p'' / 2 is missing."""
     motion = Motion(rng, degree=2)
     found, wanted = align(walk, motion.frames(3))[2], read(walk, motion.at_one_instant(2))
     assert_same_pose(found, wanted, AFTER)
@@ -112,6 +112,55 @@ def test_with_the_following_frame_every_parabola_is_interpolated(walk: Scene, rn
     motion = Motion(rng, degree=2)
     for index, found in list(enumerate(align(walk, motion.frames(6), lookahead=True)))[1:]:
         assert_same_pose(found, read(walk, motion.at_one_instant(index)), EVERY)
+
+
+def test_with_the_following_frame_orientations_are_interpolated(walk: Scene, rng: np.random.Generator) -> None:
+    """Towards the neighbour on the side of the instant, by the share of the step between the two."""
+    frames = Motion(rng, degree=0).frames(4)
+    turns = [rotations.exp(rng.normal(0.0, 0.1, (6, 3))) for _ in frames]
+    frames = [
+        replace(f, tracker_from_station=rotations.multiply(turn, f.tracker_from_station))
+        for f, turn in zip(frames, turns, strict=True)
+    ]
+    measured = [read(walk, frame)[1] for frame in frames]
+    neighbour = np.where(BEFORE[:, None], measured[3], measured[1])
+    step = rotations.log(rotations.multiply(neighbour, rotations.inverse(measured[2])))
+    wanted = rotations.multiply(rotations.exp(np.abs(SLOT_S)[:, None] / PERIOD_S * step), measured[2])
+    found = align(walk, frames, lookahead=True)[2][1]
+    assert rotations.angle_between_rad(found, wanted).max() < 1e-9
+
+
+def test_a_station_that_the_following_frame_lacks_is_extrapolated(walk: Scene, rng: np.random.Generator) -> None:
+    frames = Motion(rng, degree=2).frames(4)
+    causal, ahead = align(walk, frames)[2], align(walk, frames, lookahead=True)[2]
+    frames[3] = drop_stations(frames[3], [1])
+    found, without = align(walk, frames, lookahead=True)[2], np.arange(6) == 1
+    for array, at_once, later in zip(found, causal, ahead, strict=True):
+        np.testing.assert_array_equal(array, np.where(without[:, None], at_once, later))
+    assert not (causal[0] == ahead[0])[BEFORE].any()
+
+
+def test_stations_that_never_report_together_are_aligned_among_themselves(
+    walk: Scene, rng: np.random.Generator
+) -> None:
+    motion = Motion(rng, degree=1)
+    frames = [drop_stations(f, [3, 4, 5] if i == 0 else [0, 1, 2]) for i, f in enumerate(motion.frames(4))]
+    theirs = motion.frame(np.full(6, 7.0 + PERIOD_S * 3 + SLOT_S[3:].mean()))
+    assert_same_pose(align(walk, frames)[3], read(walk, theirs), np.arange(6) > 2)
+
+
+def test_a_station_at_rest_stays_as_it_is(walk: Scene, rng: np.random.Generator) -> None:
+    still = Motion(rng, degree=0)
+    still.rate_rad_s[:] = 0.0
+    frames = still.frames(4)
+    for frame, (target_m, world_from_target) in zip(frames, align(walk, frames), strict=True):
+        np.testing.assert_array_equal(target_m, read(walk, frame)[0])
+        np.testing.assert_array_equal(world_from_target, read(walk, frame)[1])
+
+
+def test_what_counts_as_motion_is_documented() -> None:
+    """docs/methods.md, temporal alignment."""
+    assert (MAX_STEP_S, MAX_BEND_M, MAX_TURN_RAD) == (0.04, 0.06, 0.6)
 
 
 def test_uneven_periods_are_as_exact(walk: Scene, rng: np.random.Generator) -> None:
