@@ -58,7 +58,10 @@ class AccuracyReport:
     quick: bool
     failures: Mapping[str, str]
     """Cell -> why it has no result; with any, nothing below is evaluated."""
+    stored: ErrorsByCondition = field(default_factory=dict)
+    """The stored errors of the measured seeds."""
     by_method: Mapping[str, ErrorsByCondition] = field(default_factory=dict)
+    """Method -> today's errors."""
     targets: Sequence[TargetResult] = ()
     lag: LagResult | None = None
     no_lag: str = ""
@@ -133,6 +136,7 @@ def measure_accuracy(
         stored.title,
         quick,
         results.failures,
+        earlier,
         by_method,
         evaluate_targets(earlier, by_method[method]),
         evaluate_lag(with_lag(method), lag) if lag else None,

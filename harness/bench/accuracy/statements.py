@@ -105,7 +105,7 @@ def find_worse_clips(
 
     All conditions count; where a station is silent, the errors meanwhile. The clips with the largest ratios come first.
     """
-    others = {stored_title: stored} | {name: by_method[name] for name in LIMITING_METHODS if name != method}
+    others = {stored_title: stored} | {name: by_method[name] for name in LIMITING_METHODS}
     found = []
     for condition, by_clip in by_method[method].items():
         for clip, errors in by_clip.items():

@@ -11,6 +11,7 @@ from harness.bench.accuracy.statements import LARGEST_RATIO
 from harness.bench.accuracy.targets import (
     GOAL_JITTER,
     GOAL_SKATE_MM_S,
+    LAGGED_CONDITION,
     LEAST_JITTER,
     LEAST_SKATE_MM_S,
     LagResult,
@@ -57,22 +58,23 @@ def _lag_text(report: AccuracyReport) -> str:
         return f"two frames of lag: not measured ({report.no_lag})"
     lag: LagResult = report.lag
     low, high = (f"{a:g} to {b:g}" for a, b in (LEAST_JITTER, GOAL_JITTER))
-    head = ["two frames of lag, boxing default", "today", "truth", "at least", "goal", "met"]
-    jitter = ["jitter over truth's", format_fixed(lag.jitter_ratio, 2), "1", low, high, lag.jitter_met]
-    skate = [f"{value:.0f}" for value in (lag.skate_mm_s, lag.true_skate_mm_s, LEAST_SKATE_MM_S, GOAL_SKATE_MM_S)]
+    head = ["two frames of lag, boxing default", report.stored_title, "today", "truth", "at least", "goal", "met"]
+    _, ratio, skate_mm_s, _ = _motion_cells(report.stored, LAGGED_CONDITION)
+    jitter = ["jitter over truth's", ratio, format_fixed(lag.jitter_ratio, 2), "1", low, high, lag.jitter_met]
+    values = (lag.skate_mm_s, lag.true_skate_mm_s, LEAST_SKATE_MM_S, GOAL_SKATE_MM_S)
+    skate = [skate_mm_s, *(f"{value:.0f}" for value in values)]
     rows = [jitter, ["foot skate [mm/s]", *skate, lag.skate_met]]
     note = f"{lag.method}: joint angle {lag.angle_deg:.2f} deg at the frames that it answers"
     return "\n".join((*Table(head, rows).lines(), note))
 
 
 def _motion_table(report: AccuracyReport) -> Table:
-    """Position, jitter over the truth's, and foot skate by condition, for the method and `dynamic_map` of today."""
+    """Position, jitter over the truth's, and foot skate by condition, of the stored errors and of today's."""
     head = ["condition", "method", "position [mm]", "jitter/truth", "foot skate [mm/s]", "truth's"]
-    names = dict.fromkeys((report.method, "dynamic_map"))
+    today = report.by_method[report.method]
+    sides = {report.stored_title: report.stored, report.method: today}
     rows = [
-        [condition, name, *_motion_cells(report.by_method.get(name, {}), condition)]
-        for condition in report.by_method[report.method]
-        for name in names
+        [condition, name, *_motion_cells(errors, condition)] for condition in today for name, errors in sides.items()
     ]
     return Table(head, rows, text_columns=2)
 

@@ -13,7 +13,7 @@ from harness.bench.accuracy.clip_errors import ANGLE, SILENT_ANGLE, ErrorsByCond
 from harness.bench.accuracy.conditions import SEEDS
 from harness.bench.accuracy.measurement import AccuracyReport, collect_errors, measure_accuracy
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
-from harness.bench.accuracy.targets import evaluate_targets
+from harness.bench.accuracy.targets import LagResult, evaluate_targets
 from harness.bench.accuracy.text import format_report, report_content
 from harness.cli import main
 from harness.errors import BadInput, Outcome
@@ -36,6 +36,7 @@ def report(ours: ErrorsByCondition, others: ErrorsByCondition, earlier: ErrorsBy
         "stored",
         False,
         {},
+        earlier,
         by_method,
         evaluate_targets(earlier, ours),
         None,
@@ -128,6 +129,19 @@ def test_a_worse_clip_is_listed() -> None:
     assert len(content["targets"]) == 16
 
 
+def test_the_text_has_both_sides_of_every_condition_and_of_the_lag() -> None:
+    found = report(errors(0.5), errors(1.0), errors(1.0))
+    lag = LagResult("ours[lag=2]", ("a",), 1.15, 128.0, 78.0, 1.2)
+    text = format_report(replace(found, lag=lag, stored_title="old"))
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    assert "boxing, default old 2.0 0.75 5 6" in lines  # multiples of 1.01: mm, jitter's ratio, skate, the truth's
+    assert "boxing, default ours 1.0 0.75 3 3" in lines
+    assert "jitter over truth's 0.75 1.15 1 0.8 to 1.2 0.9 to 1.1 at least" in lines
+    assert "foot skate [mm/s] 5 128 78 180 130 goal" in lines
+    assert replace(found, lag=lag).outcome is Outcome.PASS
+    assert replace(found, lag=replace(lag, skate_mm_s=181.0)).outcome is Outcome.REGRESSED
+
+
 def test_failed_cells_leave_the_run_incomplete() -> None:
     found = AccuracyReport("ours", "stored", False, {"ours on a": "Traceback\nValueError: seven"})
     assert found.outcome is Outcome.INCOMPLETE
@@ -173,9 +187,15 @@ def test_flags_that_do_not_fit_are_refused(words: list[str], named: str, capsys:
     [({"commit": None, "dirty": None}, "no checkout"), ({"commit": "ab", "dirty": True}, "differs from its commit")],
 )
 def test_errors_of_code_without_a_commit_are_not_saved(
-    code: dict[str, object], named: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    code: dict[str, object],
+    named: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measurement, "current_circumstances", lambda: code)
+    monkeypatch.delenv("HARNESS_MOCAP", raising=False)
     words = ["bench", "accuracy", "--baseline", str(BASELINE), "--save", "never.json"]
     assert main(words) == Outcome.REFUSED.exit_code
     assert named in capsys.readouterr().err
