@@ -1,21 +1,46 @@
-"""The verb `bench`: measure speed."""
+"""The verb `bench`: measure speed, or the accuracy of a method against stored errors."""
 
 import argparse
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
 from harness.core.progress import ProgressBar
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
+
+ACCURACY = "accuracy"
+"""Name of the benchmark of accuracy, which runs alone."""
+_ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick")
 
 
 def add_bench(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "bench", "measure speed on this machine: medians and ratios", run_bench, "seed")
-    text = "methods, ik, index, wire, stream, load, gate, sweep, startup (default: all)"
+    text = "measure speed on this machine, or a method's accuracy against stored errors"
+    verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
+    text = "methods, ik, index, wire, stream, load, gate, sweep, startup (default: all), or accuracy"
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
+    verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default dynamic_map)")
+    verb.add_argument("--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5)")
+    text = "accuracy: clips computed at the same time (default 1)"
+    verb.add_argument("--jobs", type=positive_int, metavar="N", help=text)
+    text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
+    verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")
+    text = "accuracy: one seed, three clips, no verdict"
+    verb.add_argument("--quick", action="store_true", default=None, help=text)
 
 
 def run_bench(args: argparse.Namespace) -> Outcome:
+    if ACCURACY in args.what:
+        return _bench_accuracy(args)
+    if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
+        raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
+    return _bench_speed(args)
+
+
+def _bench_speed(args: argparse.Namespace) -> Outcome:
     from harness.bench.benchmarks import run_benchmarks
     from harness.bench.rows import format_rows
 
@@ -26,3 +51,42 @@ def run_bench(args: argparse.Namespace) -> Outcome:
     return print_result(
         args, content, format_rows(rows), *left_out, outcome=Outcome.INCOMPLETE if left_out else Outcome.PASS
     )
+
+
+def _bench_accuracy(args: argparse.Namespace) -> Outcome:
+    from harness.bench.accuracy.clip_errors import DEFAULT_BASELINE, StoredErrors, read_errors, write_errors
+    from harness.bench.accuracy.conditions import DEFAULT_METHOD, SEEDS
+    from harness.bench.accuracy.measurement import clean_commit, measure_accuracy
+    from harness.bench.accuracy.text import format_report, report_content
+    from harness.experiment.executors import process_executor
+
+    if args.what != [ACCURACY] or args.large or args.seed is not None:
+        raise BadInput("accuracy runs alone, without --large and --seed.", "Give --seeds N for the first N seeds.")
+    if args.quick and (args.save or args.seeds):
+        raise BadInput("--quick has one seed and few clips.", "Leave out --save and --seeds, or leave out --quick.")
+    jobs, seeds, out = args.jobs or 1, SEEDS[: args.seeds], args.out or Path("results") / ACCURACY
+    if args.seeds and args.seeds > len(SEEDS):
+        raise BadInput(f"--seeds {args.seeds}: there are {len(SEEDS)} seeds.", "Name fewer.")
+    commit = clean_commit() if args.save else ""
+    stored, method = read_errors(args.baseline or DEFAULT_BASELINE), args.method or DEFAULT_METHOD
+    with (
+        progress_note(out),
+        ProgressBar("cells") as bar,
+        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
+        process_executor(jobs) as executor,
+    ):
+        report = measure_accuracy(
+            method,
+            stored,
+            out,
+            seeds=seeds,
+            quick=bool(args.quick),
+            folder=args.mocap,
+            executor=executor,
+            workers=jobs,
+            command=this_command(),
+            progress=bar,
+        )
+    if args.save and not report.failures:
+        write_errors(args.save, StoredErrors(method, commit, seeds, report.by_method[method]))
+    return print_result(args, report_content(report), format_report(report), outcome=report.outcome)

@@ -1,0 +1,220 @@
+"""Run the cells of the accuracy benchmark, and collect their errors by method, condition, clip and seed."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.bench.accuracy.clip_errors import (
+    ANGLE,
+    CELL_METRICS,
+    SILENT_ANGLE,
+    ClipErrors,
+    ErrorsByCondition,
+    StoredErrors,
+)
+from harness.bench.accuracy.conditions import (
+    CONDITIONS,
+    SEEDS,
+    Condition,
+    plan_lagged,
+    plan_scenarios,
+    quick_conditions,
+    refuse_lag,
+    with_lag,
+)
+from harness.bench.accuracy.statements import (
+    PairedStatement,
+    WorseClip,
+    compare_methods,
+    find_worse_clips,
+    rank_pooled,
+)
+from harness.bench.accuracy.targets import LAGGED_CONDITION, LagResult, TargetResult, evaluate_lag, evaluate_targets
+from harness.compare.ranking import MethodRanking
+from harness.errors import BadInput, Outcome, UnknownName
+from harness.experiment.cells import ProgressCallback, check_names, clear_caches
+from harness.experiment.engine import run_cells
+from harness.experiment.executors import TaskExecutor
+from harness.experiment.isolation import DEFAULT_ISOLATION
+from harness.experiment.remote_method import close_methods, resolve_method
+from harness.experiment.scenario import Scenario
+from harness.mocap.library import LibraryFolders
+from harness.results.cell import cell_folder, read_cell
+from harness.results.lock import folder_lock
+from harness.results.manifest import current_circumstances
+from harness.study.papers.paper_study import open_study
+
+
+@dataclass(frozen=True)
+class AccuracyReport:
+    """What one run of the benchmark measured."""
+
+    method: str
+    stored_title: str
+    """Name of the stored errors, such as "dynamic_map of 40f3d61"."""
+    quick: bool
+    failures: Mapping[str, str]
+    """Cell -> why it has no result; with any, nothing below is evaluated."""
+    stored: ErrorsByCondition = field(default_factory=dict)
+    """The stored errors of the measured seeds."""
+    by_method: Mapping[str, ErrorsByCondition] = field(default_factory=dict)
+    """Method -> today's errors."""
+    targets: Sequence[TargetResult] = ()
+    lag: LagResult | None = None
+    no_lag: str = ""
+    """Why there are no cells with a lag; "" where there are."""
+    statements: Sequence[PairedStatement] = ()
+    rankings: Mapping[tuple[str, str], MethodRanking] = field(default_factory=dict)
+    worse_clips: Sequence[WorseClip] = ()
+
+    @property
+    def outcome(self) -> Outcome:
+        """INCOMPLETE when a cell failed, REGRESSED when a target or a statement is not met, else PASS.
+
+        The quick form has too few clips for a verdict and passes.
+        """
+        if self.failures:
+            return Outcome.INCOMPLETE
+        met = [result.met != "no" for result in self.targets] + [statement.holds for statement in self.statements]
+        if self.lag is not None:
+            met += [self.lag.jitter_met != "no", self.lag.skate_met != "no"]
+        return Outcome.PASS if self.quick or (all(met) and not self.worse_clips) else Outcome.REGRESSED
+
+
+def measure_accuracy(
+    method: str,
+    stored: StoredErrors,
+    out: Path,
+    *,
+    seeds: Sequence[int] = SEEDS,
+    quick: bool = False,
+    folder: LibraryFolders | None = None,
+    executor: TaskExecutor,
+    workers: int = 1,
+    command: str = "",
+    progress: ProgressCallback = lambda cell, done, planned: None,
+) -> AccuracyReport:
+    """Run or resume the cells in `out`, and compare `method` with the stored errors and today's other methods.
+
+    `folder` is the library of real motion, by default HARNESS_MOCAP. BadInput without one, for a method with a lag,
+    for a folder that holds something else, and when clips or seeds differ from the stored ones.
+    """
+    refuse_lag(method)
+    seeds = seeds[:1] if quick else seeds
+    earlier = stored.first_seeds(seeds)
+    clear_caches()  # files may have changed since the last run
+    try:
+        conditions = quick_conditions() if quick else CONDITIONS
+        scenarios = plan_scenarios(conditions, method, seeds, quick=quick)
+        lagged, no_lag = _plan_supported_lag(method, seeds, quick)
+        check_names([*scenarios, *lagged], folder)
+        open_study(out, {"benchmark": "accuracy"})
+        with folder_lock(out):
+            (out / "cells").mkdir(exist_ok=True)
+            results = run_cells(
+                [*scenarios, *lagged],
+                out,
+                folder=folder,
+                executor=executor,
+                command=command,
+                progress=progress,
+                workers=workers,
+            )
+            if results.failures:
+                return AccuracyReport(method, stored.title, quick, results.failures)
+            by_method = collect_errors(results.rows, out)
+    finally:
+        close_methods()
+    lag = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
+    if quick:
+        earlier = _same_clips(earlier, by_method[method])
+    return AccuracyReport(
+        method,
+        stored.title,
+        quick,
+        results.failures,
+        earlier,
+        by_method,
+        evaluate_targets(earlier, by_method[method]),
+        evaluate_lag(with_lag(method), lag) if lag else None,
+        no_lag,
+        compare_methods(method, by_method),
+        rank_pooled(by_method),
+        find_worse_clips(method, by_method, stored.title, earlier),
+    )
+
+
+def clean_commit() -> str:
+    """The commit of the running code, 40 hex digits; BadInput outside a checkout and with changes that it lacks."""
+    code = current_circumstances()
+    if not code["commit"] or code["dirty"]:
+        found = "The code differs from its commit." if code["commit"] else "The code is in no checkout of git."
+        raise BadInput(found, "Stored errors name their commit: commit first, or leave out --save.")
+    return str(code["commit"])
+
+
+def _plan_supported_lag(method: str, seeds: Sequence[int], quick: bool) -> tuple[list[Scenario], str]:
+    """The scenarios with a fixed lag; none, and why, for a method without that option."""
+    resolve_method(method, DEFAULT_ISOLATION)
+    try:
+        resolve_method(with_lag(method), DEFAULT_ISOLATION)
+    except (UnknownName, BadInput):
+        return [], f"{method} has no option lag"
+    return plan_lagged(method, seeds, quick=quick), ""
+
+
+def _same_clips(errors: ErrorsByCondition, like: ErrorsByCondition) -> ErrorsByCondition:
+    """The errors of the conditions and clips that `like` has."""
+    return {
+        condition: {clip: e for clip, e in errors.get(condition, {}).items() if clip in by_clip}
+        for condition, by_clip in like.items()
+    }
+
+
+def collect_errors(rows: Iterable[Mapping[str, Any]], out: Path) -> dict[str, ErrorsByCondition]:
+    """Method -> errors of finished cells, whose frames in `out` are read where a station is silent.
+
+    BadInput for a cell whose joint angle error was not measured.
+    """
+    collected: dict[str, dict[str, dict[str, list[Mapping[str, Any]]]]] = {}
+    for row in rows:
+        if row[ANGLE] is None:
+            raise BadInput(f"{row['method']} on {row['clip']} answered too few frames to measure.", "")
+        condition = str(condition_of(row))
+        by_clip = collected.setdefault(row["method"], {}).setdefault(condition, {})
+        by_clip.setdefault(row["clip"], []).append(row)
+    return {
+        method: {
+            condition: {clip: _clip_errors(cells, out) for clip, cells in by_clip.items()}
+            for condition, by_clip in by_condition.items()
+        }
+        for method, by_condition in collected.items()
+    }
+
+
+def condition_of(row: Mapping[str, Any]) -> Condition:
+    """The condition of a cell's row; cells with a lag have the condition of those without."""
+    scenario = "boxing" if row["scenario"] == "boxing_lagged" else row["scenario"]
+    return Condition(scenario, row["noise"], row["inputs"], row["varied"].get("disturbance.station", ""))
+
+
+def _clip_errors(rows: Sequence[Mapping[str, Any]], out: Path) -> ClipErrors:
+    rows = sorted(rows, key=lambda row: int(row["seed"]))
+    by_metric: dict[str, tuple[float | None, ...]] = {name: tuple(row[name] for row in rows) for name in CELL_METRICS}
+    if "disturbance.station" in rows[0]["varied"]:
+        by_metric[SILENT_ANGLE] = tuple(_silent_angle_deg(cell_folder(out, row["key"])) for row in rows)
+    return ClipErrors(rows[0]["behaviour"], rows[0]["performer"], by_metric)
+
+
+def _silent_angle_deg(folder: Path) -> float:
+    """Mean joint angle error of a cell's frames within its disturbance [deg]; BadInput without such frames."""
+    cell = read_cell(folder)
+    limits = cell.defined_by["disturbance"]
+    during = (cell.time_s > limits["begins_s"] - 1e-9) & (cell.time_s < limits["ends_s"] - 1e-9)
+    values = cell.errors[ANGLE][during & cell.scores.scored]
+    if not len(values) or not np.isfinite(values).all():
+        raise BadInput(f"{cell.method} on {cell.clip} has no errors while a station is silent.", "")
+    return float(values.mean())

@@ -1,0 +1,66 @@
+"""Pooled clips, paired verdicts and the list of clips that became worse, on planted errors."""
+
+import pytest
+
+from harness.bench.accuracy.conditions import COMPARED_METHODS
+from harness.bench.accuracy.statements import compare_methods, find_worse_clips, pool_clips, rank_pooled
+from tests.bench.accuracy.planted import errors
+
+
+def test_known_and_new_performers_are_pooled_apart() -> None:
+    known = pool_clips(errors(1.0), "default", "known")
+    assert len(known) == 4 * 3
+    assert not any("new_1" in clip or clip.startswith(("boxing_inputs", "recovery")) for clip in known)
+    assert known["walking_known_2"] == pytest.approx(1.02)
+    assert pool_clips(errors(1.0), "default", "new").keys().isdisjoint(known)
+
+
+def test_the_verdict_of_every_statement() -> None:
+    by_method = {"ours": errors(1.0), "ik": errors(2.0), "local_pca": errors(1.0), "kernel_cca": errors(0.5)}
+    found = compare_methods("ours", by_method)
+    assert len(found) == 2 * 3 * 3  # dynamic_map was not measured
+    for statement in found:
+        expected = {"ik": "better", "local_pca": "cannot tell", "kernel_cca": "worse"}[statement.other]
+        assert statement.verdict == expected
+        assert statement.holds == (expected == "better" or (expected == "cannot tell" and statement.performer == "new"))
+        assert statement.difference.mean == pytest.approx(statement.other_mean_deg - statement.mean_deg)
+
+
+def test_a_method_is_not_compared_with_itself() -> None:
+    by_method = dict.fromkeys(COMPARED_METHODS, errors(1.0))
+    assert {s.other for s in compare_methods("dynamic_map", by_method)} == {"local_pca", "kernel_cca", "ik"}
+    assert {s.other for s in compare_methods("ours", {**by_method, "ours": errors(1.0)})} == set(COMPARED_METHODS)
+
+
+def test_the_ranking_has_the_lowest_mean_first() -> None:
+    rankings = rank_pooled({"ours": errors(1.0), "ik": errors(2.0), "local_pca": errors(1.5)})
+    assert len(rankings) == 6
+    for ranking in rankings.values():
+        assert list(ranking.means) == ["ours", "local_pca", "ik"]
+        assert ranking.best == "ours"
+
+
+def test_only_more_than_5_percent_is_worse() -> None:
+    place = ("walking, noise", "walking_new_0")
+    ours = errors(1.0, changed={place: 1.0501})
+    by_method = {"ours": ours, "dynamic_map": errors(1.0), "ik": errors(1.0, changed={place: 1.001})}
+    (worse,) = find_worse_clips("ours", by_method, "stored", errors(1.2))
+    assert (worse.condition, worse.clip, worse.other) == (*place, "dynamic_map")
+    assert worse.ratio == pytest.approx(1.0501)
+    by_method["ours"] = errors(1.0, changed={place: 1.0499})
+    assert not find_worse_clips("ours", by_method, "stored", errors(1.2))
+
+
+def test_stored_errors_and_other_conditions_count_and_the_largest_ratio_is_first() -> None:
+    silent, mixed = "recovery_boxing, default, torso silent", "boxing_inputs, clean, mixed"
+    changed = {(silent, "recovery_boxing_known_0"): 2.0, (mixed, "boxing_inputs_known_1"): 1.5}
+    by_method = {name: errors(1.0, changed=changed) for name in ("ours", "dynamic_map", "ik")}
+    found = find_worse_clips("ours", by_method, "stored", errors(1.0))
+    assert [(w.condition, w.other) for w in found] == [(silent, "stored"), (mixed, "stored")]
+    assert found[0].error_deg == pytest.approx(4.0)  # while the station is silent: twice the others
+
+
+def test_the_method_itself_sets_no_limit_of_today() -> None:
+    by_method = {"dynamic_map": errors(1.0), "ik": errors(2.0)}
+    assert not find_worse_clips("dynamic_map", by_method, "stored", errors(1.0))
+    assert len(find_worse_clips("dynamic_map", by_method, "stored", errors(0.5))) == sum(map(len, errors(1.0).values()))
