@@ -15,7 +15,7 @@ from harness.experiment.scenario import Scenario, load_scenario
 
 Preset = Literal["clean", "noise", "default"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)
-DEFAULT_METHOD = "dynamic_map"
+DEFAULT_METHOD = "expert_map"
 """Method that the benchmark measures unless another is named."""
 COMPARED_METHODS = ("dynamic_map", "local_pca", "kernel_cca", "ik")
 """Methods that the measured method is compared with, on the same cells."""
