@@ -12,12 +12,14 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
 from harness.results.cell import Cell, as_row, varied_text
+from harness.score.angles import wrap_difference
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
+from harness.score.uncertainty import SigmaSums, sum_sigma
 
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
-GROUP_KEYS = ("method", "inputs", "split", "performer", "varied")
+GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")
 """Cells that differ in one of these are never pooled."""
 
 
@@ -37,12 +39,20 @@ class SummaryStatistics:
         return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
 
 
+def sigma_of_cell(cell: Cell, angle_sigma_rad: Floats) -> SigmaSums:
+    """Sums of the scored frames of a cell with standard deviations (F, 48) [rad]."""
+    rows = cell.scores.scored
+    difference_rad = cell.estimate_qpos[rows, 7:] - cell.truth_qpos[rows, 7:]
+    return sum_sigma(np.rad2deg(np.abs(wrap_difference(difference_rad))), np.rad2deg(angle_sigma_rad[rows]))
+
+
 class _GroupStatistics:
     def __init__(self) -> None:
         self.sequences: list[dict[str, Any]] = []
         self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
         self.step_ms: list[Floats] = []
         self.cpu_ms: list[Floats] = []
+        self.sigma: SigmaSums | None = None
 
     def add(self, cell: Cell) -> None:
         self.sequences.append(as_row(cell))
@@ -52,6 +62,9 @@ class _GroupStatistics:
             self.frames[name].append(values[cell.scores.scored].astype(np.float32))
         timed = cell.scores.scored & (np.arange(len(cell)) > 0)
         self.step_ms.append(cell.step_ms[timed])
+        if cell.sigma_scores and cell.angle_sigma_rad is not None:
+            sums = sigma_of_cell(cell, cell.angle_sigma_rad)
+            self.sigma = sums if self.sigma is None else self.sigma + sums
         self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
 
     def named(self, fields: Iterable[str]) -> dict[str, Any]:
@@ -67,6 +80,7 @@ class _GroupStatistics:
             **counts,
             "coverage": counts["frames_matched"] / expected if expected else 0.0,
             "metrics": {name: self._statistics(name) for name in measured},
+            "sigma_scores": self.sigma.scores() if self.sigma else {},
         }
 
     def _statistics(self, name: str) -> dict[str, float | int | None]:
