@@ -45,6 +45,7 @@ class Written:
     estimate_bone_m: Floats = field(default_factory=lambda: BELIEVED.bone_m)
     frame_index: Ints = field(default_factory=lambda: np.arange(FRAMES))
     status: Ints = field(default_factory=lambda: np.zeros(FRAMES, dtype=np.int64))
+    angle_sigma_rad: Floats | None = None
     errors: Mapping[str, Floats] = field(default_factory=lambda: {"mpjpe_mm": np.full(FRAMES, 12.5)})
 
     @property
