@@ -28,11 +28,10 @@ from harness.mocap.library import LibraryFolders
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
 from harness.results.sigma_table import sigma_lines
-from harness.score.angles import wrap_difference
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
-from harness.score.uncertainty import SigmaSums, sum_sigma
+from harness.score.uncertainty import SigmaSums, score_sigma
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.frame import TrackerFrame
@@ -287,8 +286,7 @@ def _score_method(name: str, output: _MethodOutput, loops: Sequence[_LoopFrames]
         )
         if output.sigma_rad is not None:
             rows, index = (values[scores[-1].scored] for values in (answered.rows, answered.index))
-            error_rad = wrap_difference(output.qpos[rows, 7:] - truth_qpos[index, 7:])
-            sigma.append(sum_sigma(np.rad2deg(np.abs(error_rad)), np.rad2deg(output.sigma_rad[rows])))
+            sigma.append(score_sigma(truth_qpos[index], output.qpos[rows], output.sigma_rad[rows]))
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(score.scored.sum()) for score in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected

@@ -12,11 +12,10 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
 from harness.results.cell import Cell, as_row, varied_text
-from harness.score.angles import wrap_difference
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
-from harness.score.uncertainty import SigmaSums, sum_sigma
+from harness.score.uncertainty import SigmaSums, score_sigma
 
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
 GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")
@@ -39,13 +38,6 @@ class SummaryStatistics:
         return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
 
 
-def sigma_of_cell(cell: Cell, angle_sigma_rad: Floats) -> SigmaSums:
-    """Sums of the scored frames of a cell with standard deviations (F, 48) [rad]."""
-    rows = cell.scores.scored
-    difference_rad = cell.estimate_qpos[rows, 7:] - cell.truth_qpos[rows, 7:]
-    return sum_sigma(np.rad2deg(np.abs(wrap_difference(difference_rad))), np.rad2deg(angle_sigma_rad[rows]))
-
-
 class _GroupStatistics:
     def __init__(self) -> None:
         self.sequences: list[dict[str, Any]] = []
@@ -63,7 +55,8 @@ class _GroupStatistics:
         timed = cell.scores.scored & (np.arange(len(cell)) > 0)
         self.step_ms.append(cell.step_ms[timed])
         if cell.sigma_scores and cell.angle_sigma_rad is not None:
-            sums = sigma_of_cell(cell, cell.angle_sigma_rad)
+            rows = cell.scores.scored
+            sums = score_sigma(cell.truth_qpos[rows], cell.estimate_qpos[rows], cell.angle_sigma_rad[rows])
             self.sigma = sums if self.sigma is None else self.sigma + sums
         self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
 

@@ -12,7 +12,7 @@ from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
 from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
-from harness.score.uncertainty import SigmaSums, sum_sigma
+from harness.score.uncertainty import SigmaSums, score_sigma
 
 WARM_UP_S = 1.0
 """Estimates in this first part of a take are not scored [s] (choice)."""
@@ -64,7 +64,7 @@ def score_estimate(
     - `step_ms` (F,): wall time of each step, NaN where not timed;
     - `origin` (F,): values of `Origin`, all MODEL by default;
     - `complete` (F,): frames in which every station reported, all by default;
-    - `angle_sigma_rad` (F, 48): standard deviations of the hinge angles, if the method states them;
+    - `angle_sigma_rad` (F, 48): standard deviations of the hinge angles, in the order of `qpos`, if any are stated;
     - `cpu_ms`: CPU time (F,) of the steps and (F,) of the reference (see `timing.step_relative`), NaN where not timed.
     """
     if angle_sigma_rad is not None and np.shape(angle_sigma_rad) != (len(estimate_qpos), len(skeleton.axes)):
@@ -122,7 +122,7 @@ def score_estimate(
     }
     per_joint, sigma = (_per_joint(scored_pair), dict[str, float]()) if enough else ({}, {})
     if enough and angle_sigma_rad is not None:
-        sums = sum_sigma(angles.hinge_errors_deg(scored_pair), np.rad2deg(angle_sigma_rad[scored]))
+        sums = score_sigma(truth_qpos[frame_index[scored]], estimate_qpos[scored], angle_sigma_rad[scored])
         sigma, per_joint = sums.scores(), per_joint | _sigma_per_joint(skeleton, sums)
     return Scores(metrics, per_frame, per_joint, scored, sigma)
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
+from harness.core.humanoid24 import QPOS_OF_DOF, unpack
 from harness.errors import ShapeError
+from harness.score.angles import wrap_difference
 from harness.score.metrics import Definition
 
 SIGMA_DEFINITIONS: dict[str, Definition] = {
@@ -29,7 +31,7 @@ SIGMA_DEFINITIONS: dict[str, Definition] = {
 
 @dataclass(frozen=True, eq=False)
 class SigmaSums:
-    """Sums over frames, for each of D hinges; ShapeError if the arrays disagree about D."""
+    """Sums over frames, for each of D hinges in the skeleton's order; ShapeError if the arrays disagree about D."""
 
     frames: int
     within_1: Floats
@@ -76,6 +78,18 @@ class SigmaSums:
             "sigma_log_score": self.log_score,
         }
         return {name: values / self.frames for name, values in sums.items()}
+
+
+def score_sigma(truth_qpos: Floats, estimate_qpos: Floats, angle_sigma_rad: Floats) -> SigmaSums:
+    """Sums over N frames of configurations (N, 55) and standard deviations (N, 48) [rad] in their order."""
+    error_rad = np.abs(wrap_difference(unpack(estimate_qpos)[2] - unpack(truth_qpos)[2]))
+    return sum_sigma(np.rad2deg(error_rad), np.rad2deg(in_skeleton_order(angle_sigma_rad)))
+
+
+def in_skeleton_order(angle_sigma_rad: Floats) -> Floats:
+    """Standard deviations (..., 48) in the order of a configuration, brought into the skeleton's order of hinges."""
+    out: Floats = np.asarray(angle_sigma_rad)[..., QPOS_OF_DOF]
+    return out
 
 
 def sum_sigma(error_deg: Floats, sigma_deg: Floats) -> SigmaSums:

@@ -20,6 +20,7 @@ from harness.results.summary import GROUP_KEYS
 from harness.score.angles import hinge_errors_deg, local_errors_deg
 from harness.score.pair import Pair, PoseSequence, compute_poses
 from harness.score.positions import joint_errors_mm
+from harness.score.uncertainty import in_skeleton_order
 
 Row = Mapping[str, Any]
 _GROUPS = ("methods", "behaviours")
@@ -194,7 +195,7 @@ def _trace(run: RunData, cell: Cell) -> Trace:
         rotation_deg=local_errors_deg(pair).astype(np.float32),
         position_mm=joint_errors_mm(pair).astype(np.float32),
         hinge_deg=none if sigma_rad is None else hinge_errors_deg(pair).astype(np.float32),
-        sigma_deg=none if sigma_rad is None else np.rad2deg(sigma_rad).astype(np.float32),
+        sigma_deg=none if sigma_rad is None else np.rad2deg(in_skeleton_order(sigma_rad)).astype(np.float32),
         quality=cell.quality,
         position_valid=cell.position_valid,
         orientation_valid=cell.orientation_valid,

@@ -187,6 +187,17 @@ def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path
     assert "mpjpe_mm" not in truth.read_text().split("\n")[0]
 
 
+def test_csv_has_the_standard_deviations_of_a_method_that_states_them(cell: Written, tmp_path: Path) -> None:
+    sigma_rad = np.deg2rad(1.0 + np.arange(48.0)) * np.ones((FRAMES, 1))
+    marked = pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.arange(48.0))
+    _, estimate = export([replace(cell, angle_sigma_rad=sigma_rad)], "csv", tmp_path)
+    with estimate.open() as file:
+        row = next(csv.DictReader(file))
+    for dof, name in enumerate(SKELETON.dof_names):
+        (place,) = np.flatnonzero(marked[7:] == dof)
+        assert float(row[f"{name}_sigma_deg"]) == pytest.approx(1.0 + place)
+
+
 def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:
     files = export([cell], "tum", tmp_path)
     assert [f.name.split(".", 3)[-1] for f in files if "truth" in f.name] == [f"truth.{p}.tum" for p in POINTS]
