@@ -67,7 +67,7 @@ def spoilt(session: WaitingSession, at: int, **changes: Any) -> Any:
         estimate = step(frame)
         return Spoilt(estimate, changes) if len(session.answers) == at + 1 else estimate
 
-    session.step = changed  # type: ignore[method-assign, assignment]
+    session.step = changed  # type: ignore[method-assign]
     return session
 
 

@@ -339,16 +339,15 @@ class CertainWhenLost(StandingSession):
         return SimpleNamespace(qpos=qpos, status=status, origin=origin, angle_sigma_rad=sigma_rad, lag=0)
 
 
-class Hesitates(StandingSession):
-    """Answers one frame late, but at once when no station reports."""
+class AnswersTooEarly(StandingSession):
+    """States at its first step that it answers an earlier frame."""
 
     def start(self) -> None:
-        self.steps = 0
+        self.lag = 1
 
     def step(self, frame: TrackerFrame) -> Any:
         status, _ = self.coverage.update(frame)
-        lag = 1 if self.steps and frame.quality.any() else 0
-        self.steps += 1
+        lag, self.lag = self.lag, 0
         return Estimate(self.answer(frame), status, lag=lag)
 
 
@@ -378,7 +377,7 @@ FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
     (NeedsSixStations, "any set of stations is supported"),
     (StatesAtTimes, FORM_RULE),
     (CertainWhenLost, FORM_RULE),
-    (Hesitates, FORM_RULE),
+    (AnswersTooEarly, FORM_RULE),
     (Unseeded, "equal input gives equal estimates"),
     (Continuing, "a session does not depend on earlier sessions"),
     (SharesTime, "simultaneous sessions do not affect each other"),

@@ -1,7 +1,6 @@
 """The page of a run whose methods state standard deviations, or answer late."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ LATE = "user:Smooth (lag 2)"
 
 
 @pytest.fixture(scope="module")
-def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two methods that state standard deviations, of which one is late, as is the most accurate one."""
     plan = Plan(
         methods={"ik": 2.0, "gauss": 1.5, "user:Smooth": 0.5, "gauss[lag=2]": 1.0},
@@ -32,7 +31,7 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     )
     out = fabricate(tmp_path_factory.mktemp("sigma") / "run", plan)
     write_run_page(out, rendered=False)
-    yield out
+    return out
 
 
 def test_the_late_methods_are_named_and_ranked_apart(run_folder: Path) -> None:

@@ -27,6 +27,7 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
 from harness.report.sweep.page import write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
+from harness.report.sweep.tables import scenario_table
 from harness.report.sweep.text import text
 from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
