@@ -67,8 +67,8 @@ class Estimate:
 
 def check_sigma(angle_sigma_rad: Floats) -> None:
     """ValueError unless standard deviations (..., 48) [rad] are finite and positive; it names the first hinge."""
-    wrong = np.argwhere(~(np.isfinite(angle_sigma_rad) & (angle_sigma_rad > 0.0)))
-    if len(wrong):
+    if not (angle_sigma_rad.min(initial=1.0) > 0.0 and angle_sigma_rad.max(initial=0.0) < np.inf):  # NaN fails both
+        wrong = np.argwhere(~(np.isfinite(angle_sigma_rad) & (angle_sigma_rad > 0.0)))
         value = angle_sigma_rad[tuple(wrong[0])]
         raise ValueError(f"the standard deviation of hinge {wrong[0][-1]} is {value:g} rad; it must be above 0")
 

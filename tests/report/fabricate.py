@@ -45,7 +45,7 @@ class Plan:
     varied: tuple[Mapping[str, Any], ...] = ({},)
     """The n-th entry has errors n times as large."""
     sigma_deg: Mapping[str, float] = field(default_factory=dict)
-    """Method -> standard deviation that it states for every hinge, changing over time by a tenth [deg]."""
+    """Method -> mean standard deviation that it states, half of it for the first hinge and changing over time [deg]."""
     lags: Mapping[str, int] = field(default_factory=dict)
     """Method -> its lag [frames]; the last frames have no answer."""
 
@@ -92,7 +92,7 @@ def make_cell(
     sigma_rad = None
     if method in plan.sigma_deg:
         over_time = 1.0 + 0.1 * np.sin(seen / 7.0)
-        sigma_rad = np.deg2rad(plan.sigma_deg[method]) * over_time[:, None] * np.ones(48)
+        sigma_rad = np.deg2rad(plan.sigma_deg[method]) * over_time[:, None] * np.linspace(0.5, 1.5, 48)
     status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
     defined_by: dict[str, Any] = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ, "varied": varied}
     defined_by |= {"lag": lag} if lag else {}

@@ -143,6 +143,39 @@ def test_an_impossible_lag_is_refused(run_folder: Path, make_cell: MakeCell, jud
         storage.read_cell(folder)
 
 
+@pytest.mark.parametrize(
+    ("part", "changes", "found"),
+    [
+        ("cells", {"lag": "two"}, r"cells\[0\].lag: expected a number of frames, found two"),
+        ("behaviours", {"lag": -1}, r"behaviours\[0\].lag: expected a number of frames, found -1"),
+        ("cells", {"sigma_scores": {"sigma_coverage_1": 2.0}}, "sigma_coverage_1 is 2.0"),
+        ("methods", {"sigma_scores": 5}, "the pooled sigma_scores is 5"),
+    ],
+)
+def test_impossible_rows_of_a_summary_are_refused(
+    run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], part: str, changes: dict[str, Any], found: str
+) -> None:
+    cell = stating(make_cell, judge)
+    storage.open_run(run_folder, manifest())
+    storage.write_cell(run_folder, cell)
+    finish_run(run_folder, keys=[cell.key], planned=1)
+    content = read_json(run_folder / "summary.json")
+    content[part][0].update(changes)
+    write_json(run_folder / "summary.json", content)
+    with pytest.raises(BadFile, match=found):
+        storage.read_summary(run_folder)
+
+
+@pytest.mark.parametrize("value", [0.0, -0.1, np.nan, np.inf])
+def test_impossible_standard_deviations_are_refused(run_folder: Path, make_cell: MakeCell, value: float) -> None:
+    storage.open_run(run_folder, manifest())
+    sigma_rad = np.full((400, 48), 0.1)
+    sigma_rad[7, 3] = value
+    folder = storage.write_cell(run_folder, make_cell(angle_sigma_rad=sigma_rad))
+    with pytest.raises(BadFile, match="a value of angle_sigma_rad that is not above 0"):
+        storage.read_cell(folder)
+
+
 def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
     with pytest.raises(ShapeError, match="quality"):
         make_cell(quality=np.ones((3, 2)))

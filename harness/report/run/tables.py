@@ -103,7 +103,7 @@ def coverage_tables(run: RunData) -> Markup:
         "most stations had been missing for long. Fallback: a simpler solution answered in place of the method's "
         "model. Bridged: there was no reading. Not finite: the estimate is no number and counts as not matched. The "
         "last column is the share of fallbacks where every station has reported for 0.5 s."
-    )
+    ) + (" A method with a lag leaves the last frames of a take unanswered." if any(run.lags.values()) else "")
     failures = [
         join(tag("b", cell), details(last_line(text), tag("pre", text)))
         for cell, text in run.summary["failures"].items()
