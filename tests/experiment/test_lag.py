@@ -155,6 +155,9 @@ def test_answers_pass_between_processes(wait: int) -> None:
         by_frame, lag = back.by_frame()
         assert (lag, len(by_frame.qpos), len(by_frame.step_ms)) == (wait, 12 - wait, 12 - wait)
         assert (by_frame.angle_sigma_rad is not None) == stated
+        np.testing.assert_array_equal(by_frame.qpos, answers.qpos[wait:])
+        for name in ("step_ms", "step_cpu_ms", "reference_cpu_ms"):
+            np.testing.assert_array_equal(getattr(by_frame, name), getattr(answers, name)[: 12 - wait])
 
 
 def test_a_take_shorter_than_the_lag_answers_its_first_frame() -> None:
