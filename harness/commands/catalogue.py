@@ -9,6 +9,7 @@ from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sw
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
+from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS
 from harness.study.placement.config import load_placement_study, shipped_placements
 
@@ -29,7 +30,7 @@ def build_catalogue() -> dict[str, dict[str, str]]:
             "noise": "white, slow and session errors, and the device's clock",
             "default": "all of it: also excursions, echoes, short losses and the error of fast motion",
         },
-        "metrics": {name: f"[{d.unit}] {d.text}" for name, d in DEFINITIONS.items()},
+        "metrics": {name: f"[{d.unit}] {d.text}" for name, d in {**DEFINITIONS, **SIGMA_DEFINITIONS}.items()},
     }
 
 

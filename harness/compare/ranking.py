@@ -3,6 +3,8 @@
 The method with the lowest mean is compared with each other one, as `harness compare RUN --methods OTHER,LOWEST` does.
 The lines of all these pairs are tested together: the ranked metric and the gated ones. Holm's correction therefore
 covers at least the lines of each of those comparisons, and a ranking never says *better* where they cannot tell.
+
+Methods with different lags are never ranked together: one that waits for later frames solves another task.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -49,6 +51,17 @@ class MethodRanking:
     def others(self, *verdicts: str) -> list[str]:
         """Names of the other methods that have one of these verdicts."""
         return [name for name, result in self.results.items() if result.verdict in verdicts]
+
+
+def split_by_lag(values: Mapping[str, ClipValues], lags: Mapping[str, int]) -> dict[int, dict[str, ClipValues]]:
+    """Lag [frames] -> the methods with that lag, the causal ones first; a method without an entry in `lags` is causal.
+
+    Each part is ranked alone.
+    """
+    parts: dict[int, dict[str, ClipValues]] = {}
+    for lag in sorted({lags.get(name, 0) for name in values}):
+        parts[lag] = {name: of for name, of in values.items() if lags.get(name, 0) == lag}
+    return parts
 
 
 def rank_methods(values: Mapping[str, ClipValues], metric: str) -> MethodRanking | None:

@@ -179,13 +179,18 @@ def _cached_method(name: str, isolation: Isolation) -> Method:
 def evaluate_cell(
     evaluation: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
 ) -> storage.Cell:
-    """Fit a method, run it causally over the simulated stream, and score its estimates."""
+    """Fit a method, run it over the simulated stream, and score its estimates at the frames that they answer.
+
+    A method with a lag leaves the last frames of the take unanswered: the cell has no rows for them. Its lag is one of
+    the conditions, because its errors and those of a causal method are not comparable.
+    """
     scenario, simulation = evaluation.scenario, evaluation.simulation
     inputs = make_inputs(planned.inputs, simulation.stations)
     calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
     shown = [inputs.mask(replace(frame)) for frame in calibration.map_stream(simulation).frames]
-    answers = run_over_frames(fitted, replace(calibration.calibration), shown)
-    frames = simulation.frames
+    answers, lag = run_over_frames(fitted, replace(calibration.calibration), shown).by_frame()
+    answered = slice(0, len(answers.qpos))
+    frames, frame_index = simulation.frames[answered], simulation.frame_index[answered]
     position_valid = np.array([f.position_valid for f in frames])
     orientation_valid = np.array([f.orientation_valid for f in frames])
     scores = score_estimate(
@@ -193,12 +198,13 @@ def evaluate_cell(
         scenario.tracker.rate_hz,
         simulation.truth_qpos,
         answers.qpos,
-        simulation.frame_index,
+        frame_index,
         answers.status,
         answers.step_ms,
         origin=answers.origin,
         complete=(position_valid & orientation_valid).all(axis=1),
         cpu_ms=(answers.step_cpu_ms, answers.reference_cpu_ms),
+        angle_sigma_rad=answers.angle_sigma_rad,
         estimate_skeleton=calibration.body.skeleton,
     )
     return storage.Cell(
@@ -218,7 +224,7 @@ def evaluate_cell(
         performer=evaluation.subject.performer,
         varied=planned.varied,
         scenario=scenario.name,
-        defined_by=evaluation.conditions_of(method, planned.inputs),
+        defined_by=evaluation.conditions_of(method, planned.inputs) | ({"lag": lag} if lag else {}),
         scores=scores,
         health=simulation.health,
         calibration_errors=calibration.errors,
@@ -227,10 +233,11 @@ def evaluate_cell(
         source_hash=manifest.source_hash(),
         reproduce=command,
         notes=evaluation.notes(method),
-        time_s=simulation.truth_s[simulation.frame_index],
-        truth_qpos=simulation.truth_qpos[simulation.frame_index],
+        time_s=simulation.truth_s[frame_index],
+        truth_qpos=simulation.truth_qpos[frame_index],
         estimate_qpos=answers.qpos,
-        frame_index=simulation.frame_index,
+        angle_sigma_rad=answers.angle_sigma_rad,
+        frame_index=frame_index,
         status=answers.status,
         origin=answers.origin,
         step_ms=answers.step_ms,

@@ -11,11 +11,12 @@ from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.core.arrays import immutable
 from harness.core.calibration import Calibration
+from harness.core.estimate import check_sigma, session_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
-from harness.experiment.method_run import QPOS_SIZE, MethodAnswers
+from harness.experiment.method_run import HINGES, QPOS_SIZE, MethodAnswers
 from harness.stream.frame import TrackerFrame
 
 Message = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -82,19 +83,33 @@ def decode_take(header: Header, arrays: Arrays) -> tuple[Calibration, list[Track
     ]
 
 
+def encode_answers(answers: MethodAnswers) -> dict[str, NDArray[Any]]:
+    """The arrays of the answers to a take; standard deviations only if the method gives them."""
+    return {name: array for name, array in answers._asdict().items() if array is not None}
+
+
 def decode_answers(arrays: Arrays, frames: int) -> MethodAnswers:
     """The answers of a method's process to so many frames; MessageError when they are anything else."""
-    sizes = {"qpos": (frames, QPOS_SIZE), **dict.fromkeys(MethodAnswers._fields[1:], (frames,))}
+    sizes: dict[str, tuple[int, ...]] = dict.fromkeys(MethodAnswers._fields, (frames,))
+    sizes |= {"qpos": (frames, QPOS_SIZE), "angle_sigma_rad": (frames, HINGES)}
+    if "angle_sigma_rad" not in arrays:
+        del sizes["angle_sigma_rad"]
     if {name: array.shape for name, array in arrays.items()} != sizes:
         raise MessageError("arrays of another size")
-    kinds = {name: np.int64 if name in ("status", "origin") else np.float64 for name in sizes}
+    kinds = {name: np.int64 if name in ("status", "origin", "lag") else np.float64 for name in sizes}
     if any(arrays[name].dtype != kind for name, kind in kinds.items()):
         raise MessageError("arrays of another type")
-    if np.isin(arrays["status"], (0, 1, 2)).all() and np.isin(arrays["origin"], (0, 1, 2)).all():
-        return MethodAnswers(**{name: immutable(arrays[name], kind) for name, kind in kinds.items()})
-    raise MessageError("an unknown status or origin")
+    if not (np.isin(arrays["status"], (0, 1, 2)).all() and np.isin(arrays["origin"], (0, 1, 2)).all()):
+        raise MessageError("an unknown status or origin")
+    try:
+        session_lag(arrays["lag"])
+        if "angle_sigma_rad" in arrays:
+            check_sigma(arrays["angle_sigma_rad"])
+    except ValueError as error:
+        raise MessageError(str(error)) from error
+    return MethodAnswers(**{name: immutable(arrays[name], kind) for name, kind in kinds.items()})
 
 
 def answers_size(frames: int) -> int:
     """Largest size of a message of answers to so many frames [bytes]."""
-    return 8 * frames * (QPOS_SIZE + len(MethodAnswers._fields)) + MAX_TEXT * 8
+    return 8 * frames * (QPOS_SIZE + HINGES + len(MethodAnswers._fields)) + MAX_TEXT * 8

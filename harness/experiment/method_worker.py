@@ -20,8 +20,16 @@ from harness.core.estimate import Origin, Status
 from harness.core.messages import MessageError, read_message, write_message
 from harness.errors import HarnessError
 from harness.experiment.file_audit import FileAudit
-from harness.experiment.method_messages import MAX_TEXT, Arrays, Header, Message, decode_take, decode_training
-from harness.experiment.method_run import run_method
+from harness.experiment.method_messages import (
+    MAX_TEXT,
+    Arrays,
+    Header,
+    Message,
+    decode_take,
+    decode_training,
+    encode_answers,
+)
+from harness.experiment.method_run import lag_and_sigma, run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.source_files import source_files, source_hash
@@ -88,7 +96,7 @@ class MethodWorker:
         if header["fit"] not in self._fits:
             return {"fitted": False}, {}
         answers = run_method(self._fits[header["fit"]], *decode_take(header, arrays))
-        return {"fitted": True}, answers._asdict()
+        return {"fitted": True}, encode_answers(answers)
 
     def _begin(self, header: Header, arrays: Arrays) -> Message:
         if header["fit"] not in self._fits:
@@ -101,7 +109,11 @@ class MethodWorker:
         _, (frame,) = decode_take(header, arrays)
         estimate = self._sessions[header["session"]].step(frame)
         status, origin = int(Status(estimate.status)), int(Origin(estimate.origin))
-        return {"status": status, "origin": origin}, {"qpos": np.asarray(estimate.qpos, dtype=np.float64)}
+        lag, sigma_rad = lag_and_sigma(estimate)
+        answer = {"qpos": np.asarray(estimate.qpos, dtype=np.float64)}
+        if sigma_rad is not None:
+            answer["angle_sigma_rad"] = sigma_rad
+        return {"status": status, "origin": origin, "lag": lag}, answer
 
 
 def serve(worker: MethodWorker, *descriptors: str) -> None:

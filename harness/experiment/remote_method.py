@@ -174,7 +174,10 @@ class RemoteSession:
         header, arrays = encode_take(self.calibration, [frame])
         request = {"operation": "step", "session": self.number, **header}
         answer, content = self.method.process.request(request, arrays, _MAX_REPLY_BYTES)
-        return self.method.read(lambda: Estimate(content["qpos"], answer["status"], answer["origin"]))
+        sigma_rad = content.get("angle_sigma_rad")
+        return self.method.read(
+            lambda: Estimate(content["qpos"], answer["status"], answer["origin"], sigma_rad, answer["lag"])
+        )
 
 
 _remote_methods: dict[tuple[str, Isolation], RemoteMethod] = {}

@@ -7,27 +7,31 @@ no truth and is not scored. Neither is a frame whose readings differ from those 
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
+from harness.core.estimate import Estimate, name_with_lag, session_lag
 from harness.core.fields import check_entries
 from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.isolation import DEFAULT_ISOLATION
+from harness.experiment.method_run import lag_and_sigma
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
+from harness.results.sigma_table import sigma_lines
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
+from harness.score.uncertainty import SigmaSums, score_sigma
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.frame import TrackerFrame
@@ -53,6 +57,15 @@ class RecordingScore:
     """Number of true frames between the first and last recorded frame of each loop, after the warm-up."""
     metrics: dict[str, float | None]
     """Metrics by the names of `Scores.metrics`, over all loops together; None is "not measured"."""
+    lag: int = 0
+    """Number of later frames that the method uses for each estimate."""
+    sigma_scores: Mapping[str, float] = field(default_factory=dict)
+    """Scores of the standard deviations (see `score.uncertainty`), over all loops; empty without them."""
+
+    @property
+    def title(self) -> str:
+        """Name in tables, with the lag."""
+        return name_with_lag(self.method, self.lag)
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -147,14 +160,35 @@ class _LoopFrames:
 
 @dataclass(frozen=True, eq=False)
 class _MethodOutput:
-    """Output of one method for all F frames."""
+    """Answers of one method to the first F frames of the recording; the last `lag` frames have no answer."""
 
+    lag: int
     qpos: Floats
     status: Ints
     step_ms: Floats
+    sigma_rad: Floats | None
+    """(F, 48) standard deviations, if the method states them [rad]."""
 
-    def at(self, rows: Ints) -> tuple[Floats, Ints, Floats]:
-        return self.qpos[rows], self.status[rows], self.step_ms[rows]
+    def answered(self, loop: _LoopFrames) -> _LoopFrames:
+        """The frames of a loop that the method has answered."""
+        kept = loop.rows < len(self.qpos)
+        return _LoopFrames(loop.rows[kept], loop.index[kept])
+
+
+def _collect_output(estimates: Sequence[Estimate], step_ms: Sequence[float]) -> _MethodOutput:
+    """The output of a session; ValueError as for `method_run.run_method`."""
+    told = [lag_and_sigma(estimate) for estimate in estimates]
+    lag = session_lag([each for each, _ in told])
+    sigmas = [sigma for _, sigma in told if sigma is not None]
+    if len(sigmas) not in (0, len(told)):
+        raise ValueError(f"the method gave standard deviations in {len(sigmas)} of {len(told)} frames")
+    return _MethodOutput(
+        lag,
+        np.array([estimate.qpos for estimate in estimates])[lag:],
+        np.array([int(estimate.status) for estimate in estimates], dtype=np.int64)[lag:],
+        np.array(step_ms)[: len(estimates) - lag],
+        np.array(sigmas)[lag:] if sigmas else None,
+    )
 
 
 def score_methods(stream: RecordingStream, playback: Playback, methods: Sequence[str]) -> list[RecordingScore]:
@@ -175,23 +209,17 @@ def _run_methods(
 ) -> tuple[list[TrackerFrame], Floats, dict[str, _MethodOutput]]:
     """The frames, the device time at which the device's clock was zero for each (F,) [s], and the methods' output."""
     frames, zero_s = [], []
-    steps: dict[str, list[tuple[Floats, int, float]]] = {name: [] for name in sessions}
+    estimates: dict[str, list[Estimate]] = {name: [] for name in sessions}
+    times_ms: dict[str, list[float]] = {name: [] for name in sessions}
     for frame in stream:
         frames.append(frame)
         zero_s.append(stream.device_zero_s)
         for name, session in sessions.items():
             seen, start = replace(frame), time.perf_counter()
             estimate = session.step(seen)
-            step_ms = 1e3 * (time.perf_counter() - start)
-            steps[name].append((np.array(estimate.qpos), int(estimate.status), step_ms))
-    made = {
-        name: _MethodOutput(
-            np.array([qpos for qpos, _, _ in pairs]),
-            np.array([status for _, status, _ in pairs], dtype=np.int64),
-            np.array([step_ms for _, _, step_ms in pairs]),
-        )
-        for name, pairs in steps.items()
-    }
+            times_ms[name].append(1e3 * (time.perf_counter() - start))
+            estimates[name].append(estimate)
+    made = {name: _collect_output(estimates[name], times_ms[name]) for name in sessions}
     return frames, np.array(zero_s), made
 
 
@@ -238,30 +266,33 @@ def _row_medians(values: Floats) -> Floats:
 
 def _score_method(name: str, output: _MethodOutput, loops: Sequence[_LoopFrames], playback: Playback) -> RecordingScore:
     rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
-    skeleton, scores, expected = playback.body.skeleton, [], 0
+    skeleton, scores, expected, sigma = playback.body.skeleton, [], 0, list[SigmaSums]()
     for number, loop in enumerate(loops):
         first, last = int(loop.index[0]), int(loop.index[-1])
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
-        qpos, status, step_ms = output.at(loop.rows)
+        answered = output.answered(loop)
         scores.append(
             score_estimate(
                 skeleton,
                 rate_hz,
                 truth_qpos,
-                qpos,
-                loop.index,
-                status,
-                step_ms,
+                output.qpos[answered.rows],
+                answered.index,
+                output.status[answered.rows],
+                output.step_ms[answered.rows],
                 estimate_skeleton=playback.performer_calibration.body.skeleton,
                 warm_up_s=warm_s,
             )
         )
+        if output.sigma_rad is not None:
+            rows, index = (values[scores[-1].scored] for values in (answered.rows, answered.index))
+            sigma.append(score_sigma(truth_qpos[index], output.qpos[rows], output.sigma_rad[rows]))
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(score.scored.sum()) for score in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected
-    return RecordingScore(
-        name, matched, expected, _pool_metrics(scores, output.step_ms[1:]) if enough else _not_measured()
-    )
+    metrics = _pool_metrics(scores, output.step_ms[1:]) if enough else _not_measured()
+    sigma_scores = sum(sigma[1:], start=sigma[0]).scores() if enough and sigma else {}
+    return RecordingScore(name, matched, expected, metrics, output.lag, sigma_scores)
 
 
 def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
@@ -281,9 +312,10 @@ def _not_measured() -> dict[str, float | None]:
 
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
-    """A row for each method."""
+    """A row for each method, and a table of the standard deviations if a method states them."""
     rows = []
     for one in judged:
         figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
-        rows.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
-    return "\n".join(Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows).lines())
+        rows.append([one.title, f"{one.frames_matched}/{one.frames_expected}", *figures])
+    table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
+    return "\n".join([*table.lines(), *sigma_lines(["method"], [([one.title], one.sigma_scores) for one in judged])])

@@ -16,13 +16,13 @@ from harness.stream.frame import TrackerFrame
 
 @dataclass(frozen=True, eq=False)
 class LivePose:
-    """One solved frame of a live session."""
+    """One solved frame of a live session: the frame that the estimate answers, which a lag makes an earlier one."""
 
     number: int
     """Number of the pose, from 0; dropped frames are not counted."""
     frame: TrackerFrame
     taken_s: float
-    """Host monotonic clock when the frame was taken from the queue [s]."""
+    """Host monotonic clock when the frame of the step was taken from the queue, `estimate.lag` frames later [s]."""
     ready_s: float
     """Host monotonic clock when the pose was ready [s]."""
     measured_s: float

@@ -5,7 +5,7 @@ drops its oldest frames, solves and sends. The caller's thread waits, and Ctrl-C
 """
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from threading import Event, Thread
@@ -67,6 +67,10 @@ class LiveResult:
     stages: StageLatencies
     failed: dict[str, str]
     """Error of each output that failed, by its name."""
+    lag: int = 0
+    """Number of frames by which the method answers later than it could, see `core.estimate.Estimate.lag`."""
+    lag_s: float = 0.0
+    """The lag times the expected frame period [s]. No stage contains it, but every pose is so much older."""
     stopped: bool = False
     """Whether Ctrl-C or another signal ended the session."""
 
@@ -151,6 +155,9 @@ class _SolverThread:
         self._frames_calibrated = self._frames_discarded = 0
         """Frames that the calibration used, and frames that came while the method prepared."""
         self._first_s = self._last_s = 0.0
+        self._lag = 0
+        self._waiting: deque[tuple[TrackerFrame, float]] = deque()
+        """The frame that was answered last and those after it, with their times of measurement [s]."""
         self.start_s = float("inf")
         """Time at which calibration was done [s]."""
         self.done = Event()
@@ -195,6 +202,8 @@ class _SolverThread:
             seconds=self._last_s - self._first_s,
             stages=self._stages,
             failed=self._failed,
+            lag=self._lag,
+            lag_s=self._lag / self._options.rate_hz,
         )
 
     def _calibrate(self, calibrator: Calibrator) -> Session | None:
@@ -219,8 +228,14 @@ class _SolverThread:
             frame = captured.frame
             estimate = session.step(frame)
             ready_s = self._clock()
-            measured_s = self._host_clock.measured_s(frame)
-            pose = LivePose(number, frame, taken_s, ready_s, measured_s, estimate, self._kinematics)
+            self._waiting.append((frame, self._host_clock.measured_s(frame)))
+            if estimate.lag > self._lag:  # the first frames of a session with a lag: the first one is answered again
+                self._lag = estimate.lag
+                continue
+            while len(self._waiting) > estimate.lag + 1:
+                self._waiting.popleft()
+            answered, measured_s = self._waiting[0]
+            pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics)
             self._send(pose)
             sent_s = self._clock()
             received_s = frame.received_s if self._options.host_timestamps else captured.captured_s

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from harness.core.number_format import format_fixed
+from harness.core.number_format import count_noun, format_fixed
 from harness.core.text_table import Table
 from harness.live.session import LiveResult
 
@@ -21,7 +21,10 @@ def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
         "origin": result.origin,
         "deadline_ms": 1e3 * stages.deadline_s,
         "deadline_missed": stages.missed,
+        "lag_frames": result.lag,
+        "lag_ms": 1e3 * result.lag_s,
         "latency": {name: durations.as_dict() for name, durations in stages.by_name().items()},
+        "latency_with_lag": _with_lag(result),
         "floor": dict(jitter),
         "outputs_failed": result.failed,
     }
@@ -31,6 +34,8 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
     """A table of latencies with the computer's scheduling jitter below, and the counts, as lines of text."""
     stages = result.stages
     rows = [_time_row(name, durations.as_dict()) for name, durations in stages.by_name().items()]
+    if result.lag:
+        rows.append(_time_row(f"with the method's lag of {count_noun(result.lag, 'frame')}", _with_lag(result)))
     rows += [_time_row(name, jitter[key]) for name, key in _JITTER_LABELS.items() if jitter.get(key)]
     states = "; ".join(
         ", ".join(f"{count} {name}" for name, count in counted.items()) for counted in (result.status, result.origin)
@@ -49,6 +54,12 @@ _JITTER_LABELS = {
     "the computer: a timer is late": "timer",
     "the computer: thread to thread": "handover",
 }
+
+
+def _with_lag(result: LiveResult) -> dict[str, float | None]:
+    """Times from the last byte of the frame that a pose answers until the pose is ready [ms]; None without poses."""
+    times = result.stages.to_pose.as_dict().items()
+    return {name: None if ms is None else ms + 1e3 * result.lag_s for name, ms in times}
 
 
 def _time_row(name: str, times: Mapping[str, float | None]) -> list[str]:

@@ -19,7 +19,13 @@ class Session(Protocol):
     """Reconstruction of one take of one performer."""
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        """Estimate of the body at a frame; causal, from this frame and earlier ones only."""
+        """Estimate of the body at a frame; causal, from this frame and earlier ones only.
+
+        A session answers the frame of the step (`Estimate.lag` 0), or the frame that it received a fixed number L of
+        steps before. The lag of its n-th estimate is min(n, L), n from 0. The first L + 1 estimates therefore all
+        answer the first frame, and the last of them counts. The last L frames of a take are never answered: they count
+        as expected and not as matched. Scores compare an estimate with the truth at the frame that it answers.
+        """
         ...
 
 

@@ -23,7 +23,7 @@ from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
 from harness.results.content_types import check_cell_types
 from harness.results.digests import check_file, insert_digest, read_result_json
-from harness.results.plausibility import find_impossible_frames, find_impossible_metric
+from harness.results.plausibility import find_impossible_frames, find_impossible_metric, find_impossible_sigma
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -46,6 +46,10 @@ EXTRA_IDENTITY = ("scenario", "performer", "varied")
 """Further columns that identify a cell."""
 TRAILING_COLUMNS = (*EXTRA_IDENTITY, "key", "source_hash", "health", "calibration_errors")
 """Columns that follow the metrics in a row."""
+OPTIONAL_COLUMNS: Mapping[str, Any] = {"lag": 0, "sigma_scores": {}}
+"""Last columns of a row, and their values where a stored row or cell lacks them: versions before them had neither."""
+SIGMA_ARRAY = "angle_sigma_rad"
+"""Array of frames.npz that only cells of methods with standard deviations have, (F, 48) float32."""
 _TEXTS = (
     *(*IDENTITY, *EXTRA_IDENTITY, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
@@ -131,6 +135,8 @@ class Cell:
     """Errors of the calibration by name (see `harness.experiment.simulated_calibration`); empty if it is exact."""
     estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
     """(B, 3) bone vectors of the body that the method was given [m]; by default those of the true body."""
+    angle_sigma_rad: Floats | None = None
+    """(F, 48) standard deviations of the estimated hinge angles [rad]; None from a method that states none."""
 
     def __post_init__(self) -> None:
         frames, stations = len(self.time_s), len(self.stations)
@@ -145,8 +151,20 @@ class Cell:
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
         freeze(self, np.int64, frame_index=(frames,), status=(frames,), origin=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))
+        if self.angle_sigma_rad is not None:
+            freeze(self, angle_sigma_rad=(frames, self.estimate_qpos.shape[1] - 7))
         for name in ("stations", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+
+    @property
+    def lag(self) -> int:
+        """Number of later frames that the method used for each estimate; 0 for a causal one."""
+        return int(self.defined_by.get("lag", 0))
+
+    @property
+    def sigma_scores(self) -> Mapping[str, float]:
+        """Scores of the standard deviations by name (see `score.uncertainty`); empty without them."""
+        return self.scores.sigma
 
     @property
     def metrics(self) -> Mapping[str, float | None]:
@@ -178,7 +196,11 @@ def write_cell(out: Path, cell: Cell) -> Path:
     shutil.rmtree(beside, ignore_errors=True)
     content = {name: getattr(cell, name) for name in _TEXTS}
     content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
+    if cell.sigma_scores:
+        content["sigma_scores"] = cell.sigma_scores
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
+    if cell.angle_sigma_rad is not None:
+        columns[SIGMA_ARRAY] = cell.angle_sigma_rad.astype(np.float32)
     largest = np.finfo(np.float32).max
     per_frame = {name: np.minimum(values, largest).astype(np.float32) for name, values in cell.scores.per_frame.items()}
     columns |= {_ERROR_PREFIX + name: values for name, values in per_frame.items()}
@@ -230,7 +252,7 @@ def read_content(folder: Path) -> dict[str, Any]:
     metrics = content.get("metrics")
     if not isinstance(metrics, dict):
         raise BadFile(text, "no metrics", f"{expected} of this version of the harness", _ADVICE)
-    if found := find_impossible_metric(metrics):
+    if found := find_impossible_metric(metrics) or find_impossible_sigma(content.get("sigma_scores", {})):
         raise BadFile(text, found, "possible values", _ADVICE)
     return content
 
@@ -246,11 +268,13 @@ def read_cell(folder: Path) -> Cell:
         per_frame = {name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS}
         if found := find_impossible_frames(per_frame):
             raise BadFile(frames, found, "possible values", _ADVICE)
-        scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"])
+        sigma = content.get("sigma_scores", {})
+        scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"], sigma)
         return Cell(
             scores=scores,
             **{name: content[name] for name in _TEXTS},
             **dict[str, Any]({name: arrays[name] for name in (*_FLOATS, *_INTS, *_BOOLS)}),
+            angle_sigma_rad=arrays.get(SIGMA_ARRAY),
         )
     except (KeyError, TypeError, ValueError) as error:
         found = f"no {error}" if isinstance(error, KeyError) else str(error)
@@ -262,7 +286,8 @@ def read_cell(folder: Path) -> Cell:
 def _find_wrong_array(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
     """The first array that is missing, of another type, or of another number of frames; "" if there is none."""
     errors = tuple(_ERROR_PREFIX + name for name in FRAME_METRICS)
-    for names, kinds in (((*_FLOATS, *errors), "f"), (_INTS, "iu"), ((*_BOOLS, "scored"), "b")):
+    sigma = (SIGMA_ARRAY,) if SIGMA_ARRAY in arrays else ()
+    for names, kinds in (((*_FLOATS, *errors, *sigma), "f"), (_INTS, "iu"), ((*_BOOLS, "scored"), "b")):
         for name in names:
             if name not in arrays:
                 return f"no {name!r}"
@@ -281,6 +306,9 @@ def _find_impossible_pose(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
             return f"a value of {name} that is not a number below {MAX_POSE_VALUE:g}"
         if values.ndim == 2 and not np.all(np.abs(values[:, ROOT_QUATERNION]).sum(axis=1) > MIN_QUATERNION):
             return f"a root orientation of {name} that is no quaternion"
+    sigma_rad = arrays.get(SIGMA_ARRAY, np.ones(1))
+    if not np.all((sigma_rad > 0.0) & (sigma_rad < MAX_POSE_VALUE)):
+        return f"a value of {SIGMA_ARRAY} that is not above 0 and below {MAX_POSE_VALUE:g}"
     return ""
 
 
@@ -295,16 +323,21 @@ def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
     """The row of a cell from the content of its cell.json; BadFile when columns are missing."""
     try:
         first, rest = ({name: content[name] for name in names} for names in (IDENTITY, TRAILING_COLUMNS))
-        return {**first, **content["metrics"], **rest}
+        optional = {
+            "lag": int(content["defined_by"].get("lag", OPTIONAL_COLUMNS["lag"])),
+            "sigma_scores": content.get("sigma_scores", OPTIONAL_COLUMNS["sigma_scores"]),
+        }
+        return {**first, **content["metrics"], **rest, **optional}
     except (KeyError, TypeError) as error:
         expected = "a cell of this version of the harness"
         raise BadFile(folder / "cell.json", f"no {error}", expected, _ADVICE) from error
 
 
 def as_row(cell: Cell) -> dict[str, Any]:
-    """The row of a cell: identity, then every metric, then the trailing columns."""
+    """The row of a cell: identity, then every metric, then the trailing and the optional columns."""
     first, rest = (
-        {name: to_json_types(getattr(cell, name)) for name in names} for names in (IDENTITY, TRAILING_COLUMNS)
+        {name: to_json_types(getattr(cell, name)) for name in names}
+        for names in (IDENTITY, (*TRAILING_COLUMNS, *OPTIONAL_COLUMNS))
     )
     return {**first, **cell.metrics, **rest}
 

@@ -74,10 +74,16 @@ def check_cell_types(path: Path, content: Mapping[str, Any], advice: str) -> Non
         check_entries(content, _CELL, "cell")
         if any(abs(value) > MAX_BONE_M for name in _BONES for vector in content[name] for value in vector):
             raise TypeError(f"cell: a bone of more than {MAX_BONE_M:g} m")
+        _check_lag(content["defined_by"].get("lag", 0), "defined_by.lag")
         if "disturbance" in content["defined_by"]:
             check_entries(content["defined_by"]["disturbance"], _DISTURBANCE, "defined_by.disturbance")
     except (TypeError, HarnessError) as error:
         raise BadFile(path, str(error), "a cell of this version of the harness", advice) from error
+
+
+def _check_lag(value: Any, where: str) -> None:
+    if type(value) is not int or value < 0:
+        raise TypeError(f"{where}: expected a number of frames, found {str(value)[:40]}")
 
 
 def check_summary_types(path: Path, content: Mapping[str, Any], advice: str) -> None:
@@ -88,9 +94,11 @@ def check_summary_types(path: Path, content: Mapping[str, Any], advice: str) -> 
             if not re.fullmatch(r"\w+", str(row.get("key"))):
                 raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)
             check_entries(row, {**_IDENTITY, **_METRICS}, f"cells[{n}]")
+            _check_lag(row.get("lag", 0), f"cells[{n}].lag")
         for name, extra in (("methods", {}), ("behaviours", {"behaviour": str})):
             for n, row in enumerate(content[name]):
                 check_entries(row, {**_GROUP, **extra}, f"{name}[{n}]")
+                _check_lag(row.get("lag", 0), f"{name}[{n}].lag")
                 check_entries(row["metrics"], _GROUP_METRICS, f"{name}[{n}].metrics")
                 for metric, statistic in row["metrics"].items():
                     check_entries(statistic, _STATISTIC, f"{name}[{n}].metrics.{metric}")

@@ -100,6 +100,8 @@ def _outcome(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) -> dict[st
         missing = [name for name, each in errors.items() if not each]
         gap = f"{', '.join(missing)} not measured" if missing else "no clip on which all were measured"
         return {**found, "means_deg": None, "holds": None, "why": [gap]}
+    if len({row.get("lag", 0) for row in rows}) > 1:
+        return {**found, "means_deg": None, "holds": None, "why": ["methods with different lags are not ranked"]}
     means = [float(np.mean([each[clip] for clip in shared])) for each in errors.values()]
     as_printed = [round(mean, DECIMALS) for mean in means]
     wrong = [step for step, (less, more) in zip(order.steps, pairwise(as_printed), strict=True) if not less < more]

@@ -20,7 +20,7 @@ from harness.core.files import TEMPORARY, content_key, to_json_types
 from harness.core.input_file import check_input_file
 from harness.core.parsing import parse_json
 from harness.errors import BadFile
-from harness.results.cell import IDENTITY, TRAILING_COLUMNS, read_row
+from harness.results.cell import IDENTITY, OPTIONAL_COLUMNS, TRAILING_COLUMNS, read_row
 from harness.score.metrics import DEFINITIONS
 
 INDEX_FILE = "index.sqlite"
@@ -31,7 +31,7 @@ TEXTS = (
 """Text columns that rows can be selected by, besides `seed`."""
 _JSON_COLUMNS = ("varied", "stations")
 _COLUMNS = ("key", *TEXTS, "seed", "rate_hz", *_JSON_COLUMNS, "seconds", *DEFINITIONS, "rest")
-_ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS, "seconds")
+_ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS)
 _TABLES = {"plan": "place", "cells": "key", "facts": "name", "digests": "file"}
 """Table -> the column that it is sorted by for the digest."""
 _VERSION = int(content_key([_COLUMNS, list(_TABLES)])[:7], 16)
@@ -194,6 +194,12 @@ class CellIndex:
         self._check_types("cells", names)
         return self._select(question)
 
+    def optional(self) -> Iterator[dict[str, Any]]:
+        """`cell.OPTIONAL_COLUMNS` of the plan's finished cells in planned order."""
+        for (text,) in self.columns("rest"):
+            rest = self._parse(text) if any(f'"{name}":' in text for name in OPTIONAL_COLUMNS) else {}
+            yield {name: rest.get(name, default) for name, default in OPTIONAL_COLUMNS.items()}
+
     def note(self, **facts: Any) -> None:
         """Store facts about the work, as values of JSON's types."""
         with self._db:
@@ -270,7 +276,8 @@ class CellIndex:
         values |= rest
         if missing := [name for name in _ROW_KEYS if name not in values]:
             raise self._damage(f"the row of cell {values['key']!s:.40} has no {missing[0]}")
-        return {name: values[name] for name in _ROW_KEYS}
+        values = {**OPTIONAL_COLUMNS, **values}
+        return {name: values[name] for name in (*_ROW_KEYS, *OPTIONAL_COLUMNS, "seconds")}
 
     def _damage(self, found: str) -> BadFile:
         return BadFile(self.path, f"damaged ({found})", "the index of a run or sweep", _ADVICE)
@@ -354,7 +361,13 @@ def _column_types(column: str) -> str:
 
 
 def _as_columns(row: Mapping[str, Any], seconds: float | None) -> tuple[Any, ...]:
-    rest = _json({name: value for name, value in row.items() if name not in _COLUMNS})
+    rest = _json(
+        {
+            name: value
+            for name, value in row.items()
+            if name not in _COLUMNS and not (name in OPTIONAL_COLUMNS and value == OPTIONAL_COLUMNS[name])
+        }
+    )
     texts = {name: _json(row[name]) for name in _JSON_COLUMNS if name in row}
     values = {**row, **texts, "seconds": seconds, "rest": rest}
     return tuple(values.get(name) for name in _COLUMNS)

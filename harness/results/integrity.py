@@ -10,7 +10,7 @@ from typing import Any
 
 from harness.core.files import MAX_JSON_BYTES
 from harness.errors import BadFile
-from harness.results.cell import cell_folder
+from harness.results.cell import OPTIONAL_COLUMNS, cell_folder
 from harness.results.digests import check_file, file_digest, read_result_json
 from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
@@ -55,7 +55,11 @@ def compute_digests(out: Path) -> dict[str, str]:
 
 
 def check_row(path: Path, row: Mapping[str, Any], cell: Mapping[str, Any]) -> None:
-    """BadFile when a row that is stored in the file `path` differs from the row of its cell."""
+    """BadFile when a row that is stored in the file `path` differs from the row of its cell.
+
+    Rows of versions without one of `cell.OPTIONAL_COLUMNS` count as having its default.
+    """
+    row = {**OPTIONAL_COLUMNS, **row}
     for name, value in cell.items():
         if row.get(name) != value:
             found = f"{name} of the cell {cell['key']} is {str(row.get(name))[:80]}"

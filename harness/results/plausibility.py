@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.score.metrics import DEFINITIONS
+from harness.score.metrics import DEFINITIONS, Definition
+from harness.score.uncertainty import SIGMA_DEFINITIONS
 
-SIGNED_METRICS = ("lag_ms",)
+SIGNED_METRICS = ("lag_ms", "sigma_log_score")
 """Metrics that may be negative."""
 _LARGEST = {"share": 1.0, "deg": 360.0}
 """Unit -> the largest possible value; components of two axis-angle vectors differ by up to 360 deg."""
@@ -26,7 +27,7 @@ def find_impossible_metric(metrics: Mapping[str, Any]) -> str:
     None is "not measured" and always possible.
     """
     for name, value in metrics.items():
-        if name in DEFINITIONS and value is not None and not _is_possible(name, value):
+        if name in DEFINITIONS and value is not None and not _is_possible(name, value, DEFINITIONS[name]):
             return f"{name} is {str(value)[:40]}"
     matched, expected = (metrics.get(name) for name in ("frames_matched", "frames_expected"))
     if matched is not None and expected is not None and matched > expected:
@@ -34,9 +35,24 @@ def find_impossible_metric(metrics: Mapping[str, Any]) -> str:
     return ""
 
 
+def find_impossible_sigma(scores: Any) -> str:
+    """Describe the first impossible score of standard deviations, or one that is missing; "" when there is none.
+
+    A method that states no standard deviations has no scores.
+    """
+    if not isinstance(scores, Mapping):
+        return f"sigma_scores is {str(scores)[:40]}"
+    for name, definition in SIGMA_DEFINITIONS.items() if scores else ():
+        if not _is_possible(name, scores.get(name), definition):
+            return f"{name} is {str(scores.get(name))[:40]}"
+    return ""
+
+
 def find_impossible_statistic(groups: Iterable[Mapping[str, Any]]) -> str:
     """Describe the first impossible mean, standard deviation or frame-weighted mean of groups in a summary."""
     for group in groups:
+        if found := find_impossible_sigma(group.get("sigma_scores", {})):
+            return f"the pooled {found}"
         for name, statistics in group["metrics"].items():
             for key in ("mean", "frame_weighted"):
                 if found := find_impossible_metric({name: statistics.get(key)}):
@@ -57,10 +73,10 @@ def find_impossible_frames(per_frame: Mapping[str, Floats]) -> str:
     return ""
 
 
-def _is_possible(name: str, value: Any) -> bool:
+def _is_possible(name: str, value: Any, definition: Definition) -> bool:
     if not _is_number(value):
         return False
-    unit = DEFINITIONS[name].unit
+    unit = definition.unit
     if unit == "frames" and value != int(value):
         return False
     return (value >= 0.0 or name in SIGNED_METRICS) and value <= _LARGEST.get(unit, math.inf) * _ROUNDING

@@ -19,7 +19,7 @@ from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.manifest import Manifest
-from harness.results.plausibility import find_impossible_metric, find_impossible_statistic
+from harness.results.plausibility import find_impossible_metric, find_impossible_sigma, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
 from harness.results.summary import GROUP_KEYS, SummaryStatistics
 from harness.results.table import compute_group_statistics, write_table
@@ -97,7 +97,7 @@ def read_summary(out: Path) -> dict[str, Any]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
     check_summary_types(path, content, advice)
     for row in content["cells"]:
-        if found := find_impossible_metric(row):
+        if found := find_impossible_metric(row) or find_impossible_sigma(row.get("sigma_scores", {})):
             raise BadFile(path, found, "possible values", advice)
     if found := find_impossible_statistic([*content["methods"], *content["behaviours"]]):
         raise BadFile(path, found, "possible values", advice)

@@ -15,9 +15,10 @@ from harness.results.cell import Cell, as_row, varied_text
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
+from harness.score.uncertainty import SigmaSums, score_sigma
 
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
-GROUP_KEYS = ("method", "inputs", "split", "performer", "varied")
+GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")
 """Cells that differ in one of these are never pooled."""
 
 
@@ -43,6 +44,7 @@ class _GroupStatistics:
         self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
         self.step_ms: list[Floats] = []
         self.cpu_ms: list[Floats] = []
+        self.sigma: SigmaSums | None = None
 
     def add(self, cell: Cell) -> None:
         self.sequences.append(as_row(cell))
@@ -52,6 +54,10 @@ class _GroupStatistics:
             self.frames[name].append(values[cell.scores.scored].astype(np.float32))
         timed = cell.scores.scored & (np.arange(len(cell)) > 0)
         self.step_ms.append(cell.step_ms[timed])
+        if cell.sigma_scores and cell.angle_sigma_rad is not None:
+            rows = cell.scores.scored
+            sums = score_sigma(cell.truth_qpos[rows], cell.estimate_qpos[rows], cell.angle_sigma_rad[rows])
+            self.sigma = sums if self.sigma is None else self.sigma + sums
         self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
 
     def named(self, fields: Iterable[str]) -> dict[str, Any]:
@@ -67,6 +73,7 @@ class _GroupStatistics:
             **counts,
             "coverage": counts["frames_matched"] / expected if expected else 0.0,
             "metrics": {name: self._statistics(name) for name in measured},
+            "sigma_scores": self.sigma.scores() if self.sigma else {},
         }
 
     def _statistics(self, name: str) -> dict[str, float | int | None]:

@@ -10,9 +10,10 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.files import write_parts
-from harness.results.cell import EXTRA_IDENTITY, IDENTITY, varied_text
+from harness.results.cell import EXTRA_IDENTITY, IDENTITY, OPTIONAL_COLUMNS, varied_text
 from harness.results.index import CellIndex
 from harness.score.metrics import DEFINITIONS
+from harness.score.uncertainty import SIGMA_DEFINITIONS
 
 FIRST_METRICS = (
     "frames_matched",
@@ -29,7 +30,9 @@ FIRST_METRICS = (
 )
 METRIC_COLUMNS = (*FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS))
 COLUMNS = (*IDENTITY, *METRIC_COLUMNS, *EXTRA_IDENTITY, "key", "seconds")
-"""Columns of summary.csv. A column `vary.KEY` for each varied key follows."""
+"""Columns of summary.csv. A column `vary.KEY` for each varied key follows, then `LAST_COLUMNS` if a cell has them."""
+LAST_COLUMNS = ("lag", *SIGMA_DEFINITIONS)
+"""Columns of a table in which some method has a lag or states standard deviations."""
 TIME_COLUMNS = (*(n for n in METRIC_COLUMNS if n.startswith(("step_", "first_step_"))), "fps", "seconds")
 """Columns whose values differ from run to run."""
 SUMMARY_METRICS = (
@@ -64,10 +67,11 @@ def _csv_lines(index: CellIndex) -> Iterator[str]:
     }
     lines, identities, metrics = _LastLineWriter(), len(IDENTITY), len(METRIC_COLUMNS)
     stations, rate = IDENTITY.index("stations"), IDENTITY.index("rate_hz")
+    last = LAST_COLUMNS if any(values != OPTIONAL_COLUMNS for values in index.optional()) else ()
     table = csv.writer(lines, lineterminator="\n")
-    table.writerow([*COLUMNS, *(f"vary.{key}" for key in keys)])
+    table.writerow([*COLUMNS, *(f"vary.{key}" for key in keys), *last])
     yield lines.last
-    for row in index.columns(*COLUMNS):
+    for row, of_cell in zip(index.columns(*COLUMNS), index.optional(), strict=True):
         identity, figures, (scenario, performer, varied_json, key, seconds) = (
             list(row[:identities]),
             row[identities : identities + metrics],
@@ -78,7 +82,9 @@ def _csv_lines(index: CellIndex) -> Iterator[str]:
         text, values = fields[varied_json]
         table.writerow(identity)
         first = lines.last[:-1]
-        table.writerow([scenario, performer, text, key, _format_numbers((seconds,)), *values])
+        figures_last = [of_cell["lag"], *(of_cell["sigma_scores"].get(name) for name in SIGMA_DEFINITIONS)]
+        further = [_format_numbers((value,)) for value in figures_last[: len(last)]]
+        table.writerow([scenario, performer, text, key, _format_numbers((seconds,)), *values, *further])
         yield f"{first},{_format_numbers(figures)},{lines.last}"
 
 

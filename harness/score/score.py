@@ -1,7 +1,7 @@
 """Score of an estimated motion: every metric per frame, per joint and as one number."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
 from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
+from harness.score.uncertainty import SigmaSums, score_sigma
 
 WARM_UP_S = 1.0
 """Estimates in this first part of a take are not scored [s] (choice)."""
@@ -33,6 +34,8 @@ class Scores:
     """Metric -> hinge, bone or joint -> mean over the scored frames."""
     scored: Bools
     """(F,) scored frames: finite and after the warm-up."""
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    """Scores of the stated standard deviations, see `uncertainty.SIGMA_DEFINITIONS`; empty without them."""
 
 
 def score_estimate(
@@ -47,6 +50,7 @@ def score_estimate(
     origin: Ints | None = None,
     complete: Bools | None = None,
     cpu_ms: tuple[Floats, Floats] | None = None,
+    angle_sigma_rad: Floats | None = None,
     estimate_skeleton: Skeleton | None = None,
     warm_up_s: float = WARM_UP_S,
     floor: float = COVERAGE_FLOOR,
@@ -60,8 +64,12 @@ def score_estimate(
     - `step_ms` (F,): wall time of each step, NaN where not timed;
     - `origin` (F,): values of `Origin`, all MODEL by default;
     - `complete` (F,): frames in which every station reported, all by default;
+    - `angle_sigma_rad` (F, 48): standard deviations of the hinge angles, in the order of `qpos`, if any are stated;
     - `cpu_ms`: CPU time (F,) of the steps and (F,) of the reference (see `timing.step_relative`), NaN where not timed.
     """
+    if angle_sigma_rad is not None and np.shape(angle_sigma_rad) != (len(estimate_qpos), len(skeleton.axes)):
+        expected_shape = f"({len(estimate_qpos)}, {len(skeleton.axes)})"
+        raise ShapeError("score", "angle_sigma_rad", np.shape(angle_sigma_rad), expected_shape)
     origin = np.full(len(estimate_qpos), Origin.MODEL) if origin is None else np.asarray(origin)
     complete = np.ones(len(estimate_qpos), bool) if complete is None else np.asarray(complete)
     frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
@@ -112,7 +120,11 @@ def score_estimate(
         name: counts[name] if name in counts else measured[name] if enough and np.isfinite(measured[name]) else None
         for name in DEFINITIONS
     }
-    return Scores(metrics, per_frame, _per_joint(scored_pair) if enough else {}, scored)
+    per_joint, sigma = (_per_joint(scored_pair), dict[str, float]()) if enough else ({}, {})
+    if enough and angle_sigma_rad is not None:
+        sums = score_sigma(truth_qpos[frame_index[scored]], estimate_qpos[scored], angle_sigma_rad[scored])
+        sigma, per_joint = sums.scores(), per_joint | _sigma_per_joint(skeleton, sums)
+    return Scores(metrics, per_frame, per_joint, scored, sigma)
 
 
 def undisturbed_frames(complete: Bools, frame_index: Ints, rate_hz: float) -> Bools:
@@ -153,6 +165,12 @@ def _per_joint(pair: Pair) -> dict[str, dict[str, float]]:
         "mpjpe_mm": (joint_names(pair.skeleton), positions.joint_errors_mm(pair).mean(axis=0)),
     }
     return {metric: dict(zip(names, map(float, row), strict=True)) for metric, (names, row) in columns.items()}
+
+
+def _sigma_per_joint(skeleton: Skeleton, sums: SigmaSums) -> dict[str, dict[str, float]]:
+    return {
+        name: dict(zip(skeleton.dof_names, map(float, values), strict=True)) for name, values in sums.by_hinge().items()
+    }
 
 
 def _check_shapes(

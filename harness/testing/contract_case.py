@@ -75,7 +75,11 @@ class ContractCase:
         return np.array([root_m.min(axis=0) - 3.0, root_m.max(axis=0) + 3.0])
 
     def run(self, frames: Frames) -> list[Estimate]:
-        """Estimates of a new session."""
+        """Estimates of a new session, one for each frame that it answers: all but the last `lag` frames."""
+        return answers_by_frame(self.steps(frames))
+
+    def steps(self, frames: Frames) -> list[Estimate]:
+        """Estimates of a new session, one for each step."""
         return run_session(self.reconstructor.begin(self.calibration), frames)
 
     def begin_sessions(self, count: int) -> list[Session]:
@@ -91,6 +95,11 @@ def make_case(method: Method) -> ContractCase:
 
 def run_session(session: Session, frames: Frames) -> list[Estimate]:
     return [session.step(frame) for frame in frames]
+
+
+def answers_by_frame(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """The last estimate of each frame that is answered, from those of all steps of a session with a constant lag."""
+    return list(estimates[getattr(estimates[-1], "lag", 0) :])
 
 
 def stack_qpos(estimates: Sequence[Estimate]) -> Floats:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.compare.comparison import compare_results
-from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
+from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, split_by_lag
 from harness.core.seeds import generator
 from harness.results.reader import ResultSet
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -94,3 +94,14 @@ def test_methods_on_other_clips_are_not_ranked() -> None:
     alone = rank_methods({"a": {PRIMARY_METRIC: {"x": 1.0}}}, PRIMARY_METRIC)
     assert alone is not None
     assert (alone.lowest, alone.best, alone.results) == ("a", None, {})
+
+
+def test_each_lag_is_a_part_of_its_own() -> None:
+    values: dict[str, ClipValues] = {name: {PRIMARY_METRIC: {"x": 1.0}} for name in ("a", "late", "b", "later", "also")}
+    parts = split_by_lag(values, {"late": 2, "later": 4, "also": 2, "a": 0})
+    assert [(lag, list(part)) for lag, part in parts.items()] == [
+        (0, ["a", "b"]),
+        (2, ["late", "also"]),
+        (4, ["later"]),
+    ]
+    assert split_by_lag({}, {}) == {}

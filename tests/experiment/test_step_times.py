@@ -28,7 +28,7 @@ def test_reference_work_lies_between_steps_and_the_step_after_it_is_not_timed() 
     frames = 3 * FRAMES_PER_TIMING + 2
     diary: Any = Diary()
     shown: Any = range(frames)
-    qpos, status, _, step_ms, cpu_ms, reference_ms = run_method(diary, diary, shown)
+    qpos, status, _, step_ms, cpu_ms, reference_ms, *_ = run_method(diary, diary, shown)
     assert diary.seen == list(range(frames))
     np.testing.assert_array_equal(qpos[:, 0], np.arange(frames))
     assert len(status) == len(step_ms) == len(cpu_ms) == len(reference_ms) == frames

@@ -276,6 +276,42 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
         assert (pose.estimate.status, pose.estimate.origin) == (estimate.status, estimate.origin)
 
 
+class Late(Counting):
+    """Answers two frames late, with a pose whose height is the number of the frame."""
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        super().step(frame)
+        lag = min(len(self.seen) - 1, 2)
+        qpos = humanoid.tpose(BODY.skeleton).copy()
+        qpos[2] = len(self.seen) - 1 - lag
+        return Estimate(qpos, Status.SOLVED, lag=lag)
+
+
+def test_a_late_pose_has_the_frame_that_it_answers() -> None:
+    output = Kept()
+    done = performed(Paced(frames(12), 0.005), Late(), output, plan=LiveOptions(100.0, queue_frames=99))
+    assert [pose.root_m[2] for pose in output.poses] == [
+        pytest.approx(100.0 * p.frame.measured_s[0]) for p in output.poses
+    ]
+    assert [pose.root_m[2] for pose in output.poses] == list(range(10)), "each frame once, the last two never"
+    assert [pose.number for pose in output.poses] == list(range(10))
+    assert np.all(np.diff([pose.measured_s for pose in output.poses]) > 0.0)
+    assert (done.poses, done.lag, done.lag_s) == (10, 2, 0.02)
+
+
+def test_the_lag_is_added_to_the_latency() -> None:
+    done = performed(Paced(frames(12), 0.005), Late(), plan=LiveOptions(100.0, queue_frames=99))
+    content = summary.as_dict(done, {})
+    assert (content["lag_frames"], content["lag_ms"]) == (2, 20.0)
+    for name, ms in content["latency"]["last byte to pose"].items():
+        assert content["latency_with_lag"][name] == pytest.approx(ms + 20.0)
+    (line,) = [line for line in summary.lines(done, {}) if line.startswith("with the method's lag of 2 frames")]
+    assert float(line.split()[-3]) == pytest.approx(content["latency"]["last byte to pose"]["p50_ms"] + 20.0, abs=0.006)
+    causal = performed(Paced(frames(5), 0.005), Counting(), plan=LiveOptions(100.0, queue_frames=99))
+    assert summary.as_dict(causal, {})["lag_ms"] == 0.0
+    assert not any("lag" in line for line in summary.lines(causal, {}))
+
+
 def test_a_summary_says_what_happened() -> None:
     done = performed(Paced(frames(5), 0.01), Counting(), plan=LiveOptions(100.0, queue_frames=9))
     times = {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 7.5}

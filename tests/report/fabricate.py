@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,10 @@ class Plan:
     """Behaviours of the takes, in turn."""
     varied: tuple[Mapping[str, Any], ...] = ({},)
     """The n-th entry has errors n times as large."""
+    sigma_deg: Mapping[str, float] = field(default_factory=dict)
+    """Method -> mean standard deviation that it states, half of it for the first hinge and changing over time [deg]."""
+    lags: Mapping[str, int] = field(default_factory=dict)
+    """Method -> its lag [frames]; the last frames have no answer."""
 
 
 def fabricate(out: Path, plan: Plan | None = None) -> Path:
@@ -82,9 +86,17 @@ def make_cell(
     valid, quality = _readings(clip, len(truth))
     rng = generator(1, clip, method, inputs)
     seen = np.flatnonzero(rng.random(len(truth)) < (0.0 if method in plan.silent else plan.covered))
+    lag = plan.lags.get(method, 0)
+    seen = seen[seen < len(truth) - lag]
     estimate = _wrong(truth, error_deg, valid, rng)[seen]
+    sigma_rad = None
+    if method in plan.sigma_deg:
+        over_time = 1.0 + 0.1 * np.sin(seen / 7.0)
+        sigma_rad = np.deg2rad(plan.sigma_deg[method]) * over_time[:, None] * np.linspace(0.5, 1.5, 48)
     status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
-    defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ, "varied": varied}
+    defined_by: dict[str, Any] = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ, "varied": varied}
+    defined_by |= {"lag": lag} if lag else {}
+    scores = score_estimate(skeleton, RATE_HZ, truth, estimate, seen, status, step_ms, angle_sigma_rad=sigma_rad)
     return storage.Cell(
         key=storage.cell_key(defined_by, {"name": method}, "made up"),
         method=method,
@@ -100,7 +112,7 @@ def make_cell(
         noise="default",
         seed=1,
         defined_by=defined_by,
-        scores=score_estimate(skeleton, RATE_HZ, truth, estimate, seen, status, step_ms),
+        scores=scores,
         health={"records": 6 * len(truth), "frames_dropped": 3, "out_of_order": 0, "clock_ppm": 12.5},
         bone_m=skeleton.bone_m,
         source_hash="0123456789abcdef",
@@ -120,6 +132,7 @@ def make_cell(
         performer=plan.performers[(take - 1) % len(plan.performers)],
         scenario="fabricated",
         varied=varied,
+        angle_sigma_rad=sigma_rad,
     )
 
 

@@ -36,6 +36,8 @@ class Plan:
     """Cells that are planned, and neither finished nor failed."""
     unmeasured: tuple[str, ...] = ()
     """Methods whose metrics are None."""
+    lags: Mapping[str, int] = field(default_factory=dict)
+    """Method -> its lag [frames]."""
 
 
 def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
@@ -87,6 +89,7 @@ def _row(
         "noise": "default",
         "seed": seed,
         "varied": varied,
+        **({"lag": plan.lags[method]} if method in plan.lags else {}),
         "joint_angle_mean_deg": error if known else None,
         "mpjpe_mm": 6.0 * error if known else None,
         "mpjre_deg": 1.7 * error if known else None,

@@ -71,3 +71,11 @@ def test_inputs_of_one_method_are_compared() -> None:
 def test_what_cannot_be_judged_says_why(rows: list[dict[str, Any]], why: str) -> None:
     (found,) = evaluate_orders([METHODS], rows)
     assert (found["holds"], found["means_deg"], found["why"]) == (None, None, [why])
+
+
+def test_methods_with_different_lags_have_no_order() -> None:
+    (found,) = evaluate_orders([METHODS], [row("ik", 3.0), row("new", 1.0, lag=2), row("old", 2.0, lag=0)])
+    assert (found["holds"], found["means_deg"]) == (None, None)
+    assert found["why"] == ["methods with different lags are not ranked"]
+    (found,) = evaluate_orders([METHODS], [row(name, n, lag=2) for n, name in enumerate(METHODS.names)])
+    assert found["holds"] is True

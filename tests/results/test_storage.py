@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from harness.core.files import TEMPORARY, to_json_types
 from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
-from harness.results.cell import as_row
+from harness.results.cell import as_row, read_row
 from harness.results.digests import file_digest
+from harness.results.index import CellIndex
+from harness.results.integrity import check_row
 from tests.results.finish import finish_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 
@@ -62,6 +65,115 @@ def test_what_calibration_found_is_kept(run_folder: Path, make_cell: MakeCell) -
         assert as_row(back)["calibration_errors"] == cell.calibration_errors
     with pytest.raises(ShapeError, match="estimate_bone_m"):
         make_cell(estimate_bone_m=known.bone_m[:5])
+
+
+def stating(make_cell: MakeCell, judge: Callable[..., Any], **fields: Any) -> storage.Cell:
+    """A cell of a method that states standard deviations and has a lag of two frames."""
+    plain = make_cell()
+    sigma_rad = np.full((400, 48), 0.25)
+    scores = judge(plain.estimate_qpos, angle_sigma_rad=sigma_rad)
+    conditions = {**plain.defined_by, "lag": 2}
+    return make_cell(angle_sigma_rad=sigma_rad, scores=scores, defined_by=conditions, **fields)
+
+
+def test_lag_and_standard_deviations_are_kept(run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any]) -> None:
+    storage.open_run(run_folder, manifest())
+    cell = stating(make_cell, judge)
+    back = storage.read_cell(storage.write_cell(run_folder, cell))
+    assert back.angle_sigma_rad is not None
+    np.testing.assert_array_equal(back.angle_sigma_rad, cell.angle_sigma_rad)
+    assert (back.lag, dict(back.sigma_scores)) == (2, dict(cell.sigma_scores))
+    assert as_row(back) == to_json_types(as_row(cell)) == read_row(run_folder / "cells" / cell.key)
+    with pytest.raises(ShapeError, match="angle_sigma_rad"):
+        make_cell(angle_sigma_rad=np.ones((400, 47)))
+
+
+def test_rows_of_versions_without_lag_and_standard_deviations_are_read(run_folder: Path, make_cell: MakeCell) -> None:
+    """A folder that such a version wrote has neither column in cell.json, index, summary.json and summary.csv."""
+    cell = make_cell()
+    storage.open_run(run_folder, manifest())
+    folder = storage.write_cell(run_folder, cell)
+    assert not {"lag", "sigma_scores"} & set(read_json(folder / "cell.json"))
+    finish_run(run_folder, keys=[cell.key], planned=1)
+    head, _ = (run_folder / "summary.csv").read_text().splitlines()
+    assert not {"lag", "sigma_coverage_1"} & set(head.split(","))
+
+    def strip(content: dict[str, Any]) -> None:
+        for row in (*content["cells"], *content["methods"], *content["behaviours"]):
+            row.pop("lag")
+            row.pop("sigma_scores")
+
+    content = read_json(run_folder / "summary.json")
+    strip(content)
+    write_json(run_folder / "summary.json", content)
+    summary = storage.read_summary(run_folder)
+    assert "lag" not in summary["cells"][0]
+    check_row(run_folder / "summary.json", summary["cells"][0], as_row(storage.read_cell(folder)))
+    with CellIndex(run_folder, read_only=True) as index:
+        ((rest,),) = index.columns("rest")
+        assert "lag" not in rest
+        assert [(row["lag"], row["sigma_scores"]) for row in index.rows()] == [(0, {})]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "found"),
+    [
+        ("sigma_coverage_1", 1.5, "sigma_coverage_1 is 1.5"),
+        ("sigma_width_deg", -1.0, "sigma_width_deg is -1.0"),
+        ("sigma_log_score", None, "sigma_log_score is None"),
+    ],
+)
+def test_impossible_scores_of_standard_deviations_are_refused(
+    run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], name: str, value: float | None, found: str
+) -> None:
+    storage.open_run(run_folder, manifest())
+    folder = storage.write_cell(run_folder, stating(make_cell, judge))
+    scores = read_json(folder / "cell.json")["sigma_scores"]
+    rewrite_json(folder / "cell.json", sigma_scores={**scores, name: value})
+    with pytest.raises(BadFile, match=found):
+        storage.read_cell(folder)
+
+
+def test_an_impossible_lag_is_refused(run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any]) -> None:
+    storage.open_run(run_folder, manifest())
+    folder = storage.write_cell(run_folder, stating(make_cell, judge))
+    conditions = read_json(folder / "cell.json")["defined_by"]
+    rewrite_json(folder / "cell.json", defined_by={**conditions, "lag": -2})
+    with pytest.raises(BadFile, match=r"defined_by.lag: expected a number of frames, found -2"):
+        storage.read_cell(folder)
+
+
+@pytest.mark.parametrize(
+    ("part", "changes", "found"),
+    [
+        ("cells", {"lag": "two"}, r"cells\[0\].lag: expected a number of frames, found two"),
+        ("behaviours", {"lag": -1}, r"behaviours\[0\].lag: expected a number of frames, found -1"),
+        ("cells", {"sigma_scores": {"sigma_coverage_1": 2.0}}, "sigma_coverage_1 is 2.0"),
+        ("methods", {"sigma_scores": 5}, "the pooled sigma_scores is 5"),
+    ],
+)
+def test_impossible_rows_of_a_summary_are_refused(
+    run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], part: str, changes: dict[str, Any], found: str
+) -> None:
+    cell = stating(make_cell, judge)
+    storage.open_run(run_folder, manifest())
+    storage.write_cell(run_folder, cell)
+    finish_run(run_folder, keys=[cell.key], planned=1)
+    content = read_json(run_folder / "summary.json")
+    content[part][0].update(changes)
+    write_json(run_folder / "summary.json", content)
+    with pytest.raises(BadFile, match=found):
+        storage.read_summary(run_folder)
+
+
+@pytest.mark.parametrize("value", [0.0, -0.1, np.nan, np.inf])
+def test_impossible_standard_deviations_are_refused(run_folder: Path, make_cell: MakeCell, value: float) -> None:
+    storage.open_run(run_folder, manifest())
+    sigma_rad = np.full((400, 48), 0.1)
+    sigma_rad[7, 3] = value
+    folder = storage.write_cell(run_folder, make_cell(angle_sigma_rad=sigma_rad))
+    with pytest.raises(BadFile, match="a value of angle_sigma_rad that is not above 0"):
+        storage.read_cell(folder)
 
 
 def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:

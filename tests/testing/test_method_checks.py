@@ -320,6 +320,52 @@ class DependsOnPosition(StandingSession):
         return self.bent(0.05 * float(np.tanh(where_m[0] + self.known.tracker_origin_m[0])))
 
 
+class StatesAtTimes(StandingSession):
+    """States standard deviations only where every station reports."""
+
+    def step(self, frame: TrackerFrame) -> Any:
+        status, _ = self.coverage.update(frame)
+        sigma_rad = np.full(48, 0.1) if frame.position_valid.all() else None
+        return Estimate(self.answer(frame), status, angle_sigma_rad=sigma_rad)
+
+
+class CertainWhenLost(StandingSession):
+    """Answers with standard deviations of 0 when no station reports, in an object that nothing checks."""
+
+    def step(self, frame: TrackerFrame) -> Any:
+        status, _ = self.coverage.update(frame)
+        sigma_rad = np.full(48, 0.1 if frame.quality.any() else 0.0)
+        origin, qpos = Origin.MODEL, self.answer(frame)
+        return SimpleNamespace(qpos=qpos, status=status, origin=origin, angle_sigma_rad=sigma_rad, lag=0)
+
+
+class AnswersTooEarly(StandingSession):
+    """States at its first step that it answers an earlier frame."""
+
+    def start(self) -> None:
+        self.lag = 1
+
+    def step(self, frame: TrackerFrame) -> Any:
+        status, _ = self.coverage.update(frame)
+        lag, self.lag = self.lag, 0
+        return Estimate(self.answer(frame), status, lag=lag)
+
+
+class LateSession(StandingSession):
+    """Correct: it answers three frames late, with the status of the frame, and states standard deviations."""
+
+    def start(self) -> None:
+        self.answers: list[Estimate] = []
+
+    def step(self, frame: TrackerFrame) -> Any:
+        status, _ = self.coverage.update(frame)
+        self.answers.append(Estimate(self.answer(frame), status))
+        lag = min(len(self.answers) - 1, 3)
+        found = self.answers[-1 - lag]
+        return Estimate(found.qpos, found.status, found.origin, np.full(48, 0.1), lag)
+
+
+FORM_RULE = "lag and standard deviations keep their form"
 PROCESS_RULE = "a fitted method works in another process"
 FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
     (DriftingQuaternion, "every estimate is a valid pose"),
@@ -329,6 +375,9 @@ FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
     (NeedsPeriod, "irregular frame times are tolerated"),
     (NeedsQuality, "any reading quality is tolerated"),
     (NeedsSixStations, "any set of stations is supported"),
+    (StatesAtTimes, FORM_RULE),
+    (CertainWhenLost, FORM_RULE),
+    (AnswersTooEarly, FORM_RULE),
     (Unseeded, "equal input gives equal estimates"),
     (Continuing, "a session does not depend on earlier sessions"),
     (SharesTime, "simultaneous sessions do not affect each other"),
@@ -363,8 +412,14 @@ def test_a_correct_method_passes() -> None:
 
 
 @pytest.mark.usefixtures("_without_process_rule")
-def test_a_correct_method_has_no_violations() -> None:
-    assert violations(Standing(StandingSession)) == {}
+@pytest.mark.parametrize("session", [StandingSession, LateSession])
+def test_a_correct_method_has_no_violations(session: type[StandingSession]) -> None:
+    assert violations(Standing(session)) == {}
+
+
+def test_the_lag_and_the_standard_deviations_are_named() -> None:
+    (found,) = [result for result in check_rules(Standing(LateSession)) if result.rule == FORM_RULE]
+    assert found.seen == "a lag of 3 frames, standard deviations"
 
 
 @pytest.mark.long

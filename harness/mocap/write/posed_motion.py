@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.humanoid24 import standard_skeleton, unpack
+from harness.core.humanoid24 import QPOS_OF_DOF, standard_skeleton, unpack
 from harness.core.skeleton import Skeleton, forward_kinematics
 
 
@@ -39,6 +39,8 @@ class ExportableCell(Protocol):
     def truth_qpos(self) -> Floats: ...
     @property
     def estimate_qpos(self) -> Floats: ...
+    @property
+    def angle_sigma_rad(self) -> Floats | None: ...
     @property
     def errors(self) -> Mapping[str, Floats]: ...
 
@@ -77,6 +79,10 @@ def pose_truth_and_estimate(cell: ExportableCell) -> dict[str, PosedMotion]:
     """Truth and estimate of a cell, each on its own skeleton, in the frames with a finite estimate."""
     finite = np.isfinite(cell.estimate_qpos).all(axis=1)
     extra = {"status": cell.status[finite].astype(float)} | {name: e[finite] for name, e in cell.errors.items()}
+    if cell.angle_sigma_rad is not None:
+        sigma_deg = np.rad2deg(cell.angle_sigma_rad[finite][:, QPOS_OF_DOF])
+        names = standard_skeleton().dof_names
+        extra |= {f"{name}_sigma_deg": column for name, column in zip(names, sigma_deg.T, strict=True)}
     time_s, frame_index = cell.time_s[finite], cell.frame_index[finite]
 
     def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> PosedMotion:

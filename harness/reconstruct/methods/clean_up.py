@@ -5,6 +5,9 @@ hinges. A hinge's standard deviation is in proportion to its spread over the exa
 is the more exact the less a hinge moves. Under one wide sigma for all, the noise of readings moved hinges that the
 method knew better (docs/notes/tuning.md). The root has no prior. The other method never sees the correction.
 
+An answer to an earlier frame is fitted to the readings of that frame. Its standard deviations are passed on unchanged:
+they describe the other method's pose, which the correction moves little.
+
 Source: the last step of Kim et al. 2012 (docs/papers.md B5).
 
 Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `CleanUp`): `spread_share` 0.5,
@@ -12,6 +15,7 @@ Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -102,9 +106,12 @@ class CleanUpSession:
         self._solver = IKSolver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
         self._precision[6:] = fitted.hinge_sigma_rad**-2
+        self._frames: deque[TrackerFrame] = deque()
+        """The frame that was answered last, and those after it."""
 
     def step(self, frame: TrackerFrame) -> Estimate:
         estimate = self._inner.step(frame)
+        frame = self._answered_frame(frame, estimate.lag)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return estimate
         self._gate.read(frame, self._residuals)
@@ -113,4 +120,13 @@ class CleanUpSession:
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)
-        return Estimate(qpos, estimate.status, estimate.origin)
+        return Estimate(qpos, estimate.status, estimate.origin, estimate.angle_sigma_rad, estimate.lag)
+
+    def _answered_frame(self, frame: TrackerFrame, lag: int) -> TrackerFrame:
+        """The frame so many before this one; ValueError when the session received no such frame, or passed it."""
+        self._frames.append(frame)
+        if lag >= len(self._frames):
+            raise ValueError(f"a lag of {lag} frames, but an answer may go back {len(self._frames) - 1} at most here")
+        while len(self._frames) > lag + 1:
+            self._frames.popleft()
+        return self._frames[0]

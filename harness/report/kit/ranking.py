@@ -10,7 +10,14 @@ from harness.report.kit.text import list_first
 
 BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
 """End of the caption of a table with bold cells."""
+LAG_NOTE = "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
+"""Sentence of pages and tables with methods of several lags."""
 _MOST_NAMED = 4
+
+
+def name_lag(lag: int) -> str:
+    """A lag in words, such as "a lag of 2 frames"."""
+    return f"a lag of {count_noun(lag, 'frame')}"
 
 
 def describe_ranking(

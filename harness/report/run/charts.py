@@ -29,6 +29,11 @@ if TYPE_CHECKING:
 
 AXIS_LABELS = {PRIMARY_METRIC: "joint angle error [deg]", SECONDARY_METRIC: "joint position error [mm]"}
 """Metric -> label of its axis."""
+SIGMA_BAND_NOTE = (
+    " Shaded: up to the mean standard deviation that a method states for the hinges of a frame. Well-stated ones put "
+    "the mean error at 0.8 of the band."
+)
+"""Sentence of a caption with such bands; 0.8 is the mean of an absolute normal error, sqrt(2 / pi)."""
 
 
 def error_over_time(run: RunData, behaviour: str) -> Chart:
@@ -46,6 +51,8 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
             time_s, values = decimate(*_insert_gaps(trace.time_s, values))
             error.plot(time_s, values, label=trace.series, **line_style(run.charted_series.index(trace.series)))
         _set_log_scale(error, "y")
+        for trace in (trace for trace in shown if trace.series in run.charted_series and len(trace.sigma_deg)):
+            _draw_sigma_band(error, trace, line_style(run.charted_series.index(trace.series))["color"])
         error.set_ylabel(AXIS_LABELS[PRIMARY_METRIC])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
@@ -56,7 +63,7 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
         f"error_{to_file_name(behaviour)}",
         behaviour.replace("_", " "),
         f"{which}. Grey: warm-up, not scored. Below: quality of each station, from 1 (blue) to 0 (red, lost)."
-        f"{omitted_series_note(run)}",
+        f"{SIGMA_BAND_NOTE if any(len(trace.sigma_deg) for trace in shown) else ''}{omitted_series_note(run)}",
         f"Joint angle error of methods over time on {clip}, and the quality of every station below it.",
         draw,
         2.6 + 0.2 * len(shown[0].stations),
@@ -80,16 +87,13 @@ def error_per_joint(run: RunData, series: str) -> Chart:
             (right, joints, 1, "position of the far end [mm]"),
         ):
             rows = np.arange(len(names))
-            _draw_boxes(axes, boxes[part], COLOURS[0])
+            draw_boxes(axes, boxes[part], COLOURS[0])
             for colour, name in zip(COLOURS[1:], shown, strict=False):
                 median = np.median(_pooled_errors(run, name)[part], axis=0)
                 axes.plot(median, rows, "o", markersize=3.5, color=colour, label=name)
             axes.set_yticks(rows, names)
             axes.set_ylim(len(names) - 0.3, -0.7)
-            axes.set_xscale("function", functions=(np.sqrt, np.square))
-            axes.set_xlim(left=0.0)
-            ticks = _root_ticks(axes.get_xlim()[1])
-            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+            set_root_scale(axes)
             axes.set_title(title)
             axes.grid(False, axis="y")
         if shown:
@@ -161,13 +165,22 @@ def _draw_quality(axes: "Axes", trace: Trace) -> None:
     axes.set_xlabel("time [s]")
 
 
+def _draw_sigma_band(axes: "Axes", trace: Trace, colour: str) -> None:
+    """Shade the area up to the mean standard deviation of a frame's hinges."""
+    bottom, top = axes.get_ylim()
+    mean_deg = np.where(trace.scored, trace.sigma_deg.mean(axis=1), np.nan)
+    time_s, mean_deg = decimate(*_insert_gaps(trace.time_s, mean_deg))
+    axes.fill_between(time_s, bottom, np.maximum(mean_deg, bottom), color=colour, alpha=0.13, linewidth=0)
+    axes.set_ylim(bottom, np.nanmax(mean_deg, initial=top))
+
+
 def _pooled_errors(run: RunData, series: str) -> tuple[Floats, Floats]:
     """Rotation (N, 22) [deg] and position (N, 25) [mm] errors of every scored frame of a series."""
     traces = [trace for trace in run.traces if trace.series == series]
     return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
 
 
-def _draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
+def draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
     """A horizontal box for each column of (N, M) values. Axes.boxplot would import pyplot with its global state."""
     low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
     places = np.arange(values.shape[1])
@@ -189,6 +202,14 @@ def _set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0,) if few else (1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(lambda value, _: f"{value:g}")
+
+
+def set_root_scale(axes: "Axes") -> None:
+    """Give the x axis a square-root scale from 0, with plain numbers."""
+    axes.set_xscale("function", functions=(np.sqrt, np.square))
+    axes.set_xlim(left=0.0)
+    ticks = _root_ticks(axes.get_xlim()[1])
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
 
 
 def _root_ticks(end: float) -> list[float]:

@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.style import STYLES
-from harness.results.cell import Cell, as_row, cell_folder, varied_text
+from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, varied_text
 from harness.results.integrity import SUMMARY, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.results.summary import GROUP_KEYS
-from harness.score.angles import local_errors_deg
+from harness.score.angles import hinge_errors_deg, local_errors_deg
 from harness.score.pair import Pair, PoseSequence, compute_poses
 from harness.score.positions import joint_errors_mm
+from harness.score.uncertainty import in_skeleton_order
 
 Row = Mapping[str, Any]
 _GROUPS = ("methods", "behaviours")
@@ -53,6 +55,10 @@ class Trace:
     """(N, 22) geodesic error of each hinged bone in the scored frames, float32."""
     position_mm: Floats
     """(N, 25) error of each joint centre in the scored frames, float32."""
+    hinge_deg: Singles
+    """(N, 48) error of each hinge angle in the scored frames, float32; (0, 48) without standard deviations."""
+    sigma_deg: Singles
+    """(F, 48) standard deviation that the method states for each hinge, float32; (0, 48) where it states none."""
     quality: Floats
     """(F, S) quality of each station, 0 to 1."""
     position_valid: Bools
@@ -81,6 +87,12 @@ class RunData:
         rows: Sequence[Row] = self.summary["cells"]
         return rows
 
+    @cached_property
+    def series_with_sigma(self) -> tuple[str, ...]:
+        """The series whose methods state standard deviations, the lowest error first."""
+        stated = {trace.series for trace in self.traces if len(trace.sigma_deg)}
+        return tuple(name for name in self.ranked if name in stated)
+
     @property
     def varied_label(self) -> str:
         """The varied values that the page shows, as text; empty when the scenario varies none."""
@@ -90,6 +102,11 @@ class RunData:
     def series(self) -> tuple[str, ...]:
         """Names of what is compared: methods, qualified by inputs, split and performer where these vary."""
         return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
+
+    @cached_property
+    def lags(self) -> Mapping[str, int]:
+        """Series -> lag of its method [frames]."""
+        return {self.series_of(row): lag_of(row) for row in self.summary["methods"]}
 
     @cached_property
     def ranked(self) -> tuple[str, ...]:
@@ -132,8 +149,16 @@ def _cell_of_row(run: RunData, row: Row) -> Cell:
     return cell
 
 
+def lag_of(row: Row) -> int:
+    """Lag of the method of a row [frames]; rows of versions without lags are of causal methods."""
+    return int(row.get("lag", OPTIONAL_COLUMNS["lag"]))
+
+
 def series_name(row: Row, rows: Sequence[Row]) -> str:
-    """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary."""
+    """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary.
+
+    It states the lag of the method if the method's own name does not.
+    """
     parts = []
     if len({r["inputs"] for r in rows}) > 1:
         parts.append(str(row["inputs"]))
@@ -141,7 +166,7 @@ def series_name(row: Row, rows: Sequence[Row]) -> str:
         parts.append(f"split {row['split']}")
     if len({r["performer"] for r in rows}) > 1:
         parts.append(f"{row['performer'] or 'no'} performer")
-    return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+    return name_with_lag(str(row["method"]), lag_of(row)) + (f" ({', '.join(parts)})" if parts else "")
 
 
 def last_varied(summary: Row) -> Row:
@@ -154,7 +179,8 @@ def last_varied(summary: Row) -> Row:
 
 
 def _trace(run: RunData, cell: Cell) -> Trace:
-    pair = scored_pair(cell)
+    pair, sigma_rad = scored_pair(cell), cell.angle_sigma_rad if cell.sigma_scores else None
+    none: Singles = np.zeros((0, len(pair.skeleton.axes)), np.float32)
     return Trace(
         key=cell.key,
         series=run.series_of({name: getattr(cell, name) for name in GROUP_KEYS}),
@@ -168,6 +194,8 @@ def _trace(run: RunData, cell: Cell) -> Trace:
         errors={name: cell.errors[name] for name in WORST_METRICS},
         rotation_deg=local_errors_deg(pair).astype(np.float32),
         position_mm=joint_errors_mm(pair).astype(np.float32),
+        hinge_deg=none if sigma_rad is None else hinge_errors_deg(pair).astype(np.float32),
+        sigma_deg=none if sigma_rad is None else np.rad2deg(in_skeleton_order(sigma_rad)).astype(np.float32),
         quality=cell.quality,
         position_valid=cell.position_valid,
         orientation_valid=cell.orientation_valid,

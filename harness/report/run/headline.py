@@ -52,7 +52,8 @@ def build_headline(run: RunData) -> Headline:
 
 def _positions(run: RunData, series: str | None) -> list[str]:
     """The sentence on joint positions, of the series that have the same sequences; none where not measured."""
-    errors = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in run.series}
+    names = [name for name in run.series if run.lags[name] == run.lags.get(series or "", 0)]
+    errors = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in names}
     shared = set(errors.get(series or "", {}))
     means = {name: np.mean([e[k] for k in shared]) for name, e in errors.items() if shared and shared <= set(e)}
     if series not in means:

@@ -21,6 +21,7 @@ from harness.report.run import (
     parameter_effects,
     recovery,
     tables,
+    uncertainty,
 )
 from harness.report.run.data import RunData
 from harness.report.run.headline import Headline
@@ -55,6 +56,8 @@ class RunContent:
     over_time: Sequence[Chart]
     per_joint: Chart | None
     distribution: Chart | None
+    sigma: Chart | None
+    """Errors of each hinge against the standard deviations that a method states; None where none does."""
     windows: Mapping[tuple[str, str], WorstWindow]
     """(series, metric) -> its worst two seconds."""
     strips: Sequence[FilmStrip]
@@ -92,6 +95,7 @@ def _sections(content: RunContent) -> list[Section]:
         ("Coverage", "coverage", tables.coverage_tables(run)),
         ("Error over time", "time", join(*(chart_figure(chart, 3) for chart in content.over_time))),
         ("Each joint", "joints", chart_figure(content.per_joint) if content.per_joint else nothing),
+        ("Stated uncertainty", "sigma", _sigma_section(content)),
         ("Error distribution", "cdf", chart_figure(content.distribution) if content.distribution else nothing),
         ("Stream health", "health", tables.health_tables(run) if measured else nothing),
         ("Worst two seconds", "worst", _worst_section(content) if content.windows else nothing),
@@ -100,6 +104,11 @@ def _sections(content: RunContent) -> list[Section]:
         ("Manifest", "manifest", _manifest(run)),
         ("Reproduce", "reproduce", _reproduce(run)),
     ]
+
+
+def _sigma_section(content: RunContent) -> Markup:
+    chart = chart_figure(content.sigma, 3) if content.sigma else None
+    return join(uncertainty.sigma_table(content.run), chart)
 
 
 def _worst_section(content: RunContent) -> Markup:

@@ -1,68 +1,75 @@
 """Rankings of the series of a run, from the rows of its summary: for the headline, the terminal and bold cells."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, find_best, rank_methods
 from harness.core.number_format import count_noun
-from harness.report.kit.ranking import describe_ranking
-from harness.report.run.data import Row, last_varied, series_name
+from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
+from harness.report.run.data import Row, lag_of, last_varied, series_name
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 
-ValuesByPerformer = Mapping[str, Mapping[str, ClipValues]]
-"""Kind of performer -> series -> metric -> clip -> mean over its cells."""
+
+class RankingGroup(NamedTuple):
+    """Series that are ranked together. Known and new performers have different clips; lags are different tasks."""
+
+    performer: str
+    lag: int
+    """Lag of the methods [frames]."""
+
+
+GroupedValues = Mapping[RankingGroup, Mapping[str, ClipValues]]
+"""Group -> series -> metric -> clip -> mean over its cells; causal methods are before those with a lag."""
 UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
 """Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
 
 
-def values_by_performer(
-    cells: Sequence[Row], methods: Sequence[Row], behaviour: str | None = None
-) -> ValuesByPerformer:
+def group_values(cells: Sequence[Row], methods: Sequence[Row], behaviour: str | None = None) -> GroupedValues:
     """The values of one behaviour, or of all.
 
-    `cells` are rows of a summary, and `methods` are its methods, which name the series. Known and new performers have
-    different clips and are never ranked together.
+    `cells` are rows of a summary, and `methods` are its methods, which name the series.
     """
-    collected: dict[str, dict[str, dict[str, dict[str, list[float]]]]] = {}
-    for row in cells:
+    collected: dict[RankingGroup, dict[str, dict[str, dict[str, list[float]]]]] = {}
+    for row in sorted(cells, key=lag_of):
         if behaviour in (None, row["behaviour"]):
-            of_series = collected.setdefault(row["performer"], {}).setdefault(series_name(row, methods), {})
+            of_group = collected.setdefault(RankingGroup(row["performer"], lag_of(row)), {})
+            of_series = of_group.setdefault(series_name(row, methods), {})
             for metric in MARGINS:
                 if row.get(metric) is not None:
                     of_series.setdefault(metric, {}).setdefault(row["clip"], []).append(float(row[metric]))
     return {
-        performer: {
+        group: {
             series: {
                 metric: {clip: float(np.mean(values)) for clip, values in by_clip.items()}
                 for metric, by_clip in by_metric.items()
             }
-            for series, by_metric in of_performer.items()
+            for series, by_metric in of_group.items()
         }
-        for performer, of_performer in collected.items()
+        for group, of_group in collected.items()
     }
 
 
-def best_series(values: ValuesByPerformer, metric: str) -> set[str]:
-    """The series that is better than every other one by a metric, for each kind of performer that has one."""
+def best_series(values: GroupedValues, metric: str) -> set[str]:
+    """The series that is better than every other one by a metric, for each group that has one."""
     if metric in UNRANKED_METRICS or metric not in MARGINS:
         return set()
-    return {best for of_performer in values.values() if (best := find_best(of_performer, metric))}
+    return {best for of_group in values.values() if (best := find_best(of_group, metric))}
 
 
 def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str, str | None]]:
-    """For each kind of performer a description, and the series with the lowest error.
+    """For each group a description, and the series with the lowest error.
 
     Where the scenario varies keys, the last combination of values counts. `motion` names the motion.
     """
     last, methods = last_varied(summary), summary["methods"]
-    by_performer = values_by_performer(last["cells"], methods)
-    several, found = len(by_performer) > 1, list[tuple[str, str | None]]()
+    groups = group_values(last["cells"], methods)
+    several, found = len({group.performer for group in groups}) > 1, list[tuple[str, str | None]]()
     setting = varied_text(last["cells"][0]["varied"]) if last["cells"] else ""
-    for performer, values in by_performer.items():
+    for group, values in groups.items():
         measured = {name: of for name, of in values.items() if of.get(PRIMARY_METRIC)}
         ranking = rank_methods(measured, PRIMARY_METRIC)
         if ranking is None:
@@ -72,8 +79,13 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
         sequences = count_noun(len(ranking.clips), "sequence")
         if len(ranking.clips) < max(len(of[PRIMARY_METRIC]) for of in measured.values()):
             sequences = f"the {sequences} that all methods were measured on"
-        where = f"{sequences} of {motion}" + (f" by {performer} performers" if several and performer else "")
+        where = f"{sequences} of {motion}" + (
+            f" by {group.performer} performers" if several and group.performer else ""
+        )
         where += f", with {setting}" if setting else ""
+        where += f", with {name_lag(group.lag)}" if group.lag else ""
         text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°", "sequence")
         found.append((text, ranking.lowest))
+    if len({group.lag for group in groups}) > 1:
+        found.append((LAG_NOTE, None))
     return found

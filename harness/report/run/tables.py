@@ -8,11 +8,11 @@ import numpy as np
 from harness.core.number_format import count_noun, format_number, format_share
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
-from harness.report.kit.ranking import BOLD_NOTE
+from harness.report.kit.ranking import BOLD_NOTE, LAG_NOTE
 from harness.report.kit.table import NOT_MEASURED_CELL, count_note, html_table, stacked_cell, statistic_cell
 from harness.report.kit.text import last_line
 from harness.report.run.data import Row, RunData, Trace
-from harness.report.run.ranking import ValuesByPerformer, best_series, values_by_performer
+from harness.report.run.ranking import GroupedValues, best_series, group_values
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -42,7 +42,7 @@ def results_tables(run: RunData) -> Markup:
     """Methods by behaviour: a table for each metric, most of them folded."""
     columns = [*run.behaviours, *([None] if len(run.behaviours) > 1 else [])]
     methods = run.full_summary["methods"]
-    values = {column: values_by_performer(run.cells, methods, column) for column in columns}
+    values = {column: group_values(run.cells, methods, column) for column in columns}
     further = [behaviour_table(run, metric, values) for metric in FOLDED_METRICS]
     return join(
         *(behaviour_table(run, metric, values) for metric in OPEN_METRICS),
@@ -50,7 +50,7 @@ def results_tables(run: RunData) -> Markup:
     )
 
 
-def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, ValuesByPerformer]) -> Markup:
+def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, GroupedValues]) -> Markup:
     """One metric: a row for each method, a column for each key of `values`: a behaviour, or None for all of them."""
     statistics: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
@@ -76,6 +76,7 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Value
     caption = join(
         tag("b", f"{metric} [{unit}]"),
         f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.{BOLD_NOTE if any(best.values()) else ''}",
+        f" {LAG_NOTE}" if len({group.lag for of in values.values() for group in of}) > 1 else "",
     )
     return html_table(Table(["method", *titles], rows), caption, label=metric)
 
@@ -102,7 +103,7 @@ def coverage_tables(run: RunData) -> Markup:
         "most stations had been missing for long. Fallback: a simpler solution answered in place of the method's "
         "model. Bridged: there was no reading. Not finite: the estimate is no number and counts as not matched. The "
         "last column is the share of fallbacks where every station has reported for 0.5 s."
-    )
+    ) + (" A method with a lag leaves the last frames of a take unanswered." if any(run.lags.values()) else "")
     failures = [
         join(tag("b", cell), details(last_line(text), tag("pre", text)))
         for cell, text in run.summary["failures"].items()

@@ -3,13 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from harness.core.estimate import name_with_lag
 from harness.core.number_format import format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
+from harness.report.run.data import lag_of
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE, TABLE_COLUMNS
+from harness.results.sigma_table import sigma_lines
 
 _RECORDS = ("records_sent", "records_dropped")
 
@@ -25,14 +28,16 @@ def run_table(summary: Mapping[str, Any]) -> str:
     if not cells:
         return "\n".join(["nothing was measured", finished, *failed])
     varying = _varying_columns(cells)
-    rows = []
+    rows, sigma = [], []
     for row in sorted(summary["behaviours"], key=lambda row: str(row["behaviour"])):
         settings = [_format_cell(row[name]) for name in varying]
         matched = f"{row['frames_matched']}/{row['frames_expected']}"
         statistics = [(row["metrics"][name], decimals) for _, name, decimals in TABLE_COLUMNS]
         figures = [format_mean_sd(s["mean"], s["sd"], decimals) for s, decimals in statistics]
         share = _format_fallback(row["metrics"]["fallback_share"]["mean"])
-        rows.append([row["behaviour"], row["method"], *settings, str(row["sequences"]), matched, share, *figures])
+        method = name_with_lag(row["method"], lag_of(row))
+        sigma.append(([row["behaviour"], method, *settings], row.get("sigma_scores", {})))
+        rows.append([row["behaviour"], method, *settings, str(row["sequences"]), matched, share, *figures])
     head = ["behaviour", "method", *varying, "clips", "matched", "fallback [%]"]
     head += [title for title, *_ in TABLE_COLUMNS]
     return "\n".join(
@@ -41,6 +46,7 @@ def run_table(summary: Mapping[str, Any]) -> str:
             *_link_loss(cells),
             "",
             *Table(head, rows, text_columns=2 + len(varying)).lines(),
+            *sigma_lines(["behaviour", "method", *varying], sigma),
             "",
             *_fallback_lines(summary["methods"]),
             *calibration_errors.text(summary),

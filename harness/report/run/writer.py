@@ -14,7 +14,7 @@ from harness.report.kit.markup import Markup
 from harness.report.kit.render_process import ProgressCallback, RenderJob, RenderProcess
 from harness.report.kit.skeleton_player import PlayerSegment, skeleton_player
 from harness.report.kit.text import to_file_name
-from harness.report.run import charts, parameter_effects
+from harness.report.run import charts, parameter_effects, uncertainty
 from harness.report.run.data import WORST_METRICS, RunData, pose_pair, read_run
 from harness.report.run.headline import build_headline
 from harness.report.run.page import FilmStrip, RunContent, run_page
@@ -55,6 +55,8 @@ def write_run_page(
         over_time = [charts.error_over_time(run, behaviour) for behaviour in measured]
         per_joint = charts.error_per_joint(run, headline.lowest) if headline.lowest else None
         distribution = charts.error_distribution(run) if measured else None
+        stated = run.series_with_sigma[:1]
+        sigma = uncertainty.error_against_sigma(run, stated[0]) if stated else None
         player, no_player = _player(run, windows, headline.lowest, reader)
         reason = rendering.finish() if rendered else "rendering was turned off"
     missing = []
@@ -67,10 +69,10 @@ def write_run_page(
     movies, no_movies = _movies(run, reader, progress) if movie else ([], "")
     if no_movies:
         missing.append(f"Movies: {no_movies}")
-    for chart in (*curves, *over_time, *(chart for chart in (per_joint, distribution) if chart)):
+    for chart in (*curves, *over_time, *(chart for chart in (per_joint, distribution, sigma) if chart)):
         chart.write(plots)
     content = RunContent(
-        run, headline, curves, over_time, per_joint, distribution, windows, strips, player, movies, missing
+        run, headline, curves, over_time, per_joint, distribution, sigma, windows, strips, player, movies, missing
     )
     path = out / "report.html"
     write_text(path, run_page(content))

@@ -54,6 +54,8 @@ class SweepData:
     series: tuple[str, ...]
     performers: tuple[str, ...]
     """"known", "new" or "" for each series; known and new performers have different clips."""
+    lags: tuple[int, ...]
+    """Lag of the method of each series [frames]; methods with different lags are never ranked together."""
     clips: tuple[str, ...]
     """Names as "scenario: clip", because clips of the same name may differ between scenarios."""
     keys: tuple[VariedKey, ...]

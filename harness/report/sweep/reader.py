@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Ints
+from harness.core.estimate import name_with_lag
 from harness.report.sweep.data import READ_METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
@@ -28,6 +30,7 @@ def read_sweep(out: Path) -> SweepData:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
             index.columns(*_COLUMNS),
+            lags=(values["lag"] for values in index.optional()),
             name=str(facts.get("name", out.name)),
             planned=counts.planned,
             failures=failures,
@@ -36,14 +39,25 @@ def read_sweep(out: Path) -> SweepData:
 
 
 def collect_cells(
-    cells: Iterable[Sequence[Any]], *, name: str, planned: int, failures: Mapping[str, str], command: str = ""
+    cells: Iterable[Sequence[Any]],
+    *,
+    name: str,
+    planned: int,
+    failures: Mapping[str, str],
+    command: str = "",
+    lags: Iterable[int] | None = None,
 ) -> SweepData:
-    """The data of a sweep from its cells, each a row of the index's columns."""
+    """The data of a sweep from its cells, each a row of the index's columns.
+
+    `lags` has the lag of the method of each cell [frames], by default 0.
+    """
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
     figures: list[Sequence[float | None]] = []
-    for scenario, clip, method, *others in cells:
-        group = (method, *others[: len(_GROUP_COLUMNS)])
+    lag_of_group: dict[int, int] = {}
+    for (scenario, clip, method, *others), lag in zip(cells, repeat(0) if lags is None else lags, strict=False):
+        group = (name_with_lag(method, lag), *others[: len(_GROUP_COLUMNS)])
+        lag_of_group.setdefault(groups.code(group), lag)
         varied, *metrics = others[len(_GROUP_COLUMNS) :]
         clip_code = clips.code(f"{scenario}: {clip}")
         codes.append((scenarios.code(scenario), clip_code, groups.code(group), values.code(varied)))
@@ -59,6 +73,7 @@ def collect_cells(
         scenarios=tuple(scenarios.names),
         series=_series_names(groups.names),
         performers=tuple(group[-1] for group in groups.names),
+        lags=tuple(lag_of_group[code] for code in range(len(groups.names))),
         clips=tuple(clips.names),
         keys=keys,
         scenario_of=scenario_of,

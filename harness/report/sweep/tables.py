@@ -94,12 +94,15 @@ def _failure_item(group: FailureGroup, command: str) -> Markup:
 
 
 def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]]) -> set[int]:
-    """The rows that are better than every other one, for each kind of performer; a row is a series and its cells."""
+    """The rows that are better than every other one, for each kind of performer and each lag.
+
+    A row is a series and its cells.
+    """
     if DEFINITIONS[metric].unit not in _LOWER_IS_BETTER:
         return set()
-    groups: dict[str, dict[int, Bools]] = {}
+    groups: dict[tuple[str, int], dict[int, Bools]] = {}
     for n, (series, selected) in enumerate(rows):
-        groups.setdefault(sweep.performers[series], {})[n] = selected
+        groups.setdefault((sweep.performers[series], sweep.lags[series]), {})[n] = selected
 
     def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
         return find_best({str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}, metric)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.margins import GATED_METRICS
-from harness.compare.ranking import ClipValues, rank_methods
+from harness.compare.ranking import ClipValues, rank_methods, split_by_lag
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_change_percent, format_number
-from harness.report.kit.ranking import describe_ranking
+from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -41,7 +41,7 @@ def progress_sentence(sweep: SweepData) -> str:
 
 
 def _best(sweep: SweepData) -> str:
-    """The sentences on the best series, separately for known and new performers, which have different clips."""
+    """The sentences on the best series, separately for known and new performers and for each lag."""
     groups: dict[str, dict[str, ClipValues]] = {}
     for n, (name, performer) in enumerate(zip(sweep.series, sweep.performers, strict=True)):
         values = sweep.clip_values(sweep.select(series=n), GATED_METRICS)
@@ -49,14 +49,18 @@ def _best(sweep: SweepData) -> str:
             groups.setdefault(performer, {})[name] = values
     if not groups:
         return "Nothing was measured." if len(sweep) else ""
-    return " ".join(map(_best_of, groups.values()))
+    lags = dict(zip(sweep.series, sweep.lags, strict=True))
+    parts = [(lag, values) for group in groups.values() for lag, values in split_by_lag(group, lags).items()]
+    sentences = [_best_of(values, lag) for lag, values in sorted(parts, key=lambda part: part[0])]
+    return " ".join([*sentences, *([LAG_NOTE] if len({lag for lag, _ in parts}) > 1 else [])])
 
 
-def _best_of(values: Mapping[str, ClipValues]) -> str:
+def _best_of(values: Mapping[str, ClipValues], lag: int) -> str:
     ranking = rank_methods(values, PRIMARY_METRIC)
     if ranking is None:
         return f"{list_first(list(values))} share no measured clip, so they are not ranked."
-    return describe_ranking(ranking, count_noun(len(ranking.clips), "clip"), _format_error)
+    where = count_noun(len(ranking.clips), "clip") + (f", with {name_lag(lag)}" if lag else "")
+    return describe_ranking(ranking, where, _format_error)
 
 
 def describe_effect(sweep: SweepData, key: VariedKey) -> str:

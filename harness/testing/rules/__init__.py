@@ -18,6 +18,7 @@ RULES: dict[str, Rule] = {
     "irregular frame times are tolerated": degraded_input.tolerates_irregular_timing,
     "any reading quality is tolerated": degraded_input.tolerates_any_quality,
     "any set of stations is supported": degraded_input.supports_other_stations,
+    "lag and standard deviations keep their form": semantics.keeps_lag_and_uncertainty,
     "equal input gives equal estimates": reproducibility.is_deterministic,
     "a session does not depend on earlier sessions": reproducibility.starts_without_history,
     "simultaneous sessions do not affect each other": reproducibility.isolates_sessions,

@@ -13,7 +13,7 @@ class RuleViolation(Exception):
 
 def require_poses(case: ContractCase, frames: Frames) -> str:
     """Require valid poses of a new session; returns the number of frames as text."""
-    for index, estimate in enumerate(case.run(frames)):
+    for index, estimate in enumerate(case.steps(frames)):
         require_pose(case, index, estimate)
     return f"{len(frames)} frames"
 

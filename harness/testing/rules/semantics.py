@@ -4,7 +4,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.estimate import Origin, Status
+from harness.core.estimate import Origin, Status, session_lag
+from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE
@@ -96,6 +97,34 @@ def is_invariant_to_placement(case: ContractCase) -> str:
     text = f"the postures differ by {angle_deg:.2g} deg and {height_mm:.2g} mm on average"
     if not (angle_deg <= _POSTURE_TOLERANCE_DEG and height_mm <= _TOLERANCE_MM):
         raise RuleViolation(text)
+    return text
+
+
+def keeps_lag_and_uncertainty(case: ContractCase) -> str:
+    """Estimates answer the frame a fixed number of steps before; standard deviations are in all of them, or in none.
+
+    Standard deviations are finite and above 0. Both hold while stations are lost, too.
+    """
+    count, text = len(case.calibration.stations), ""
+    for silent in (range(0), range(1), range(count)):
+        frames = [drop_stations(f, silent) if 10 <= i < 40 else f for i, f in enumerate(case.frames)]
+        estimates = case.steps(frames)
+        when = f"with {len(silent)} of {count} stations lost"
+        try:
+            lag = session_lag([getattr(estimate, "lag", 0) for estimate in estimates])
+        except ValueError as error:
+            raise RuleViolation(f"{error} ({when})") from error
+        sigmas = [getattr(estimate, "angle_sigma_rad", None) for estimate in estimates]
+        given = [np.asarray(sigma, dtype=float) for sigma in sigmas if sigma is not None]
+        if len(given) not in (0, len(estimates)):
+            raise RuleViolation(f"{len(given)} of {len(estimates)} estimates have standard deviations {when}")
+        for sigma in given:
+            if sigma.shape != (HINGES,) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
+                raise RuleViolation(f"standard deviations of shape {sigma.shape} are not all above 0 rad {when}")
+        found = f"a lag of {lag} frames, {'standard deviations' if given else 'no standard deviations'}"
+        if text and found != text:
+            raise RuleViolation(f"{found} {when}; {text} without losses")
+        text = found
     return text
 
 

@@ -45,6 +45,7 @@ class Written:
     estimate_bone_m: Floats = field(default_factory=lambda: BELIEVED.bone_m)
     frame_index: Ints = field(default_factory=lambda: np.arange(FRAMES))
     status: Ints = field(default_factory=lambda: np.zeros(FRAMES, dtype=np.int64))
+    angle_sigma_rad: Floats | None = None
     errors: Mapping[str, Floats] = field(default_factory=lambda: {"mpjpe_mm": np.full(FRAMES, 12.5)})
 
     @property
@@ -184,6 +185,17 @@ def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path
     assert float(rows[7]["lradius.rx_deg"]) == pytest.approx(np.rad2deg(unpack(cell.estimate_qpos)[2][7, dof]))
     assert (rows[7]["frame"], rows[7]["status"], rows[7]["mpjpe_mm"], rows[3]["mpjpe_mm"]) == ("7", "0", "12.5", "")
     assert "mpjpe_mm" not in truth.read_text().split("\n")[0]
+
+
+def test_csv_has_the_standard_deviations_of_a_method_that_states_them(cell: Written, tmp_path: Path) -> None:
+    sigma_rad = np.deg2rad(1.0 + np.arange(48.0)) * np.ones((FRAMES, 1))
+    marked = pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.arange(48.0))
+    _, estimate = export([replace(cell, angle_sigma_rad=sigma_rad)], "csv", tmp_path)
+    with estimate.open() as file:
+        row = next(csv.DictReader(file))
+    for dof, name in enumerate(SKELETON.dof_names):
+        (place,) = np.flatnonzero(marked[7:] == dof)
+        assert float(row[f"{name}_sigma_deg"]) == pytest.approx(1.0 + place)
 
 
 def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:

@@ -2,24 +2,28 @@
 
 import math
 from dataclasses import replace
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from harness.body.humanoid import build_body
 from harness.core.arrays import Floats
+from harness.core.estimate import Estimate, Status
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.playback import prepare_playback
 from harness.experiment.scenario import load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
-from harness.reconstruct.methods.clean_up import CleanUp
+from harness.reconstruct.methods.clean_up import CleanUp, FittedCleanUp
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.score.angles import wrap_difference
 from harness.testing.frames import swaying_motion
+from tests.experiment.late_methods import SIGMA_RAD, Late
 
 
 def _errors_deg(noise: Literal["clean", "default"], names: list[str]) -> Floats:
@@ -71,3 +75,31 @@ def test_without_examples_all_hinges_have_one_width() -> None:
     assert not method.needs_examples
     sigma_rad = method.fit(build_body(), [], np.random.default_rng(1)).hinge_sigma_rad
     np.testing.assert_array_equal(sigma_rad, np.full(48, 0.3))
+
+
+@pytest.mark.parametrize("wait", [0, 2])
+def test_a_late_answer_is_fitted_to_the_readings_of_its_frame(wait: int) -> None:
+    """The performer walks on while the answer waits: fitted to later readings, the root would be 5 cm ahead."""
+    simulation = prepare_playback("demo", stations=6).simulation
+    body, frames = build_body(), simulation.frames[:80]
+    late, prompt = (
+        CleanUp(Late(wait=w)).fit(body, [], np.random.default_rng(1)).begin(simulation.calibration) for w in (wait, 0)
+    )
+    answers, expected = ([session.step(frame) for frame in frames] for session in (late, prompt))
+    assert [answer.lag for answer in answers] == [min(n, wait) for n in range(80)]
+    sigma_rad = answers[5].angle_sigma_rad
+    assert sigma_rad is not None
+    np.testing.assert_array_equal(sigma_rad, SIGMA_RAD)
+    for found, prompt_answer in zip(answers[wait + 10 :], expected[10 : 80 - wait], strict=True):
+        np.testing.assert_allclose(found.qpos, prompt_answer.qpos, atol=1e-6)
+        assert found.status is prompt_answer.status
+
+
+def test_an_answer_to_a_frame_that_was_never_received_is_refused() -> None:
+    simulation = prepare_playback("demo", stations=4).simulation
+    inner: Any = SimpleNamespace(
+        begin=lambda calibration: SimpleNamespace(step=lambda frame: Estimate(np.ones(55), Status.SOLVED, lag=1))
+    )
+    fitted = FittedCleanUp(CleanUp(MeanPose()), build_body(), inner, np.ones(48))
+    with pytest.raises(ValueError, match="a lag of 1 frames, but an answer may go back 0 at most"):
+        fitted.begin(simulation.calibration).step(simulation.frames[0])

@@ -27,6 +27,7 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
 from harness.report.sweep.page import write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
+from harness.report.sweep.tables import scenario_table
 from harness.report.sweep.text import text
 from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
@@ -201,6 +202,23 @@ def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
 
     sweep = collect_cells(cells(), name="x", planned=4, failures={})
     assert scenarios_varying(sweep, sweep.keys[0]) == [0]
+
+
+def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
+    """The late method has the lowest error of all; without its lag it would be the only best one."""
+    methods = {"ik": 6.0, "good": 2.0, "late": 0.1}
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=10, methods=methods, lags={"late": 2})))
+    assert sweep.series == ("ik", "good", "late (lag 2)")
+    causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
+    assert "good is best: " in causal
+    assert "late" not in causal
+    assert late.endswith("with a lag of 2 frames. No other method was measured.")
+    assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
+    table = str(scenario_table(sweep, PRIMARY_METRIC))
+    assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
+    plain = read_sweep(fabricate_sweep(tmp_path / "plain", Plan(clips=10, methods=methods)))
+    assert "late is best: " in sentence(plain)
+    assert "lag" not in sentence(plain)
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
