@@ -27,6 +27,7 @@ from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
+from harness.reconstruct.contract import Session
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.local_experts import LocalExperts
@@ -35,6 +36,7 @@ from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.methods.ik import Ik
+from harness.reconstruct.solver.fixed_lag import FixedLagSession
 from harness.reconstruct.solver.ground_frame import (
     HINGES,
     POSTURE_SIZE,
@@ -47,7 +49,7 @@ from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, Postu
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
-from harness.reconstruct.solver.self_calibration import Posterior, SelfCalibration, posterior
+from harness.reconstruct.solver.self_calibration import SelfCalibration, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
@@ -62,6 +64,9 @@ _HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
 """Ridge and width of the expert of the history, and a further standard deviation of every hinge under it."""
 _DIRECTIONS = 32
 """Number of features of readings and history."""
+
+_LAG_WEIGHTS = {1: (0.15, 0.7, 0.15), 2: (0.02, 0.14, 0.68, 0.14, 0.02)}
+"""Weights of the poses for each fixed lag. The jitter is then about that of true motion; wider windows smooth it away."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,8 @@ class ExpertMap:
     distance of the nearest examples per feature; the prior of `ik` takes part with the weight 1 - 1/f."""
     align: bool = True
     """Move the readings of all stations to one instant."""
+    lag: Annotated[int, Range(0, 2)] = 0
+    """Fixed lag [frames]: answers are smoothed over this many frames before and after."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
 
@@ -116,8 +123,9 @@ class FittedExpertMap:
         default_factory=CalibrationCache
     )
 
-    def begin(self, calibration: Calibration) -> "ExpertMapSession":
-        return ExpertMapSession(self, calibration, *self._trained(calibration))
+    def begin(self, calibration: Calibration) -> Session:
+        causal = ExpertMapSession(self, calibration, *self._trained(calibration))
+        return FixedLagSession(causal, _LAG_WEIGHTS[self.options.lag]) if self.options.lag else causal
 
     def _trained(self, calibration: Calibration) -> tuple[ReducedRankRegression, dict[int, LocalExperts]]:
         """The regression for the mounts of a calibration, and its experts by the identity of their regression."""
@@ -155,11 +163,13 @@ class ExpertMapSession(HistorySession):
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
         self._prior: Subspace | None = None
         """Prior of the pose that was solved last; None when inverse kinematics answered."""
-        self.posterior: Posterior | None = None
+        self._angle_sigma_rad: Floats = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
+        """(48,) standard deviation of each hinge angle in the last answer."""
 
     def step(self, frame: TrackerFrame) -> Estimate:
         self.residuals.set_sigma(self._scales.position_sigma_m, self._scales.orientation_sigma_rad)
-        return super().step(frame)
+        estimate = super().step(frame)
+        return Estimate(estimate.qpos, estimate.status, estimate.origin, self._angle_sigma_rad)
 
     def solve_next(self) -> IKSolution:
         self._prior = prior = self._predict(history=True)
@@ -206,14 +216,15 @@ class ExpertMapSession(HistorySession):
         super().record(frame, cold)
         self._query.record()
         if self._prior is None:
-            self.posterior = None
+            self._angle_sigma_rad = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
             return
         residuals, prior = self.residuals, self._prior
         residuals.evaluate(self.qpos)
         z = np.concatenate([ground_from_qpos(self.qpos), posture_from_qpos(self.qpos)])
-        self.posterior = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+        found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+        self._angle_sigma_rad = np.sqrt(found.variance[HINGES])
         if not cold:
-            self._scales.update(self.posterior)
+            self._scales.update(found)
 
     def _next_ground(self) -> Floats:
         """Ground frame (3,) after the last two, at the same speed."""
