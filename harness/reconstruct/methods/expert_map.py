@@ -66,7 +66,7 @@ _DIRECTIONS = 32
 """Number of features of readings and history."""
 
 _LAG_WEIGHTS = {1: (0.15, 0.7, 0.15), 2: (0.02, 0.14, 0.68, 0.14, 0.02)}
-"""Weights of the poses for each fixed lag. The jitter is then about that of true motion; wider windows smooth it away."""
+"""Weights of the poses for each fixed lag. The jitter is then about that of true motion."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class ExpertMapSession(HistorySession):
 
     def predict_gap(self) -> Floats:
         prior = self._predict(history=True)
-        posture = prior.mean + np.linalg.solve(prior.curvature, prior.linear)
+        posture = prior.mean.copy()
         posture[HINGES] = self.limits.clip(posture[HINGES])
         out: Floats = qpos_from_posture(posture, self._next_ground())
         return out
@@ -283,7 +283,7 @@ def _product(
     precision: Floats,
     linear: Floats,
 ) -> Subspace:
-    """The prior about `mean`: two experts, the second with a power, and independent terms of each number.
+    """The prior: two experts, the second with a power, and independent terms of each number, linear about `mean`.
 
     `covariance` and `other` (P, P) are overwritten.
     """
@@ -298,7 +298,8 @@ def _product(
         curvature += weight * inverse
     for i in range(size):
         curvature[i, i] += precision[i]
-    return Subspace(mean, np.zeros((0, size)), curvature, linear, np.zeros(size))
+    most_likely = mean + np.linalg.solve(curvature, linear)
+    return Subspace(most_likely, np.zeros((0, size)), curvature, np.zeros(size), np.zeros(size))
 
 
 @compiled

@@ -49,7 +49,10 @@ class Posterior(NamedTuple):
 def posterior(
     tree: KinematicTree, targets: StationTargets, state: KinematicState, prior: Subspace, z: Floats
 ) -> Posterior:
-    """The posterior at a solution z (3 + P,), for which `state` is evaluated: Laplace's approximation."""
+    """The posterior at a solution z (3 + P,), for which `state` is evaluated: Laplace's approximation.
+
+    The prior is a Gaussian about its mean: its linear term is 0.
+    """
     count, directions, size = len(tree.station_body), len(tree.depth), len(z)
     hessian, descent = np.zeros((directions, directions)), np.empty(directions)
     total, of_positions = np.empty((size, size)), np.empty((size, size))
@@ -81,8 +84,7 @@ def posterior(
             squares[kind] += min(precision * state.squared[row], _MAX_SQUARE)
             rows[kind] += 3.0
     offset = z[3:] - prior.mean
-    pull = np.dot(prior.curvature, offset) - prior.linear
-    away = np.dot(offset, pull) - np.dot(offset, prior.linear)
+    away = np.dot(offset, np.dot(prior.curvature, offset))
     variance = np.empty(size - 3)
     for i in range(3, size):
         variance[i - 3] = covariance[i, i]
