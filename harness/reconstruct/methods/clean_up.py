@@ -114,9 +114,10 @@ class CleanUpSession:
         frame = self._answered_frame(frame, estimate.lag)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return estimate
-        self._gate.read(frame, self._residuals)
-        if self._alignment is not None:
-            self._alignment.align(frame, self._residuals)
+        if self._alignment is None:
+            self._gate.read(frame, self._residuals)
+        else:
+            self._alignment.read(frame, self._residuals, self._gate)
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)

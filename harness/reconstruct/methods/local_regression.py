@@ -170,9 +170,10 @@ class LocalRegressionSession:
         if not any_valid:
             self._last_rows, self._last_poses = _NO_ROWS, []
             return Estimate(self._estimate, status, Origin.BRIDGED)
-        self._gate.read(frame, self._residuals)
-        if self._alignment is not None:
-            self._alignment.align(frame, self._residuals)
+        if self._alignment is None:
+            self._gate.read(frame, self._residuals)
+        else:
+            self._alignment.read(frame, self._residuals, self._gate)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._estimate, status, Origin.BRIDGED)
         query = self._features.compute(frame, self._estimate)

@@ -132,9 +132,10 @@ class IKSession:
         self.origin = Origin.MODEL if any_valid else Origin.BRIDGED
         self.now_s = self._time.frame_time_s(frame)
         if any_valid:
-            self._gate.read(frame, self.residuals)
-            if self._alignment is not None:
-                self._alignment.align(frame, self.residuals)
+            if self._alignment is None:
+                self._gate.read(frame, self.residuals)
+            else:
+                self._alignment.read(frame, self.residuals, self._gate)
             cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
             if cold:
                 solution = self.solve_cold()

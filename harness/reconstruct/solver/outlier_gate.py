@@ -76,11 +76,14 @@ class OutlierGate:
         self.readings, self.rejected = 0, 0
         """Number of positions that were measured in this session, and of those that were left out."""
 
-    def read(self, frame: TrackerFrame, residuals: Residuals) -> None:
-        """Let the residuals read a frame, then leave out the positions that jumped."""
+    def read(self, frame: TrackerFrame, residuals: Residuals, offset_s: Floats | None = None) -> None:
+        """Let the residuals read a frame, then leave out the positions that jumped.
+
+        `offset_s` (S,) are the stations' sampling times from the instant that estimates answer [s]; None for 0.
+        """
         residuals.read(frame)
         self._now_s = self._time.frame_time_s(frame)
-        jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid)
+        jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid, offset_s)
         count = int(np.count_nonzero(jumped))
         self.readings += int(np.count_nonzero(frame.position_valid))
         self.rejected += count
@@ -93,12 +96,17 @@ class OutlierGate:
         residuals.evaluate(qpos)
         self.update_stations(self._now_s, residuals.station_m)
 
-    def find_jumps(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
-        """(S,) which of the measured positions `target_m` (S, 3), in the world [m], to leave out of this frame."""
+    def find_jumps(self, now_s: float, target_m: Floats, measured: Bools, offset_s: Floats | None = None) -> Bools:
+        """(S,) which of the measured positions `target_m` (S, 3), in the world [m], to leave out of this frame.
+
+        The body is predicted at the time now + `offset_s` (S,) of each station [s].
+        """
         out, self.all_moved = np.zeros(len(measured), bool), False
         period_s = now_s - self._updated_at_s
         if self._moving and 0.0 < period_s <= _MAX_PERIOD_S:
             expected_m = self._station_m + period_s * self._velocity_m_s
+            if offset_s is not None:
+                expected_m += offset_s[:, None] * self._velocity_m_s
             self.all_moved = _find_jumps(
                 *(target_m, measured, expected_m, self._velocity_m_s, self._jump_m),
                 *(now_s, period_s, self._patience_s, self._history, out),

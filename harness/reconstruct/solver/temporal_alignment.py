@@ -9,9 +9,10 @@ t_1, by the station's last readings p_1, p_0, p_-1:
   accurate there and adds jitter (docs/notes/tuning.md).
 - Orientation: the last rotation vector, in proportion to the time.
 
-The stage follows the outlier gate and works on what the gate let through. A loss, an outlier, a suspect record or a gap
-clears the history of the station, and its next readings stay as they are. Known slots of the stations keep the instant
-in place while one of them is silent. Readings of one time stay the same to the bit.
+The outlier gate comes first. It compares readings as measured, each with the body's position at the time of the
+reading. What it lets through is aligned. A loss, an outlier, a suspect record or a gap clears the history of the
+station, and its next readings stay as they are. Known slots of the stations keep the instant in place while one of them
+is silent. Readings of one time stay the same to the bit.
 """
 
 from typing import NamedTuple
@@ -21,6 +22,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, immutable
 from harness.core.compiled import compiled, specialise
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_product, rotation_vector
 from harness.reconstruct.solver.residuals import Residuals
 from harness.stream.frame import TrackerFrame
@@ -31,8 +33,8 @@ MAX_BEND_M = 0.06
 """Largest second difference of three positions that counts as motion [m]: 96 m/s^2 at 40 Hz. Echoes are larger."""
 MAX_TURN_RAD = 0.6
 """Largest rotation between two readings that counts as motion [rad]: 24 rad/s at 40 Hz."""
-_MIN_SHIFT_S = 1e-6
-"""A reading that is nearer to the instant stays as it is: stamps of one time differ by rounding [s]."""
+_MIN_OFFSET_S = 1e-6
+"""A reading that is nearer to the instant stays as it is: the mean of equal times has a rounding error [s]."""
 
 
 class AlignmentHistory(NamedTuple):
@@ -89,19 +91,26 @@ class TemporalAlignment:
             np.zeros((stations, 4)),
             np.zeros(2 * stations, bool),
         )
-        readings = np.zeros(2 * stations, bool), np.zeros((stations, 3)), np.zeros((stations, 4))
+        self._offset_s: Floats = np.zeros(stations)
         record = immutable(np.zeros(stations)), immutable(np.zeros(stations), bool)
-        self._align = specialise(align_readings, *record, *readings, self._nothing, self._history)
+        readings = np.zeros(2 * stations, bool), np.zeros((stations, 3)), np.zeros((stations, 4))
+        self._measure_offsets = specialise(measure_offsets, *record, self._history.slot_s, self._offset_s)
+        self._align = specialise(align_readings, *record, self._offset_s, *readings, self._nothing, self._history)
 
-    def align(self, frame: TrackerFrame, residuals: Residuals, following: TrackerFrame | None = None) -> None:
-        """Move the targets of residuals, which have read this frame, to the frame's instant, in place.
+    def read(
+        self, frame: TrackerFrame, residuals: Residuals, gate: OutlierGate, following: TrackerFrame | None = None
+    ) -> None:
+        """Let residuals read a frame, leave out the positions that jumped, and move the others to one instant.
 
-        Only rows that are measured and not left out count. With the `following` frame (a fixed lag of one frame) a
-        reading is interpolated towards the next one of its station instead of extrapolated.
+        The gate predicts each station at its own sampling time. With the `following` frame (a fixed lag of one frame)
+        a reading is interpolated towards the next one of its station instead of extrapolated.
         """
+        self._measure_offsets(frame.measured_s, frame.suspect, self._history.slot_s, self._offset_s)
+        gate.read(frame, residuals, self._offset_s)
         ahead = self._nothing if following is None else _following(following, residuals)
         self._align(
-            *(frame.measured_s, frame.suspect, residuals.measured, residuals.target_m, residuals.world_from_target),
+            *(frame.measured_s, frame.suspect, self._offset_s),
+            *(residuals.measured, residuals.target_m, residuals.world_from_target),
             *(ahead, self._history),
         )
 
@@ -116,6 +125,7 @@ def _following(frame: TrackerFrame, residuals: Residuals) -> FollowingReadings:
 def align_readings(
     measured_s: Floats,
     suspect: Bools,
+    offset_s: Floats,
     measured: Bools,
     target_m: Floats,
     world_from_target: Floats,
@@ -124,10 +134,9 @@ def align_readings(
 ) -> None:
     """Move positions (S, 3) and orientations (S, 4), of which rows (2S,) are measured, to the instant, in place.
 
-    `measured_s` (S,) are the times of the records, NaN where none arrived.
+    `measured_s` (S,) are the times of the records, NaN where none arrived, and `offset_s` (S,) those from the instant.
     """
     count = len(measured_s)
-    instant_s = _find_instant(measured_s, suspect, history.slot_s)
     for s in range(count):
         now_s = measured_s[s]
         if suspect[s] or np.isnan(now_s):
@@ -135,8 +144,8 @@ def align_readings(
             continue
         if not 0.0 < now_s - history.last_s[s] <= MAX_STEP_S:
             history.positions[s] = history.orientations[s] = 0
-        shift_s = instant_s - now_s
-        moves = _MIN_SHIFT_S <= abs(shift_s) <= MAX_STEP_S
+        shift_s = -offset_s[s]
+        moves = 0.0 < abs(shift_s) <= MAX_STEP_S
         if measured[s]:
             x, y, z = target_m[s, 0], target_m[s, 1], target_m[s, 2]
             if moves:
@@ -159,27 +168,33 @@ def align_readings(
 
 
 @compiled
-def _find_instant(measured_s: Floats, suspect: Bools, slot_s: Floats) -> float:
-    """The instant of a frame [s]: the mean sampling time of the stations known so far, whose slots (S,) are updated."""
-    instant_s, records, everyone = 0.0, 0, True
+def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Floats) -> None:
+    """Fill in the sampling times (S,) from the frame's instant [s]; 0 where no record arrived or it is suspect.
+
+    The instant is the mean sampling time of the stations known so far. Their slots (S,) are updated.
+    """
+    start_s, records, everyone = 0.0, 0, True
     for s in range(len(measured_s)):
         here = not suspect[s] and not np.isnan(measured_s[s])
         if not np.isnan(slot_s[s]):
             everyone = everyone and here
             if here:
-                instant_s, records = instant_s + measured_s[s] - slot_s[s], records + 1
+                start_s, records = start_s + measured_s[s] - slot_s[s], records + 1
     if records == 0:
         for s in range(len(measured_s)):
             if not suspect[s] and not np.isnan(measured_s[s]):
-                instant_s, records = instant_s + measured_s[s], records + 1
-    instant_s /= records
+                start_s, records = start_s + measured_s[s], records + 1
+    start_s /= records
     centre_s, known = 0.0, 0
     for s in range(len(measured_s)):
         if not suspect[s] and not np.isnan(measured_s[s]) and (everyone or np.isnan(slot_s[s])):
-            slot_s[s] = measured_s[s] - instant_s
+            slot_s[s] = measured_s[s] - start_s
         if not np.isnan(slot_s[s]):
             centre_s, known = centre_s + slot_s[s], known + 1
-    return instant_s + centre_s / known
+    instant_s = start_s + centre_s / known
+    for s in range(len(measured_s)):
+        offset_s = 0.0 if suspect[s] or np.isnan(measured_s[s]) else measured_s[s] - instant_s
+        out[s] = offset_s if abs(offset_s) >= _MIN_OFFSET_S else 0.0
 
 
 @compiled

@@ -40,6 +40,17 @@ def test_a_jump_is_told_from_motion(by_m: float, out: list[int]) -> None:
     assert jumped(watched(2), 2, by_m, [2]) == out
 
 
+@pytest.mark.parametrize(("by_m", "out", "as_if_at_once"), [(0.14, [], [2]), (-0.16, [2], [])])
+def test_a_station_is_predicted_at_its_own_sampling_time(by_m: float, out: list[int], as_if_at_once: list[int]) -> None:
+    """It travels 3.2 cm in the 8 ms between the instant and its sampling time."""
+    offset_s = np.array([0.0, 0.0, 0.008, 0.0])
+    target_m = at(2) + SPEED_M_S * offset_s[:, None]
+    target_m[2, 0] += by_m
+    for times_s, wanted in ((offset_s, out), (None, as_if_at_once)):
+        found = watched(2).find_jumps(2 * PERIOD_S, target_m, EVERY, times_s)
+        assert np.flatnonzero(found).tolist() == wanted
+
+
 def test_nothing_is_said_before_a_velocity_is_known_or_after_a_gap() -> None:
     assert jumped(watched(0), 0, 1.0, [2]) == []
     assert jumped(watched(1), 1, 1.0, [2]) == []

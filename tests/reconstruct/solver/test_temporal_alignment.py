@@ -9,6 +9,7 @@ from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct import registry
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.temporal_alignment import (
     MAX_BEND_M,
@@ -59,18 +60,29 @@ def read(walk: Scene, frame: TrackerFrame) -> tuple[Floats, Floats]:
     return residuals.target_m, residuals.world_from_target
 
 
+class ChosenOutliers(OutlierGate):
+    """Leaves out the rows that it is told to, and keeps the sampling times that it is given."""
+
+    def __init__(self, rows: dict[int, list[int]]) -> None:
+        super().__init__(6, np.inf)
+        self.rows, self.offsets_s = rows, list[Floats]()
+
+    def read(self, frame: TrackerFrame, residuals: Residuals, offset_s: Floats | None = None) -> None:
+        super().read(frame, residuals, offset_s)
+        rows = np.isin(np.arange(12), self.rows.get(len(self.offsets_s), []))
+        residuals.leave_out(rows)
+        assert offset_s is not None
+        self.offsets_s.append(offset_s.copy())
+
+
 def align(
     walk: Scene, frames: list[TrackerFrame], lookahead: bool = False, left_out: dict[int, list[int]] | None = None
 ) -> list[tuple[Floats, Floats]]:
     """Aligned targets of each frame; with `lookahead` without the last frame. `left_out`: stations by frame."""
     residuals, alignment = Residuals(walk.body, walk.calibration, Loss()), TemporalAlignment(6)
-    out = []
+    out, gate = [], ChosenOutliers(left_out or {})
     for index, frame in enumerate(frames[: len(frames) - lookahead]):
-        residuals.read(frame)
-        rows: Bools = np.zeros(12, bool)
-        rows[(left_out or {}).get(index, [])] = True
-        residuals.leave_out(rows)
-        alignment.align(frame, residuals, frames[index + 1] if lookahead else None)
+        alignment.read(frame, residuals, gate, frames[index + 1] if lookahead else None)
         out.append((residuals.target_m.copy(), residuals.world_from_target.copy()))
     return out
 
@@ -147,6 +159,19 @@ def test_stations_that_never_report_together_are_aligned_among_themselves(
     frames = [drop_stations(f, [3, 4, 5] if i == 0 else [0, 1, 2]) for i, f in enumerate(motion.frames(4))]
     theirs = motion.frame(np.full(6, 7.0 + PERIOD_S * 3 + SLOT_S[3:].mean()))
     assert_same_pose(align(walk, frames)[3], read(walk, theirs), np.arange(6) > 2)
+
+
+def test_the_gate_learns_when_each_station_was_sampled(walk: Scene, rng: np.random.Generator) -> None:
+    frames = Motion(rng, degree=1).frames(3)
+    frames[1] = replace(drop_stations(frames[1], [0]), suspect=np.arange(6) == 3)
+    frames.append(Motion(rng, degree=1).at_one_instant(3))
+    gate, alignment = ChosenOutliers({}), TemporalAlignment(6)
+    for frame in frames:
+        alignment.read(frame, Residuals(walk.body, walk.calibration, Loss()), gate)
+    np.testing.assert_allclose(gate.offsets_s[0], SLOT_S, atol=1e-12)
+    np.testing.assert_allclose(gate.offsets_s[1], np.where(np.isin(np.arange(6), [0, 3]), 0.0, SLOT_S), atol=1e-12)
+    np.testing.assert_allclose(gate.offsets_s[2], SLOT_S, atol=1e-12)
+    np.testing.assert_array_equal(gate.offsets_s[3], np.zeros(6))
 
 
 def test_a_station_at_rest_stays_as_it_is(walk: Scene, rng: np.random.Generator) -> None:
