@@ -25,14 +25,20 @@ class QueryFeatures:
     """Computes the features of each frame of a session."""
 
     def __init__(
-        self, residuals: Residuals, calibration: Calibration, examples: ExampleFeatures, longest_gap_s: float
+        self,
+        residuals: Residuals,
+        calibration: Calibration,
+        examples: ExampleFeatures,
+        longest_gap_s: float,
+        clock: DeviceTime,
     ) -> None:
+        """`clock` is that of the session."""
         count = len(calibration.stations)
         self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
         self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
-        self._time = DeviceTime()
+        self._time = clock
         self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
         """(S, 3) positions of the last query, measured or filled in, and its time by the device's clock [s]."""
 

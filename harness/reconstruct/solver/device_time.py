@@ -17,9 +17,21 @@ class DeviceTime:
         self._host: tuple[float, float] | None = None
         """Time and host time of the first frame, or of the last frame with a usable time stamp [s]."""
         self._now_s = 0.0
+        self._frame: TrackerFrame | None = None
+        """The last frame: the parts of a session share one clock, and each asks for the time of every frame."""
 
     def frame_time_s(self, frame: TrackerFrame) -> float:
-        """Time of the next frame since the first [s]; by the host's clock when no time stamp is usable."""
+        """Time of the next frame since the first [s]; by the host's clock when no time stamp is usable.
+
+        The frame of the last call may be given again; its time is the same.
+        """
+        if frame is not self._frame:
+            self._frame = frame
+            self._advance(frame)
+        return self._now_s
+
+    def _advance(self, frame: TrackerFrame) -> None:
+        """Advance to a frame, and keep its time stamps."""
         stamps = [
             (row, stamp_s)
             for row, (stamp_s, suspect) in enumerate(
@@ -38,4 +50,3 @@ class DeviceTime:
             self._host = self._now_s, frame.received_s
         for row, stamp_s in stamps:
             self._last_stamps[row] = stamp_s, self._now_s
-        return self._now_s
