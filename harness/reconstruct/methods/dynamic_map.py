@@ -353,10 +353,9 @@ class DynamicMapSession(HistorySession):
         after = windows.successors(rows)
         mean, covariance = forecast(offsets, after, weight, options.variance_kept, options.ridge)
         mean[HINGES] = self.limits.clip(mean[HINGES])
-        covariance *= options.spread**2
-        covariance.reshape(-1)[:: len(covariance) + 1] += self._least_variance
         widened = 1.0 + (options.widening * float(squared[0]) / offsets.shape[1]) ** 2
-        covariance *= widened
+        covariance *= options.spread**2 * widened
+        covariance.reshape(-1)[:: len(covariance) + 1] += widened * self._least_variance
         return Prediction(mean, covariance, after[0].astype(float), options.ik_prior_weight * (1.0 - 1.0 / widened))
 
     def independent_prior(self, prediction: Prediction) -> Prior:
@@ -380,10 +379,7 @@ class DynamicMapSession(HistorySession):
             if ik_prior.precision is None:
                 raise ValueError("The product of two priors needs the precisions of both.")
             mean[HINGES], precision[HINGES] = ik_prior.qpos[7:], prediction.ik_prior_weight * ik_prior.precision[6:]
-        posture = slice(POSTURE_SIZE)
-        return gaussian_space(
-            prediction.mean[posture], np.ascontiguousarray(prediction.covariance[posture, posture]), mean, precision
-        )
+        return gaussian_space(prediction.mean, prediction.covariance, mean, precision)
 
 
 _TANGENT_INDICES = np.array(

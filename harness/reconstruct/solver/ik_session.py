@@ -6,6 +6,7 @@ once, and when readings keep contradicting the pose. The solution of lower cost 
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -52,15 +53,18 @@ class PosturePrior:
     towards_mean: float = 1.0
     """Position of the prior's mean between the previous pose, 0, and the mean posture, 1."""
 
+    @cached_property
+    def precision(self) -> Floats:
+        """(54,) precision of the prior along each tangent direction; 0 for the root [1/rad^2]."""
+        return np.concatenate([np.zeros(6), self.spread_rad**-2.0])
+
     def prior(self, limits: HingeLimits, previous: Floats) -> Prior:
         """The prior after a previous pose (55,)."""
-        precision = np.zeros(6 + len(self.spread_rad))
-        precision[6:] = self.spread_rad**-2.0
         if self.mean_qpos is None:
-            return Prior(previous, precision)
+            return Prior(previous, self.precision)
         mean = np.array(previous)
         mean[7:] += self.towards_mean * (limits.unwrap_near(self.mean_qpos[7:], previous[7:]) - previous[7:])
-        return Prior(mean, precision)
+        return Prior(mean, self.precision)
 
 
 @dataclass(frozen=True)

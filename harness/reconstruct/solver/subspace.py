@@ -76,9 +76,12 @@ def fit_subspace(postures: Singles, components: int, alpha: float, expected: Flo
 
 @compiled
 def gaussian_space(mean: Floats, covariance: Floats, other_mean: Floats, other_precision: Floats) -> Subspace:
-    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); mean and precisions (P,)."""
-    size = len(mean)
-    curvature = invert_positive_definite(covariance)
+    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); mean and precisions (P,).
+
+    Rows and columns of the first prior beyond the posture are left out.
+    """
+    size = len(other_mean)
+    mean, curvature = mean[:size], invert_positive_definite(covariance[:size, :size])
     for i in range(size):
         curvature[i, i] += other_precision[i]
     return Subspace(mean, np.zeros((0, size)), curvature, other_precision * (other_mean - mean), np.zeros(size))
