@@ -82,6 +82,10 @@ class HingeLimits:
         """Angles (48,) with full turns added to hinges without limits, to be nearest to `other_rad` (48,)."""
         return _unwrap_near(angles_rad, other_rad, self.high_rad)
 
+    def between(self, qpos: Floats, other: Floats, share: float) -> Floats:
+        """A configuration (55,) with hinges moved by a share of the way to another's (55,), through full turns."""
+        return _between(qpos, other, share, self.high_rad)
+
     def mean(self, angles_rad: Floats) -> Floats:
         """(48,) circular mean of angles (T, 48), in principal representation and within the limits."""
         principal = self.principal(angles_rad)
@@ -97,10 +101,10 @@ class HingeLimits:
 @compiled
 def _any_beyond(angles_rad: Floats, hinges: Ints, limit_rad: float) -> bool:
     """Whether any of some hinges' angles (48,) is farther than a limit from 0."""
+    beyond = False
     for hinge in hinges:
-        if abs(angles_rad[hinge]) > limit_rad:
-            return True
-    return False
+        beyond = beyond or abs(angles_rad[hinge]) > limit_rad
+    return beyond
 
 
 @compiled
@@ -110,6 +114,15 @@ def _unwrap_near(angles_rad: Floats, other_rad: Floats, high_rad: Floats) -> Flo
     for i in range(len(out)):
         if np.isinf(high_rad[i]):
             out[i] += _FULL_TURN_RAD * np.rint((other_rad[i] - out[i]) / _FULL_TURN_RAD)
+    return out
+
+
+@compiled
+def _between(qpos: Floats, other: Floats, share: float, high_rad: Floats) -> Floats:
+    """`HingeLimits.between`, with the upper limits (48,)."""
+    out, near = qpos.copy(), _unwrap_near(other[7:], qpos[7:], high_rad)
+    for i in range(len(near)):
+        out[7 + i] += share * (near[i] - out[7 + i])
     return out
 
 

@@ -62,9 +62,7 @@ class PosturePrior:
         """The prior after a previous pose (55,)."""
         if self.mean_qpos is None:
             return Prior(previous, self.precision)
-        mean = np.array(previous)
-        mean[7:] += self.towards_mean * (limits.unwrap_near(self.mean_qpos[7:], previous[7:]) - previous[7:])
-        return Prior(mean, self.precision)
+        return Prior(limits.between(previous, self.mean_qpos, self.towards_mean), self.precision)
 
 
 @dataclass(frozen=True)

@@ -75,16 +75,21 @@ def fit_subspace(postures: Singles, components: int, alpha: float, expected: Flo
 
 
 @compiled
-def gaussian_space(mean: Floats, covariance: Floats, other_mean: Floats, other_precision: Floats) -> Subspace:
-    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); mean and precisions (P,).
+def gaussian_space(
+    mean: Floats, covariance: Floats, hinge_mean: Floats, hinge_precision: Floats, hinge_weight: float
+) -> Subspace:
+    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); and one of the hinges alone.
 
-    Rows and columns of the first prior beyond the posture are left out.
+    The second has a mean and precisions (48,) and counts `hinge_weight` times. Rows and columns of the first beyond the
+    posture are left out.
     """
-    size = len(other_mean)
-    mean, curvature = mean[:size], invert_positive_definite(covariance[:size, :size])
-    for i in range(size):
-        curvature[i, i] += other_precision[i]
-    return Subspace(mean, np.zeros((0, size)), curvature, other_precision * (other_mean - mean), np.zeros(size))
+    linear, first = np.zeros(POSTURE_SIZE), POSTURE_SIZE - len(hinge_mean)
+    posture, curvature = mean[:POSTURE_SIZE], invert_positive_definite(covariance[:POSTURE_SIZE, :POSTURE_SIZE])
+    for i in range(len(hinge_mean)):
+        precision = hinge_weight * hinge_precision[i]
+        curvature[first + i, first + i] += precision
+        linear[first + i] = precision * (hinge_mean[i] - posture[first + i])
+    return Subspace(posture, np.zeros((0, POSTURE_SIZE)), curvature, linear, np.zeros(POSTURE_SIZE))
 
 
 @compiled

@@ -60,7 +60,7 @@ def minimise_in_subspace(
     z[3:] = project_posture(subspace, z[3:])
     qpos = qpos_from_posture(z[3:], z[:3])
     cost = evaluate(tree, targets, state, qpos) + subspace_cost(subspace, z[3:])
-    damping = _INITIAL_DAMPING
+    damping, last_decrease = _INITIAL_DAMPING, 0.0
     for steps in range(1, stop[2] + 1):
         normal_equations(tree, state, hessian, descent)
         to_subspace(subspace, z, hessian, descent, normal, z_descent)
@@ -75,7 +75,10 @@ def minimise_in_subspace(
             if next_cost <= cost or longest < stop[0]:
                 break
             damping *= DAMPING_INCREASE
-        converged = longest < stop[0] or cost - next_cost < stop[1]
+        # Decreases shrink at least geometrically, so the next one is less than decrease^2 / last_decrease.
+        decrease = cost - next_cost
+        converged = longest < stop[0] or decrease < stop[1] or decrease * decrease < stop[1] * last_decrease
+        last_decrease = decrease
         if next_cost <= cost:
             z, qpos, cost, damping = next_z, next_qpos, next_cost, damping / DAMPING_DECREASE
         if converged:
