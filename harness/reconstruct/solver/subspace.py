@@ -27,13 +27,12 @@ class SubspaceSolver:
     """Solves for the frame that its residuals have read, among the postures of a subspace."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
-        self._residuals, self._limits = residuals, limits
         self._arrays = residuals.tree, residuals.targets, residuals.state
-        self._stop = stopping.step, stopping.decrease, stopping.most_steps
+        self._end = (limits.low_rad, limits.high_rad), (stopping.step, stopping.decrease, stopping.most_steps)
         posture = np.zeros(POSTURE_SIZE)
         example = fit_subspace(np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, posture, 0.0)
         start = np.zeros(3 + POSTURE_SIZE)
-        self._minimise = specialise(minimise_in_subspace, *self._arrays, example, self._stop, start)
+        self._minimise = specialise(minimise_in_subspace, *self._arrays, example, *self._end, start)
 
     def solve(self, subspace: Subspace, ground: Floats, posture: Floats) -> IKSolution:
         """The minimum from a start: ground frame (3,) and posture (P,). Hinges are clipped to their limits at the end.
@@ -41,11 +40,9 @@ class SubspaceSolver:
         ArithmeticError when a reading is not finite.
         """
         start = np.concatenate([ground, posture])
-        qpos, cost, steps, converged = self._minimise(*self._arrays, subspace, self._stop, start)
+        qpos, cost, steps, converged = self._minimise(*self._arrays, subspace, *self._end, start)
         if steps < 0:
             raise ArithmeticError("The normal equations are not positive definite: is a reading not finite?")
-        qpos[7:] = self._limits.clip(qpos[7:])
-        self._residuals.evaluate(qpos)
         return IKSolution(qpos, cost, steps, converged)
 
 

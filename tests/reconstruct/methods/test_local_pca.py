@@ -20,7 +20,7 @@ from harness.reconstruct.solver.subspace_minimiser import (
     subspace_cost,
     to_subspace,
 )
-from tests.reconstruct.conftest import Scene, normal_equations_of
+from tests.reconstruct.conftest import Scene, normal_equations_of, normal_rows_of
 
 
 def postures_of(scene: Scene) -> Singles:
@@ -65,7 +65,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     expected = jacobian.T @ hessian @ jacobian
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)
-    to_subspace(space, z, hessian, descent, normal, found)
+    to_subspace(residuals.tree, space, z, *normal_rows_of(residuals), normal, found)
     np.testing.assert_allclose(np.tril(normal), np.tril(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
     np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
 
