@@ -36,6 +36,8 @@ class Subspace(NamedTuple):
 
 _INITIAL_DAMPING = 1e-3
 """Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it."""
+_MAX_EXTRAPOLATED_STEP = 2e-3
+"""After a step with no larger component [m, rad] the next decrease is predicted: decreases shrink geometrically."""
 _MIN_DIAGONAL = 1e-6
 """Keeps the step at 0 for a ground frame that no reading determines."""
 
@@ -78,7 +80,7 @@ def _minimise(
     z[3:] = project_posture(subspace, z[3:])
     qpos = qpos_from_posture(z[3:], z[:3])
     cost = evaluate(tree, targets, state, qpos) + subspace_cost(subspace, z[3:])
-    damping, last_decrease = _INITIAL_DAMPING, 0.0
+    damping, last_decrease = _INITIAL_DAMPING, np.nan  # no comparison with NaN is true
     for steps in range(1, stop[2] + 1):
         normal_rows(tree, state, rows, descent)
         to_subspace(tree, subspace, z, rows, descent, normal, z_descent)
@@ -93,9 +95,9 @@ def _minimise(
             if next_cost <= cost or longest < stop[0]:
                 break
             damping *= DAMPING_INCREASE
-        # Decreases shrink at least geometrically, so the next one is less than decrease^2 / last_decrease.
         decrease = cost - next_cost
-        converged = longest < stop[0] or decrease < stop[1] or decrease * decrease < stop[1] * last_decrease
+        predicted = decrease * decrease / last_decrease if longest < _MAX_EXTRAPOLATED_STEP else np.inf
+        converged = longest < stop[0] or decrease < stop[1] or predicted < stop[1]
         last_decrease = decrease
         if next_cost <= cost:
             z, qpos, cost, damping = next_z, next_qpos, next_cost, damping / DAMPING_DECREASE
