@@ -164,3 +164,37 @@ def test_the_smoothness_term_is_in_units_of_a_typical_change(walk: Scene) -> Non
 
     np.testing.assert_allclose(answers(0.2, 0.1), answers(20.0, 1.0), atol=1e-9)
     assert np.abs(answers(0.2, 0.1) - answers(2.0, 1.0)).max() > 1e-6
+
+
+def test_the_predicted_decrease_ends_a_solve_early_and_hardly_elsewhere(walk: Scene) -> None:
+    space = space_of(walk, 52)
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    limits, saved = HingeLimits(walk.body), 0
+    for index in range(20, 40):
+        residuals.read(walk.frames[index])
+        ground, posture = ground_from_qpos(walk.take.qpos[index - 2]), posture_from_qpos(walk.take.qpos[index - 2])
+        usual, exact = (
+            SubspaceSolver(residuals, limits, Stopping(step, decrease)).solve(space, ground, posture)
+            for step, decrease in ((1e-4, 1e-5), (1e-7, 1e-13))
+        )
+        assert usual.converged
+        assert usual.cost - exact.cost < 3e-5
+        np.testing.assert_allclose(usual.qpos, exact.qpos, atol=1e-3)
+        saved += exact.steps - usual.steps
+    assert saved > 20
+
+
+def test_a_result_is_within_the_limits_and_evaluated(walk: Scene) -> None:
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss()), HingeLimits(walk.body)
+    residuals.read(walk.frames[30])
+    posture = posture_from_qpos(walk.take.qpos[30])
+    hinge = int(np.flatnonzero(np.isfinite(limits.low_rad))[0])
+    limits.low_rad[hinge] = posture[4 + hinge] + 0.02
+    limits.high_rad[hinge] = posture[4 + hinge] + 0.03
+    solution = SubspaceSolver(residuals, limits, Stopping()).solve(
+        space_of(walk, 52), ground_from_qpos(walk.take.qpos[30]), posture
+    )
+    assert limits.low_rad[hinge] <= solution.qpos[7 + hinge] <= limits.high_rad[hinge]
+    evaluated = residuals.state.error.copy()
+    residuals.evaluate(solution.qpos)
+    np.testing.assert_array_equal(evaluated, residuals.state.error)
