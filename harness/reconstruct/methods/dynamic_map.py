@@ -228,6 +228,7 @@ class FittedDynamicMap:
         )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
+        self.windows.database.release_memory()  # pages that earlier sessions read
         return DynamicMapSession(self, calibration)
 
 

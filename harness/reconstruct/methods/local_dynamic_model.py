@@ -97,7 +97,8 @@ def _primal_ridge_regression(offsets: Real, after: Real, share: Real, ridge: flo
 
     The Gram matrix of the columns X, y and 1, times the roots of the weights, holds all second moments and the means.
     """
-    columns = _weighted_columns(offsets, after, np.sqrt(share))
+    root: Real = np.sqrt(share)
+    columns = _weighted_columns(offsets, after, root)
     least = max(ridge, 1e-6 if offsets.dtype == np.float32 else 1e-9)
     shift, covariance = _solve_primal(columns.T @ columns, offsets[0], least)  # numpy sees the symmetry: half the work
     return Forecast(after[0] + shift, covariance)

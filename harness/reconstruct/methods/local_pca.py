@@ -149,6 +149,7 @@ class FittedLocalPca:
     """Station features and search index of the last calibration, shared by sessions of one performer."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
+        self.windows.database.release_memory()  # pages that earlier sessions read
         return LocalPcaSession(self, calibration)
 
     def station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":

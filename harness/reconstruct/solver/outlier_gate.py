@@ -119,8 +119,11 @@ class OutlierGate:
         out: Bools = np.empty(len(measured), bool)
         self.all_moved = self._judge(
             *(now_s, now_s - self._updated_at_s, self._moving, self._jump_m, self._patience_s),
-            *(np.ascontiguousarray(target_m), np.ascontiguousarray(measured)),
-            *(self._stations, self._history, out),
+            np.ascontiguousarray(target_m),
+            np.ascontiguousarray(measured),
+            self._stations,
+            self._history,
+            out,
         )
         return out
 
