@@ -81,3 +81,10 @@ def test_a_frame_of_other_stations_is_timed_by_the_host() -> None:
     fields = {name: getattr(four, name)[:2] for name in TrackerFrame.__slots__ if name != "received_s"}
     two = replace(four, received_s=1.5, **fields)
     assert times_s([four, two]) == [0.0, 0.5]
+
+
+def test_a_station_that_takes_over_counts_from_the_time_of_its_first_frame() -> None:
+    """That frame is timed by the host: no station of it has an earlier stamp."""
+    missing = [(1, 2, 3), (0, 2, 3), (0, 2, 3)]
+    found = times_s([frame(i, 20.0 + 0.03 * i, without) for i, without in enumerate(missing)])
+    np.testing.assert_allclose(found, [0.0, 0.03, 0.03 + PERIOD_S], atol=1e-12)
