@@ -10,7 +10,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Stopping
+from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import (
@@ -169,19 +169,21 @@ def test_the_smoothness_term_is_in_units_of_a_typical_change(walk: Scene) -> Non
 def test_the_predicted_decrease_ends_a_solve_early_and_hardly_elsewhere(walk: Scene) -> None:
     space = space_of(walk, 52)
     residuals = Residuals(walk.body, walk.calibration, Loss())
-    limits, saved = HingeLimits(walk.body), 0
+    limits, early = HingeLimits(walk.body), 0
     for index in range(20, 40):
         residuals.read(walk.frames[index])
         ground, posture = ground_from_qpos(walk.take.qpos[index - 2]), posture_from_qpos(walk.take.qpos[index - 2])
-        usual, exact = (
-            SubspaceSolver(residuals, limits, Stopping(step, decrease)).solve(space, ground, posture)
-            for step, decrease in ((1e-4, 1e-5), (1e-7, 1e-13))
-        )
+
+        def solve(stopping: Stopping, ground: Floats = ground, posture: Floats = posture) -> IKSolution:
+            return SubspaceSolver(residuals, limits, stopping).solve(space, ground, posture)
+
+        usual, exact = solve(Stopping()), solve(Stopping(1e-7, 1e-13))
+        before = solve(Stopping(most_steps=usual.steps - 1))
         assert usual.converged
         assert usual.cost - exact.cost < 3e-5
         np.testing.assert_allclose(usual.qpos, exact.qpos, atol=1e-3)
-        saved += exact.steps - usual.steps
-    assert saved > 20
+        early += before.cost - usual.cost > Stopping().decrease
+    assert early > 5, "solves that ended while the cost still fell by more"
 
 
 def test_a_result_is_within_the_limits_and_evaluated(walk: Scene) -> None:
