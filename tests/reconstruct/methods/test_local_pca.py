@@ -177,8 +177,8 @@ def test_the_predicted_decrease_ends_a_solve_early_and_hardly_elsewhere(walk: Sc
         def solve(stopping: Stopping, ground: Floats = ground, posture: Floats = posture) -> IKSolution:
             return SubspaceSolver(residuals, limits, stopping).solve(space, ground, posture)
 
-        usual, exact = solve(Stopping()), solve(Stopping(1e-7, 1e-13))
-        before = solve(Stopping(most_steps=usual.steps - 1))
+        usual, exact = solve(Stopping(step=0.0)), solve(Stopping(1e-7, 1e-13))
+        before = solve(Stopping(step=0.0, most_steps=usual.steps - 1))
         assert usual.converged
         assert usual.cost - exact.cost < 3e-5
         np.testing.assert_allclose(usual.qpos, exact.qpos, atol=1e-3)
