@@ -30,6 +30,8 @@ from harness.stream.codec.records import RecordFormat
 METHOD = "dynamic_map"
 SECONDS, LONG_S = 15.0, 600.0
 """Duration of the measurement of each line, and with --large [s]."""
+MAX_ABOVE_TIMER_MS = 5.0
+"""Largest p99 of the way from the last byte to the pose, above the timer's p99 of the same run [ms]."""
 _TICK_S = RecordFormat().seconds_per_tick
 
 
@@ -124,14 +126,19 @@ def _line_rows(case: WireCase, seconds: float, report: dict[str, Any], sent: Any
     lost, latency_s = _losses_and_latency(written_s, ready_s)
     late_ms = 1e3 * (written_s - due_s)[~np.isnan(written_s)]
     floor = report["floor"]
-    jitter = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
+    timer_p99_ms = float(floor["timer"]["p99_ms"])
+    jitter = f"timer p99 {timer_p99_ms:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
     p50, p99, most = (1e3 * float(np.quantile(latency_s, share)) for share in (0.5, 0.99, 1.0))
     count = f"of {int(np.sum(~np.isnan(ready_s)))} in {seconds:g} s"
     return [
         BenchmarkRow(f"{case.name}: records without a pose", float(lost.sum()), "", count, "0"),
         BenchmarkRow(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", jitter, ""),
         BenchmarkRow(
-            f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {jitter}", "<= 10"
+            f"{case.name}: last byte to pose p99",
+            p99,
+            "ms",
+            f"p50 {p50:.2f}, max {most:.1f} ms; {jitter}",
+            f"<= {timer_p99_ms + MAX_ABOVE_TIMER_MS:.2f}",
         ),
     ]
 

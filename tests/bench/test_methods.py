@@ -56,7 +56,7 @@ def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.Monke
     learnt = MotionDatabase.open(folder)
     row = methods.large_database_row("weighted_blend", learnt, learnt, 1, lambda *_: None)
     assert 0.3 < row.value < 3.0
-    assert row.target == "<= 1.5"
+    assert row.target == "<= 1.3"
 
 
 def test_options_change_the_hash() -> None:

@@ -14,7 +14,7 @@ from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
 from harness.reconstruct.contract import Method
-from harness.reconstruct.solver.normal_equations import normal_equations
+from harness.reconstruct.solver.normal_equations import normal_rows
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import make_inputs
@@ -82,9 +82,19 @@ def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
 
 def normal_equations_of(residuals: Residuals) -> tuple[Floats, Floats]:
     """The Gauss-Newton matrix (54, 54) and the descent (54,) at the configuration that was evaluated last."""
-    hessian, descent = np.zeros((54, 54)), np.empty(54)
-    normal_equations(residuals.tree, residuals.state, hessian, descent)
+    tree, hessian = residuals.tree, np.zeros((54, 54))
+    rows, descent = normal_rows_of(residuals)
+    for i, row in enumerate(rows):
+        ancestors = tree.ancestors[i, : tree.depth[i] + 1]
+        hessian[i, ancestors] = row[: len(ancestors)]
     return hessian + np.tril(hessian, -1).T, descent
+
+
+def normal_rows_of(residuals: Residuals) -> tuple[Floats, Floats]:
+    """The same matrix as rows (54, D)."""
+    rows, descent = np.empty(residuals.tree.ancestors.shape), np.empty(54)
+    normal_rows(residuals.tree, residuals.state, rows, descent)
+    return rows, descent
 
 
 def moved(qpos: Floats, yaw_rad: float, by_m: tuple[float, float, float]) -> Floats:

@@ -62,11 +62,12 @@ class Windows:
     def successors(self, rows: Ints | slice) -> Singles:
         """(K, 55) posture (52) and step (3) of the frame after each window; IndexError at the end of the database."""
         newest, database = self.frames[rows], self.database
-        if len(newest) and newest.max() + 1 >= len(database):
+        out = np.empty((len(newest), POSTURE_SIZE + 3), np.float32)
+        if not _gather_successors(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest, out):
             raise IndexError(
                 "the last window of the database has no successor: ask for windows(..., with_successor=True)"
             )
-        return _gather_successors(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest)
+        return out
 
     def query(self, qpos: Floats) -> Singles:
         """The vector (D,) of m configurations (m, 55), newest first, with hinges in the database's representation."""
@@ -102,17 +103,18 @@ def _fill_windows(posture: Singles, step: Singles, newest: Ints, out: Singles) -
 
 
 @compiled
-def _gather_successors(posture: Singles, step: Singles, newest: Ints) -> Singles:
-    """(K, 55) posture and step of the frames after `newest` (K,)."""
+def _gather_successors(posture: Singles, step: Singles, newest: Ints, out: Singles) -> bool:
+    """Fill in posture and step (K, 55) of the frames after `newest` (K,); False when one has no successor."""
     width = posture.shape[1]
-    out = np.empty((len(newest), width + 3), np.float32)
     for k in range(len(newest)):
-        frame = newest[k] + 1
+        frame, row = newest[k] + 1, out[k]
+        if frame >= len(posture):
+            return False
         for i in range(width):
-            out[k, i] = posture[frame, i]
+            row[i] = posture[frame, i]
         for i in range(3):
-            out[k, width + i] = step[frame, i]
-    return out
+            row[width + i] = step[frame, i]
+    return True
 
 
 @compiled

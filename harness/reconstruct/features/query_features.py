@@ -25,14 +25,20 @@ class QueryFeatures:
     """Computes the features of each frame of a session."""
 
     def __init__(
-        self, residuals: Residuals, calibration: Calibration, examples: ExampleFeatures, longest_gap_s: float
+        self,
+        residuals: Residuals,
+        calibration: Calibration,
+        examples: ExampleFeatures,
+        longest_gap_s: float,
+        clock: DeviceTime | None = None,
     ) -> None:
+        """`clock` is that of the session; without one the features have their own."""
         count = len(calibration.stations)
         self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
         self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
-        self._time = DeviceTime()
+        self._time = clock or DeviceTime()
         self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
         """(S, 3) positions of the last query, measured or filled in, and its time by the device's clock [s]."""
 
@@ -44,7 +50,7 @@ class QueryFeatures:
         """
         residuals, examples = self._residuals, self._examples
         velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
-        complete = _estimate_velocities(
+        complete, all_moving = _estimate_velocities(
             *(residuals.target_m, frame.measured_s, residuals.measured),
             *(self._before_m, self._before_s, self._before_valid),
             *(self._longest_gap_s, velocity_m_s, moving),
@@ -53,14 +59,15 @@ class QueryFeatures:
         facing = turned[examples.anchor]
         if not complete:
             position_m, turned, facing = self._completed_readings(last_qpos)
-        filled = bool((moving | ~residuals.measured[: len(moving)]).all())
         now_s = self._time.frame_time_s(frame)
         gap_s = now_s - self._shown_s
-        if 0.0 < gap_s <= self._longest_gap_s:
-            velocity_m_s[~moving] = (position_m[~moving] - self._shown_m[~moving]) / gap_s
-        else:
-            filled = False
-        self._shown_m, self._shown_s = np.array(position_m), now_s
+        filled = 0.0 < gap_s <= self._longest_gap_s
+        if not all_moving:
+            if filled:
+                velocity_m_s[~moving] = (position_m[~moving] - self._shown_m[~moving]) / gap_s
+            filled = filled and bool((moving | ~residuals.measured[: len(moving)]).all())
+        self._shown_m[:] = position_m
+        self._shown_s = now_s
         w, _, _, z = facing.tolist()
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
@@ -91,10 +98,11 @@ def _estimate_velocities(
     longest_gap_s: float,
     velocity_m_s: Floats,
     has_velocity: Bools,
-) -> bool:
+) -> tuple[bool, bool]:
     """Compute velocities (S, 3) since the last frame [m/s], 0 where unknown, and where they are known (S,), in place.
 
-    Returns whether everything was measured. The frame is then stored as the last one (`before_*`).
+    Returns whether everything was measured, and whether all velocities are known. The frame is then stored as the last
+    one (`before_*`).
     """
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
@@ -103,7 +111,7 @@ def _estimate_velocities(
             velocity_m_s[s, i] = (target_m[s, i] - before_m[s, i]) / gap_s if has_velocity[s] else 0.0
             before_m[s, i] = target_m[s, i]
         before_s[s], before_valid[s] = measured_s[s], measured[s]
-    return bool(measured.all())
+    return bool(measured.all()), bool(has_velocity.all())
 
 
 @compiled

@@ -22,6 +22,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.ranges import Range
 from harness.reconstruct.database import Windows
 from harness.reconstruct.features.ground_step import features_from_readings
@@ -151,8 +152,9 @@ class ReducedRankRegression:
 
     def predictors(self, window: Singles, position_m: Floats, orientation: Floats, view: AnchorFrame) -> Floats:
         """Predictors (D + 9 S,) of a window (D,) and of readings (S, 3), (S, 4) in the world, in an anchor frame."""
-        read = features_from_readings(position_m, orientation, np.array(view), self.options.lever_m)
-        return np.concatenate([self.options.window_weight * window, read])
+        return _join_predictors(
+            window, self.options.window_weight, position_m, orientation, np.array(view), self.options.lever_m
+        )
 
     def columns(self, measured: Bools, history: bool = True) -> Bools:
         """(D + 9 S,) columns that are known when these readings (2 S,) of positions, then orientations, are.
@@ -232,7 +234,7 @@ class ReducedRankSearch:
 
         The offsets are those of z, possibly along other orthonormal axes.
         """
-        mask = np.append(measured, history).tobytes()
+        mask = measured.tobytes() + bytes([history])
         entry = self._maps.get(mask)
         if entry is None:
             if len(self._maps) >= _CACHED_MAPS:
@@ -247,3 +249,17 @@ class ReducedRankSearch:
         to_z = np.zeros((regression.size, vectors.size))
         to_z[columns] = regression.imputation_map(columns, vectors.usual) @ vectors.directions
         return to_z, regression.mean @ to_z
+
+
+@compiled
+def _join_predictors(
+    window: Singles, window_weight: float, position_m: Floats, orientation: Floats, ground: Floats, lever_m: float
+) -> Floats:
+    """(D + 9 S,) a weighted window (D,), and the features of readings (S, 3), (S, 4) relative to a ground frame."""
+    read = features_from_readings(position_m, orientation, ground, lever_m)
+    out = np.empty(len(window) + len(read))
+    for i in range(len(window)):
+        out[i] = np.float32(window_weight * window[i])
+    for i in range(len(read)):
+        out[len(window) + i] = read[i]
+    return out

@@ -9,7 +9,8 @@ takes longer than all distances when hundreds of neighbours are wanted (`harness
 
 Memory layout. `_rows` lists the vectors cell after cell; cell c occupies places `_starts[c]` to `_starts[c + 1]`.
 Within a cell of n vectors the codes are stored by axis: n numbers for the first axis, then n for the second, and so
-on. So the scan adds up one axis for all vectors of a cell in a contiguous loop, which the compiler vectorises.
+on. So the scan adds up one axis for all vectors of a cell in a contiguous loop, which the compiler vectorises. A second
+copy of the codes by row would save 20 us of 800 neighbours' offsets, for a fifth of the memory of the poses.
 """
 
 import math
@@ -94,32 +95,32 @@ class InvertedFile(StatelessIndex):
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """See `Lookup`; finds most of the nearest, not always all."""
-        rows, squared, _ = self._search(query, count)
-        return rows, squared
+        best, _ = self._search(query, count)
+        return _unpack(best, self._step)
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """See `Index`; offsets are along the leading principal axes."""
-        rows, squared, target = self._search(query, count)
+        best, target = self._search(query, count)
+        rows, squared = _unpack(best, self._step)
         offsets = _gather_offsets(self._codes, self._starts, self._cell_of, self._place, rows, target, self._step)
         return Neighbours(rows, squared, offsets)
 
-    def _search(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
-        """Rows (K,), squared distances (K,), and the query in steps (d,)."""
+    def _search(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """The nearest (K,) as integers of squared distance and row, in order, and the query in steps (d,)."""
         count, probes = min(count, len(self)), self._probes
         target = self._principal.project(np.asarray(query, np.float32)) / self._step
-        if np.isnan(target).any():
-            raise ArithmeticError(
-                "A query for neighbours contains a value that is not a number: is a reading not finite?"
-            )
-        np.clip(target, -_MAX_QUERY, _MAX_QUERY, out=target)
         candidates = _scan_cells(self._centroids, self._starts, self._codes, self._rows, target, probes)
         while len(candidates) < count:  # the scanned cells hold too few
+            if np.isnan(target).any():
+                raise ArithmeticError(
+                    "A query for neighbours contains a value that is not a number: is a reading not finite?"
+                )
             probes = min(4 * probes, len(self._starts) - 1)
             candidates = _scan_cells(self._centroids, self._starts, self._codes, self._rows, target, probes)
         candidates.partition(count - 1)
-        best = np.sort(candidates[:count])
-        squared = (best >> _ROW_BITS).astype(np.int32).view(np.float32)
-        return best & _ROW_MASK, squared * self._step**2, target
+        best = candidates[:count]
+        best.sort()
+        return best, target
 
 
 def cells_for(count: int) -> int:
@@ -149,23 +150,33 @@ def _store_codes(values: Codes, place: Places, cell_of: Places, starts: Ints, co
 
 @compiled
 def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, target: Singles, probes: int) -> Ints:
-    """(M,) integers of squared distance and row, for all vectors of the `probes` cells nearest to `target` (d,)."""
+    """(M,) integers of squared distance and row, for all vectors of the `probes` cells nearest to `target` (d,).
+
+    The target is clipped. None are near a target with a value that is not a number.
+    """
     width, cells = centroids.shape
+    for i in range(width):
+        if np.isnan(target[i]):
+            return np.empty(0, np.int64)
+        target[i] = min(max(target[i], np.float32(-_MAX_QUERY)), np.float32(_MAX_QUERY))
     # 1. Squared distances to all centroids, axis by axis, so that the inner loop runs over contiguous numbers.
     far = np.zeros(cells, np.float32)
     for i in range(width):
         coordinate, value = centroids[i], target[i]
         for c in range(cells):
             far[c] += (coordinate[c] - value) * (coordinate[c] - value)
-    # 2. The nearest cells by repeated minimum, since only few are needed.
-    nearest, total, most = np.empty(probes, np.int64), 0, 0
-    for p in range(probes):
-        best = 0
-        for c in range(1, cells):
-            if far[c] < far[best]:
-                best = c
-        nearest[p], far[best] = best, np.inf
-        total, most = total + starts[best + 1] - starts[best], max(most, starts[best + 1] - starts[best])
+    # 2. The nearest cells, by insertion into a short list, since only few are needed.
+    nearest, distance = np.empty(probes, np.int64), np.full(probes, np.inf, np.float32)
+    for c in range(cells):
+        if far[c] < distance[-1]:
+            p = probes - 1
+            while p > 0 and distance[p - 1] > far[c]:
+                nearest[p], distance[p] = nearest[p - 1], distance[p - 1]
+                p -= 1
+            nearest[p], distance[p] = c, far[c]
+    total, most = 0, 0
+    for cell in nearest:
+        total, most = total + starts[cell + 1] - starts[cell], max(most, starts[cell + 1] - starts[cell])
     # 3. Squared distances to their vectors. `bits` is the same memory as `squared`, read as integers.
     out, squared, done = np.empty(total, np.int64), np.empty(most, np.float32), 0
     bits = squared.view(np.int32)
@@ -185,6 +196,15 @@ def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, ta
 
 
 @compiled
+def _unpack(packed: Ints, step: np.float32) -> tuple[Ints, Singles]:
+    """Rows (K,) and squared distances (K,) of integers of both."""
+    rows, bits = np.empty(len(packed), np.int64), np.empty(len(packed), np.int32)
+    for k in range(len(packed)):
+        rows[k], bits[k] = packed[k] & _ROW_MASK, packed[k] >> _ROW_BITS
+    return rows, bits.view(np.float32) * (step * step)
+
+
+@compiled
 def _gather_offsets(
     codes: Codes, starts: Ints, cell_of: Places, place: Places, rows: Ints, target: Singles, step: np.float32
 ) -> Singles:
@@ -192,9 +212,12 @@ def _gather_offsets(
     width = len(target)
     out = np.empty((len(rows), width), np.float32)
     for k in range(len(rows)):
-        cell = cell_of[rows[k]]
-        first, last = starts[cell], starts[cell + 1]
-        begin = first * width + place[rows[k]] - first
+        values, cell = out[k], cell_of[rows[k]]
+        first, stride = starts[cell], starts[cell + 1] - starts[cell]
+        at = first * width + place[rows[k]] - first
         for i in range(width):
-            out[k, i] = (codes[begin + i * (last - first)] - target[i]) * step
+            values[i] = codes[at]
+            at += stride
+        for i in range(width):
+            values[i] = (values[i] - target[i]) * step
     return out

@@ -28,6 +28,7 @@ from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.features.virtual_trackers import station_poses
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import StatusMonitor
@@ -81,7 +82,9 @@ class BestMatchSession:
     def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
         self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._monitor, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), _JUMP_M)
+        clock = DeviceTime()
+        self._monitor = StatusMonitor(clock=clock)
+        self._gate = OutlierGate(len(calibration.stations), _JUMP_M, clock=clock)
         self._qpos = np.concatenate([take.qpos for take in fitted.takes])
         read = [station_poses(fitted.body, take, calibration) for take in fitted.takes]
         velocity = [_backward_difference(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]

@@ -29,6 +29,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
@@ -229,6 +230,7 @@ class FittedDynamicMap:
         )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
+        self.windows.database.release_memory()  # pages that earlier sessions read
         return DynamicMapSession(self, calibration)
 
 
@@ -359,11 +361,9 @@ class DynamicMapSession(HistorySession):
         weight = neighbour_weights(squared, max(variance, _MIN_WEIGHT_VARIANCE))
         after = windows.successors(rows)
         mean, covariance = forecast(offsets, after, weight, options.variance_kept, options.ridge)
-        mean[HINGES] = self.limits.clip(mean[HINGES])
-        covariance *= options.spread**2
-        covariance.reshape(-1)[:: len(covariance) + 1] += self._least_variance
         widened = 1.0 + (options.widening * float(squared[0]) / offsets.shape[1]) ** 2
-        covariance *= widened
+        _widen(mean, covariance, options.spread**2, self._least_variance, widened)
+        _clip_hinges(mean, self.limits.low_rad, self.limits.high_rad)
         return Prediction(mean, covariance, after[0].astype(float), options.ik_prior_weight * (1.0 - 1.0 / widened))
 
     def independent_prior(self, prediction: Prediction) -> Prior:
@@ -381,16 +381,31 @@ class DynamicMapSession(HistorySession):
 
     def joint_prior(self, prediction: Prediction) -> Subspace:
         """The prediction of the posture with its covariances, times the prior of `ik`; the ground frame is free."""
-        mean, precision = np.zeros((2, POSTURE_SIZE))
-        if prediction.ik_prior_weight > 0.0:
-            ik_prior = self.ik_prior()
-            if ik_prior.precision is None:
-                raise ValueError("The product of two priors needs the precisions of both.")
-            mean[HINGES], precision[HINGES] = ik_prior.qpos[7:], prediction.ik_prior_weight * ik_prior.precision[6:]
-        posture = slice(POSTURE_SIZE)
+        ik_prior = self.ik_prior()
+        if ik_prior.precision is None:
+            raise ValueError("The product of two priors needs the precisions of both.")
         return gaussian_space(
-            prediction.mean[posture], np.ascontiguousarray(prediction.covariance[posture, posture]), mean, precision
+            *(prediction.mean, prediction.covariance, ik_prior.qpos[7:], ik_prior.precision[6:]),
+            prediction.ik_prior_weight,
         )
+
+
+@compiled
+def _widen(mean: Floats, covariance: Floats, factor: float, least_variance: Floats, widened: float) -> None:
+    """Multiply a covariance (D, D) by a factor, add the floors (D,) to its diagonal, and multiply it by `widened`."""
+    for i in range(len(covariance)):
+        row = covariance[i]
+        for j in range(len(row)):
+            row[j] *= factor * widened
+        row[i] += least_variance[i] * widened
+
+
+@compiled
+def _clip_hinges(mean: Floats, low_rad: Floats, high_rad: Floats) -> None:
+    """Clip the hinges of a posture and step (55,) to their limits (48,)."""
+    for i in range(len(low_rad)):
+        hinge = HINGES.start + i
+        mean[hinge] = min(max(mean[hinge], low_rad[i]), high_rad[i])
 
 
 _TANGENT_INDICES = np.array(

@@ -32,6 +32,7 @@ from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.anchor_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.ground_frame import ground_from_qpos
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
@@ -172,7 +173,8 @@ class KernelRidgeSession:
     def __init__(self, fitted: FittedKernelRidge, calibration: Calibration) -> None:
         count = len(calibration.stations)
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._monitor, self._gate = StatusMonitor(), OutlierGate(count, _JUMP_M)
+        clock = DeviceTime()
+        self._monitor, self._gate = StatusMonitor(clock=clock), OutlierGate(count, _JUMP_M, clock=clock)
         self._maps = fitted.maps.get(calibration, lambda: ReadingMaps(fitted, calibration))
         self._estimate = self._maps.mean_qpos
         self._measured_before = np.zeros(2 * count, bool)

@@ -95,56 +95,55 @@ def _dual_ridge_regression(
 def _primal_ridge_regression(offsets: Real, after: Real, share: Real, ridge: float) -> Forecast:
     """Eq. 4 with a ridge, in the space of the N columns: cheaper when there are more examples than columns.
 
-    The product of the weighted columns X and y with X, y and 1 holds all second moments and the means.
+    The Gram matrix of the columns X, y and 1, times the roots of the weights, holds all second moments and the means.
     """
-    weighted, columns = _weighted_columns(offsets, after, share)
+    root: Real = np.sqrt(share)
+    columns = _weighted_columns(offsets, after, root)
     least = max(ridge, 1e-6 if offsets.dtype == np.float32 else 1e-9)
-    shift, covariance = _solve_primal(columns.T @ weighted, offsets[0], least)
+    shift, covariance = _solve_primal(columns.T @ columns, offsets[0], least)  # numpy sees the symmetry: half the work
     return Forecast(after[0] + shift, covariance)
 
 
 @compiled
-def _weighted_columns(offsets: Real, after: Real, share: Real) -> tuple[Real, Real]:
-    """W X and W y (K, N + D); X, y and 1 (K, N + D + 1).
+def _weighted_columns(offsets: Real, after: Real, root: Real) -> Real:
+    """X, y and 1 (K, N + D + 1), each row times its `root` (K,).
 
     X and y are relative to the nearest example's, which keeps single precision accurate for distant queries.
     """
-    count, size, following = len(offsets), offsets.shape[1], after.shape[1]
-    weighted = np.empty((count, size + following), offsets.dtype)
-    columns = np.empty((count, size + following + 1), offsets.dtype)
-    for k in range(count):
-        row = columns[k]
+    size, following = offsets.shape[1], after.shape[1]
+    columns = np.empty((len(offsets), size + following + 1), offsets.dtype)
+    for k in range(len(offsets)):
+        x, y, scale = columns[k, :size], columns[k, size:], root[k]
         for i in range(size):
-            row[i] = offsets[k, i] - offsets[0, i]
+            x[i] = scale * (offsets[k, i] - offsets[0, i])
         for i in range(following):
-            row[size + i] = after[k, i] - after[0, i]
-        row[size + following] = 1.0
-        for i in range(size + following):
-            weighted[k, i] = share[k] * row[i]
-    return weighted, columns
+            y[i] = scale * (after[k, i] - after[0, i])
+        y[following] = scale
+    return columns
 
 
 @compiled
 def _solve_primal(product: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
     """Mean (D,) relative to the nearest example's y, and covariance (D, D), of eq. 8; x is relative to `first` (N,)."""
-    size, both = len(first), product.shape[1]
-    following = both - size
+    size, both = len(first), len(product) - 1
+    following, trace = both - size, 0.0
     middle = product[both].astype(np.float64)
-    outer, slope = np.empty((size, size)), np.empty((size, following))
-    covariance = np.empty((following, following))
+    rows, covariance = np.empty((size, both)), np.empty((following, following))
     for i in range(size):  # centred, eq. 2
-        for j in range(size):
-            outer[i, j] = product[i, j] - middle[i] * middle[j]
         for j in range(following):
-            slope[i, j] = product[size + j, i] - middle[i] * middle[size + j]
+            rows[i, j] = product[i, size + j] - middle[i] * middle[size + j]
+        for j in range(i + 1):
+            rows[i, following + j] = product[i, j] - middle[i] * middle[j]
+        trace += rows[i, following + i]
     for i in range(following):
         for j in range(following):
             covariance[i, j] = product[size + i, size + j] - middle[size + i] * middle[size + j]
-    mixed, least = slope.copy(), ridge * np.trace(outer) + 1e-30
+    mixed, least = rows[:, :following].copy(), ridge * trace + 1e-30
     for i in range(size):
-        outer[i, i] += least
-    _cholesky_solve(outer, slope)
-    mean = middle[size:] - np.dot(first.astype(np.float64) + middle[:size], slope)
+        rows[i, following + i] += least
+    _solve_rows(rows)
+    slope = rows[:, :following].copy()
+    mean = middle[size:both] - np.dot(first.astype(np.float64) + middle[:size], slope)
     covariance -= np.dot(slope.T, mixed + least * slope)  # of y - x slope
     for i in range(following):
         covariance[i, i] = max(covariance[i, i], 0.0)
@@ -152,23 +151,23 @@ def _solve_primal(product: Real, first: Real, ridge: float) -> tuple[Floats, Flo
 
 
 @compiled
-def _cholesky_solve(matrix: Floats, rows: Floats) -> None:
-    """Solve A X = B in place: B (N, D) becomes X, and positive definite A (N, N) becomes its Cholesky factor."""
-    count, width = rows.shape
-    for i in range(count):
-        for k in range(i):
-            share = matrix[i, k] * matrix[k, k]  # the diagonal holds reciprocals
-            matrix[i, k] = share
-            for j in range(k + 1, i + 1):
-                matrix[i, j] -= share * matrix[j, k]
+def _solve_rows(rows: Floats) -> None:
+    """Solve A X = B in place, for rows [B A] (N, D + N), of which the lower triangle of positive definite A is used.
+
+    X replaces B. The rows of A become those of its factor L^T D L, from the last one.
+    """
+    count, width = len(rows), rows.shape[1] - len(rows)
+    for k in range(count - 1, -1, -1):
+        pivot, scale = rows[k], 1.0 / rows[k, width + k]
+        for i in range(k):
+            row, share = rows[i], pivot[width + i] * scale
+            for j in range(width + i + 1):
+                row[j] -= share * pivot[j]
+    for k in range(count):
+        solution, scale = rows[k, :width], 1.0 / rows[k, width + k]
+        for i in range(k):
+            known, share = rows[i], rows[k, width + i]
             for j in range(width):
-                rows[i, j] -= share * rows[k, j]
-        matrix[i, i] = 1.0 / np.sqrt(matrix[i, i])
+                solution[j] -= share * known[j]
         for j in range(width):
-            rows[i, j] *= matrix[i, i]
-    for i in range(count - 1, -1, -1):
-        for j in range(width):
-            rows[i, j] *= matrix[i, i]
-        for k in range(i):
-            for j in range(width):
-                rows[k, j] -= matrix[i, k] * rows[i, j]
+            solution[j] *= scale

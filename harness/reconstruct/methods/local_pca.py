@@ -26,6 +26,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
@@ -51,6 +52,7 @@ from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
 _MIN_WIDENING_RAD = math.radians(1.0)
 """Smallest standard deviation for which the answer is solved again outside the subspace [rad]."""
+_NO_STEP: Floats = np.zeros(3)
 _HISTORY = 2
 """Number of past estimates in the query (C2)."""
 
@@ -149,6 +151,7 @@ class FittedLocalPca:
     """Station features and search index of the last calibration, shared by sessions of one performer."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
+        self.windows.database.release_memory()  # pages that earlier sessions read
         return LocalPcaSession(self, calibration)
 
     def station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
@@ -189,9 +192,8 @@ class LocalPcaSession(HistorySession):
         rows, squared = self._nearest(history)
         poses = self._windows.successors(rows)
         postures, closest = poses[:, :POSTURE_SIZE], poses[0].astype(float)
-        constant_velocity = 2.0 * history[:POSTURE_SIZE].astype(float) - history[-POSTURE_SIZE:]
         beta = options.smooth_weight / options.smooth_sigma_rad**2
-        space = fit_subspace(postures, options.components, options.prior_weight, constant_velocity, beta)
+        space = fit_subspace(postures, options.components, options.prior_weight, _constant_velocity(history), beta)
         solution = self._subspace_solver.solve(
             space, ground_after_step(self.past[0], closest[POSTURE_SIZE:]), closest[:POSTURE_SIZE]
         )
@@ -216,9 +218,9 @@ class LocalPcaSession(HistorySession):
         residuals, features, options = self.residuals, self._features, self._options
         scale = np.float32(np.sqrt(options.control_weight))
         position_m, turned = residuals.target_m, residuals.world_from_target
-        ground = ground_after_step(self.past[0], np.zeros(3))
+        ground = ground_after_step(self.past[0], _NO_STEP)
         if residuals.measured.all():
-            query = np.concatenate([past, scale * features.query(position_m, turned, ground)])
+            query = _join(past, scale, features.query(position_m, turned, ground))
             rows, squared = self._index.nearest(query, options.neighbours)
             return rows, float(squared[0])
         count = len(position_m)
@@ -231,6 +233,25 @@ class LocalPcaSession(HistorySession):
         query = np.concatenate([past, scale * control])
         rows, squared = nearest_partial(self._index, self._examples, query, weight, options.neighbours)
         return rows, float(squared[0])
+
+
+@compiled
+def _constant_velocity(window: Singles) -> Floats:
+    """(52,) the posture that follows the last two of a window at constant velocity."""
+    out, before = np.empty(POSTURE_SIZE), len(window) - POSTURE_SIZE
+    for i in range(POSTURE_SIZE):
+        out[i] = 2.0 * window[i] - window[before + i]
+    return out
+
+
+@compiled
+def _join(window: Singles, scale: np.float32, features: Singles) -> Singles:
+    """A window (D,) and features (C,) times a scale."""
+    out = np.empty(len(window) + len(features), np.float32)
+    out[: len(window)] = window
+    for i in range(len(features)):
+        out[len(window) + i] = scale * features[i]
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,7 @@ from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.features.query_features import QueryFeatures
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
@@ -148,11 +149,13 @@ class LocalRegressionSession:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
-        self._monitor, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
         self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
+        clock = DeviceTime()
+        self._monitor = StatusMonitor(clock=clock)
+        self._gate = OutlierGate(len(calibration.stations), jump_m, clock=clock)
         self._examples = fitted.example_features(calibration)
         self._lookup = self._examples.index.begin_search()
-        self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
+        self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s, clock)
         self._limits = HingeLimits(fitted.body)
         self._space: PoseSpace = HingeAngles()
         if options.outputs == "quaternions":

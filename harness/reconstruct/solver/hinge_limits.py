@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
+from harness.core.compiled import compiled
 from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF
 
@@ -31,6 +32,7 @@ class HingeLimits:
         self._gimbals: Ints = np.array(
             [QPOS_OF_DOF[where] for where in body.skeleton.dof_of_bone if are_gimbal(body.skeleton.axes[where])]
         )
+        self._middle_hinges: Ints = np.ascontiguousarray(self._gimbals[:, 1])
 
     def clip(self, angles_rad: Floats) -> Floats:
         """The nearest angles (..., 48) within the limits."""
@@ -44,7 +46,7 @@ class HingeLimits:
 
     def past_gimbal(self, angles_rad: Floats) -> bool:
         """Whether a middle hinge of angles (48,) is beyond 90 deg, where `principal` may change them."""
-        return bool(np.any(np.abs(angles_rad[self._gimbals[:, 1]]) > 0.5 * np.pi))
+        return _any_beyond(angles_rad, self._middle_hinges, 0.5 * np.pi)
 
     def principal(self, angles_rad: Floats) -> Floats:
         """The principal representation (..., 48) of the same rotations: the one that exceeds the limits least.
@@ -78,9 +80,11 @@ class HingeLimits:
 
     def unwrap_near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
         """Angles (48,) with full turns added to hinges without limits, to be nearest to `other_rad` (48,)."""
-        turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _FULL_TURN_RAD), 0.0)
-        out: Floats = angles_rad + _FULL_TURN_RAD * turns
-        return out
+        return _unwrap_near(angles_rad, other_rad, self.high_rad)
+
+    def between(self, qpos: Floats, other: Floats, share: float) -> Floats:
+        """A configuration (55,) with hinges moved by a share of the way to another's (55,), through full turns."""
+        return _between(qpos, other, share, self.high_rad)
 
     def mean(self, angles_rad: Floats) -> Floats:
         """(48,) circular mean of angles (T, 48), in principal representation and within the limits."""
@@ -92,6 +96,34 @@ class HingeLimits:
         """Angles with full turns added, so that each is within pi of the middle of its limits."""
         out: Floats = angles_rad - _FULL_TURN_RAD * np.round((angles_rad - self._middle_rad) / _FULL_TURN_RAD)
         return out
+
+
+@compiled
+def _any_beyond(angles_rad: Floats, hinges: Ints, limit_rad: float) -> bool:
+    """Whether any of some hinges' angles (48,) is farther than a limit from 0."""
+    beyond = False
+    for hinge in hinges:
+        beyond = beyond or abs(angles_rad[hinge]) > limit_rad
+    return beyond
+
+
+@compiled
+def _unwrap_near(angles_rad: Floats, other_rad: Floats, high_rad: Floats) -> Floats:
+    """`HingeLimits.unwrap_near`, with the upper limits (48,)."""
+    out = angles_rad.copy()
+    for i in range(len(out)):
+        if np.isinf(high_rad[i]):
+            out[i] += _FULL_TURN_RAD * np.rint((other_rad[i] - out[i]) / _FULL_TURN_RAD)
+    return out
+
+
+@compiled
+def _between(qpos: Floats, other: Floats, share: float, high_rad: Floats) -> Floats:
+    """`HingeLimits.between`, with the upper limits (48,)."""
+    out, near = qpos.copy(), _unwrap_near(other[7:], qpos[7:], high_rad)
+    for i in range(len(near)):
+        out[7 + i] += share * (near[i] - out[7 + i])
+    return out
 
 
 def _angular_distance(difference_rad: Floats) -> Floats:

@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.arrays import Floats
+from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Origin
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
@@ -79,10 +80,22 @@ class HistorySession(IKSession, ABC):
 
     def _push(self, qpos: Floats) -> None:
         """Add a configuration as the newest, in the representation of hinge angles that most examples share."""
-        qpos = np.array(qpos)
-        if np.abs(qpos[7:][self._unlimited]).max(initial=0.0) > np.pi:
-            qpos[7:] = self.limits.principal(qpos[7:])
-        self._dropped = np.array(self.past[-1])
-        self.past[1:] = self.past[:-1].copy()
-        self.past[0] = qpos
+        if _push_first(self.past, self._dropped, qpos, self._unlimited):
+            self.past[0, 7:] = self.limits.principal(self.past[0, 7:])
         self._length += 1
+
+
+@compiled
+def _push_first(past: Floats, dropped: Floats, qpos: Floats, unlimited: Bools) -> bool:
+    """Add a configuration (55,) before others (m, 55); the last of them goes to `dropped`.
+
+    Returns whether any of the `unlimited` hinges (48,) is farther than half a turn from 0.
+    """
+    dropped[:] = past[-1]
+    for age in range(len(past) - 1, 0, -1):
+        past[age] = past[age - 1]
+    past[0] = qpos
+    beyond = False
+    for hinge in range(len(unlimited)):
+        beyond = beyond or (unlimited[hinge] and abs(qpos[7 + hinge]) > np.pi)
+    return beyond

@@ -6,12 +6,14 @@ once, and when readings keep contradicting the pose. The solution of lower cost 
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.arrays import Floats
+from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin, Status
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -52,15 +54,16 @@ class PosturePrior:
     towards_mean: float = 1.0
     """Position of the prior's mean between the previous pose, 0, and the mean posture, 1."""
 
+    @cached_property
+    def precision(self) -> Floats:
+        """(54,) precision of the prior along each tangent direction; 0 for the root [1/rad^2]."""
+        return np.concatenate([np.zeros(6), self.spread_rad**-2.0])
+
     def prior(self, limits: HingeLimits, previous: Floats) -> Prior:
         """The prior after a previous pose (55,)."""
-        mean, precision = previous, np.zeros(6 + len(self.spread_rad))
-        precision[6:] = self.spread_rad**-2.0
-        if self.mean_qpos is not None:
-            mean = np.array(previous)
-            posture = limits.unwrap_near(self.mean_qpos[7:], previous[7:])
-            mean[7:] += self.towards_mean * (posture - previous[7:])
-        return Prior(mean, precision)
+        if self.mean_qpos is None:
+            return Prior(previous, self.precision)
+        return Prior(limits.between(previous, self.mean_qpos, self.towards_mean), self.precision)
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,11 @@ class IKSession:
         """(55,) the last answer."""
         self._posture_prior = posture_prior
         self._restart = options.restart
-        self._monitor = StatusMonitor(options.lost_after_s)
-        self._gate = OutlierGate(len(calibration.stations), options.jump_m)
         self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
         self._time, self.now_s = DeviceTime(), 0.0
         """Time of this frame [s]."""
+        self._monitor = StatusMonitor(options.lost_after_s, self._time)
+        self._gate = OutlierGate(len(calibration.stations), options.jump_m, clock=self._time)
         self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
         self._contradiction = np.repeat([_CONTRADICTION_M, _CONTRADICTION_RAD], len(calibration.stations))
         """(2S,) residuals from which on a position or an orientation contradicts the pose [m, rad]."""
@@ -123,8 +126,8 @@ class IKSession:
 
     def outlier_share(self) -> float:
         """The share of measured rows that contradict the pose evaluated last."""
-        far = (self.residuals.distance > self._contradiction) & self.residuals.measured
-        return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
+        residuals = self.residuals
+        return _share_beyond(residuals.state.squared, self._contradiction, residuals.measured)
 
     def step(self, frame: TrackerFrame) -> Estimate:
         """The estimate after one frame; without any valid reading, the last pose again."""
@@ -191,6 +194,16 @@ class IKSession:
         if self.limits.past_gimbal(qpos[7:]):
             qpos = np.concatenate([qpos[:7], self.limits.principal(qpos[7:])])
         return qpos
+
+
+@compiled
+def _share_beyond(squared: Floats, limit: Floats, measured: Bools) -> float:
+    """The share of the measured rows (N,) whose square exceeds that of its limit (N,)."""
+    beyond, count = 0, 0
+    for row in range(len(squared)):
+        count += measured[row]
+        beyond += measured[row] and squared[row] > limit[row] ** 2
+    return beyond / count
 
 
 def _is_new(qpos: Floats, known: list[Floats]) -> bool:

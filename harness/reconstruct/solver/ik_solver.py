@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.compiled import specialise
+from harness.core.compiled import compiled, specialise
 from harness.core.ranges import Range
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.levenberg_marquardt import PriorAndLimits, minimise, new_quadratic_model
@@ -38,10 +38,20 @@ def multiply_priors(prior: Prior, broad: Prior, weight: float) -> Prior:
     """
     if prior.precision is None or broad.precision is None:
         raise ValueError("The product of two priors needs the precisions of both.")
-    added, precision, qpos = weight * broad.precision[6:], prior.precision.copy(), prior.qpos.copy()
-    precision[6:] += added
-    qpos[7:] += added / precision[6:] * (broad.qpos[7:] - qpos[7:])
-    return Prior(qpos, precision)
+    return Prior(*_multiply_hinges(prior.qpos, prior.precision, broad.qpos, broad.precision, weight))
+
+
+@compiled
+def _multiply_hinges(
+    qpos: Floats, precision: Floats, broad_qpos: Floats, broad_precision: Floats, weight: float
+) -> tuple[Floats, Floats]:
+    """Mean (55,) and precision (54,) of `multiply_priors`."""
+    mean, total = qpos.copy(), precision.copy()
+    for i in range(6, len(total)):
+        added = weight * broad_precision[i]
+        total[i] += added
+        mean[i + 1] += added / total[i] * (broad_qpos[i + 1] - mean[i + 1])
+    return mean, total
 
 
 @dataclass(frozen=True)

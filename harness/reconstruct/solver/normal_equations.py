@@ -122,25 +122,12 @@ def evaluate(tree: KinematicTree, targets: StationTargets, state: KinematicState
 
 
 @compiled
-def normal_equations(tree: KinematicTree, state: KinematicState, hessian: Floats, descent: Floats) -> None:
-    """Fill in the Gauss-Newton matrix (V, V), its lower triangle only, and the descent (V,).
-
-    The descent, minus the gradient of the cost, is exact. The matrix holds the Lorentzian's weights fixed.
-    """
-    rows = np.empty(tree.ancestors.shape)
-    normal_rows(tree, state, rows, descent)
-    hessian[:] = 0.0
-    for i in range(len(rows)):
-        for d in range(tree.depth[i] + 1):
-            hessian[i, tree.ancestors[i, d]] = rows[i, d]
-
-
-@compiled
 def normal_rows(tree: KinematicTree, state: KinematicState, rows: Floats, descent: Floats) -> None:
     """Fill in the Gauss-Newton matrix as rows (V, D), and the descent (V,).
 
-    Each station adds J^T W J over the chain of directions that move it. The chain is walked by depth, so J of all
-    ancestors lies together in memory, and row i of the sum needs columns 0 to d of J only.
+    The descent, minus the gradient of the cost, is exact. The matrix holds the Lorentzian's weights fixed. Each station
+    adds J^T W J over the chain of directions that move it. The chain is walked by depth, so J of all ancestors lies
+    together in memory, and row i of the sum needs columns 0 to d of J only.
     """
     rows[:], descent[:] = 0.0, 0.0
     count = len(tree.station_body)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.compiled import compiled
+from harness.core.compiled import compiled, specialise
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.residuals import Residuals
 from harness.stream.frame import TrackerFrame
@@ -50,13 +50,28 @@ class ReadingHistory(NamedTuple):
     """(S,) time of the last position that was not left out [s]."""
 
 
+class ModelledStations(NamedTuple):
+    """The S stations in the last answer."""
+
+    position_m: Floats
+    """(S, 3) positions [m]."""
+    velocity_m_s: Floats
+    """(S, 3) velocities from the answer before [m/s]."""
+
+
 class OutlierGate:
     """The outlier gate for the positions of S stations, for one session."""
 
-    def __init__(self, stations: int, jump_m: float = JUMP_M, patience_s: float = PATIENCE_S) -> None:
+    def __init__(
+        self,
+        stations: int,
+        jump_m: float = JUMP_M,
+        patience_s: float = PATIENCE_S,
+        clock: DeviceTime | None = None,
+    ) -> None:
+        """`clock` is that of the session; without one the gate has its own."""
         self._jump_m, self._patience_s = jump_m, patience_s
-        self._station_m: Floats = np.zeros((stations, 3))
-        self._velocity_m_s: Floats = np.zeros((stations, 3))
+        self._stations = ModelledStations(np.zeros((stations, 3)), np.zeros((stations, 3)))
         self._history = ReadingHistory(
             position_m=np.zeros((stations, 3)),
             step_m=np.zeros((stations, 3)),
@@ -68,7 +83,13 @@ class OutlierGate:
             accepted_at_s=np.full(stations, -np.inf),
         )
         self._updated_at_s, self._moving = -np.inf, False
-        self._time, self._now_s = DeviceTime(), -np.inf
+        self._time, self._now_s = clock or DeviceTime(), -np.inf
+        never, positions, self._no_offset_s = np.zeros(stations, bool), np.zeros((stations, 3)), np.zeros(stations)
+        self._judge = specialise(
+            *(_judge, 0.0, 0.0, False, jump_m, patience_s, positions, never, self._no_offset_s),
+            *(self._stations, self._history, never),
+        )
+        self._follow = specialise(_follow, 0.0, positions, self._stations)
         self.left_out = False
         """Whether anything was left out of the last frame."""
         self.all_moved = False
@@ -84,10 +105,10 @@ class OutlierGate:
         residuals.read(frame)
         self._now_s = self._time.frame_time_s(frame)
         jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid, offset_s)
-        count = int(np.count_nonzero(jumped))
-        self.readings += int(np.count_nonzero(frame.position_valid))
+        count = jumped.tobytes().count(True)
+        self.readings += frame.position_valid.tobytes().count(True)
         self.rejected += count
-        self.left_out = bool(count)
+        self.left_out = count > 0
         if self.left_out:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
@@ -101,38 +122,73 @@ class OutlierGate:
 
         The body is predicted at the time now + `offset_s` (S,) of each station [s].
         """
-        out, self.all_moved = np.zeros(len(measured), bool), False
-        period_s = now_s - self._updated_at_s
-        if self._moving and 0.0 < period_s <= _MAX_PERIOD_S:
-            expected_m = self._station_m + period_s * self._velocity_m_s
-            if offset_s is not None:
-                expected_m += offset_s[:, None] * self._velocity_m_s
-            self.all_moved = _find_jumps(
-                *(target_m, measured, expected_m, self._velocity_m_s, self._jump_m),
-                *(now_s, period_s, self._patience_s, self._history, out),
-            )
-        _record(now_s, period_s, target_m, measured, out, self._history)
+        out: Bools = np.empty(len(measured), bool)
+        self.all_moved = self._judge(
+            *(now_s, now_s - self._updated_at_s, self._moving, self._jump_m, self._patience_s),
+            np.ascontiguousarray(target_m),
+            np.ascontiguousarray(measured),
+            self._no_offset_s if offset_s is None else np.ascontiguousarray(offset_s),
+            self._stations,
+            self._history,
+            out,
+        )
         return out
 
     def update_stations(self, now_s: float, station_m: Floats) -> None:
         """Take the stations' positions (S, 3) in the answer to this frame [m]."""
         period_s = now_s - self._updated_at_s
         self._moving = 0.0 < period_s <= _MAX_PERIOD_S
-        if self._moving:
-            self._velocity_m_s = (station_m - self._station_m) / period_s
-        self._station_m, self._updated_at_s = station_m.copy(), now_s
+        self._follow(period_s if self._moving else np.inf, np.ascontiguousarray(station_m), self._stations)
+        self._updated_at_s = now_s
+
+
+@compiled
+def _judge(
+    now_s: float,
+    period_s: float,
+    moving: bool,
+    jump_m: float,
+    patience_s: float,
+    target_m: Floats,
+    measured: Bools,
+    offset_s: Floats,
+    stations: ModelledStations,
+    history: ReadingHistory,
+    out: Bools,
+) -> bool:
+    """Fill in which measured positions (S,) to leave out, and take the frame into the history.
+
+    Returns whether at least half of the positions jumped. Nothing jumps unless the body's velocity is known (`moving`).
+    """
+    out[:] = False
+    all_moved = False
+    if moving and 0.0 < period_s <= _MAX_PERIOD_S:
+        all_moved = _find_jumps(
+            now_s, period_s, jump_m, patience_s, target_m, measured, offset_s, stations, history, out
+        )
+    _record(now_s, period_s, target_m, measured, out, history)
+    return all_moved
+
+
+@compiled
+def _follow(period_s: float, station_m: Floats, stations: ModelledStations) -> None:
+    """Take the stations' positions (S, 3) in an answer, `period_s` after the one before; inf for no velocity."""
+    for s in range(len(station_m)):
+        for i in range(3):
+            stations.velocity_m_s[s, i] = (station_m[s, i] - stations.position_m[s, i]) / period_s
+            stations.position_m[s, i] = station_m[s, i]
 
 
 @compiled
 def _find_jumps(
-    target_m: Floats,
-    measured: Bools,
-    expected_m: Floats,
-    body_velocity_m_s: Floats,
-    jump_m: float,
     now_s: float,
     period_s: float,
+    jump_m: float,
     patience_s: float,
+    target_m: Floats,
+    measured: Bools,
+    offset_s: Floats,
+    stations: ModelledStations,
     history: ReadingHistory,
     out: Bools,
 ) -> bool:
@@ -145,8 +201,9 @@ def _find_jumps(
         if not measured[s]:
             continue
         if not history.has_velocity[s] and history.left_out[s] == 0:
-            history.velocity_m_s[s] = body_velocity_m_s[s]
-        from_body_m = target_m[s] - expected_m[s]
+            history.velocity_m_s[s] = stations.velocity_m_s[s]
+        expected_m = stations.position_m[s] + (period_s + offset_s[s]) * stations.velocity_m_s[s]
+        from_body_m = target_m[s] - expected_m
         from_readings_m = target_m[s] - history.position_m[s] - period_s * history.velocity_m_s[s]
         is_far = _squared(from_body_m) > jump_m**2
         far += is_far

@@ -14,7 +14,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
-from harness.reconstruct.solver.normal_equations import StationTargets, normal_equations
+from harness.reconstruct.solver.normal_equations import StationTargets, normal_rows
 from harness.reconstruct.solver.subspace import invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace, to_subspace
 
@@ -53,16 +53,16 @@ def posterior(
 
     The prior is a Gaussian about its mean: its linear term is 0.
     """
-    count, directions, size = len(tree.station_body), len(tree.depth), len(z)
-    hessian, descent = np.zeros((directions, directions)), np.empty(directions)
+    count, size = len(tree.station_body), len(z)
+    rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
     total, of_positions = np.empty((size, size)), np.empty((size, size))
     unused = np.empty(size)
-    normal_equations(tree, state, hessian, descent)
-    to_subspace(prior, z, hessian, descent, total, unused)
+    normal_rows(tree, state, rows, descent)
+    to_subspace(tree, prior, z, rows, descent, total, unused)
     kept = state.weight[count:].copy()
     state.weight[count:] = 0.0
-    normal_equations(tree, state, hessian, descent)
-    to_subspace(prior, z, hessian, descent, of_positions, unused)
+    normal_rows(tree, state, rows, descent)
+    to_subspace(tree, prior, z, rows, descent, of_positions, unused)
     state.weight[count:] = kept
     for i in range(size):
         total[i, i] += _MIN_DIAGONAL
@@ -76,13 +76,13 @@ def posterior(
                 by_prior += share * prior.curvature[i - 3, j - 3]
     by_positions -= by_prior
     by_orientations = size - by_positions - by_prior
-    squares, rows = np.zeros(2), np.zeros(2)
+    squares, numbers = np.zeros(2), np.zeros(2)
     for row in range(2 * count):
         precision = targets.precision[row]
         if precision > 0.0:
             kind = 0 if row < count else 1
             squares[kind] += min(precision * state.squared[row], _MAX_SQUARE)
-            rows[kind] += 3.0
+            numbers[kind] += 3.0
     offset = z[3:] - prior.mean
     away = np.dot(offset, np.dot(prior.curvature, offset))
     variance = np.empty(size - 3)
@@ -90,8 +90,8 @@ def posterior(
         variance[i - 3] = covariance[i, i]
     return Posterior(
         variance,
-        (squares[0] + by_positions) / max(rows[0], 1.0) if rows[0] > 0.0 else 1.0,
-        (squares[1] + by_orientations) / max(rows[1], 1.0) if rows[1] > 0.0 else 1.0,
+        (squares[0] + by_positions) / max(numbers[0], 1.0) if numbers[0] > 0.0 else 1.0,
+        (squares[1] + by_orientations) / max(numbers[1], 1.0) if numbers[1] > 0.0 else 1.0,
         away + by_prior - (size - 3),
     )
 

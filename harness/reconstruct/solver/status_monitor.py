@@ -1,6 +1,6 @@
 """Status of an estimate, by the number of stations that report (docs/papers.md E, "lost tracker")."""
 
-import numpy as np
+import math
 
 from harness.core.estimate import Status
 from harness.reconstruct.solver.device_time import DeviceTime
@@ -13,9 +13,10 @@ LOST_AFTER_S = 0.5
 class StatusMonitor:
     """Monitor of one session's frames; a station reports when its position or its orientation is valid."""
 
-    def __init__(self, lost_after_s: float = LOST_AFTER_S) -> None:
+    def __init__(self, lost_after_s: float = LOST_AFTER_S, clock: DeviceTime | None = None) -> None:
+        """`clock` is that of the session; without one the monitor has its own."""
         self._lost_after_s = lost_after_s
-        self._time, self._enough_at_s = DeviceTime(), -np.inf
+        self._time, self._enough_at_s = clock or DeviceTime(), -math.inf
 
     def update(self, frame: TrackerFrame) -> tuple[Status, bool]:
         """The status of this frame, and whether any station reports at all.
@@ -23,11 +24,11 @@ class StatusMonitor:
         SOLVED with at least half of the stations; otherwise HELD, and LOST after `lost_after_s`.
         """
         now_s = self._time.frame_time_s(frame)
-        count = int(np.count_nonzero(frame.position_valid | frame.orientation_valid))
+        count = (frame.position_valid | frame.orientation_valid).tobytes().count(True)
         if 2 * count >= len(frame.position_valid) and count:
             self._enough_at_s = now_s
             return Status.SOLVED, True
-        if self._enough_at_s == -np.inf:
+        if self._enough_at_s == -math.inf:
             self._enough_at_s = now_s
         lost = now_s - self._enough_at_s > self._lost_after_s
         return Status.LOST if lost else Status.HELD, count > 0

@@ -27,13 +27,12 @@ class SubspaceSolver:
     """Solves for the frame that its residuals have read, among the postures of a subspace."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
-        self._residuals, self._limits = residuals, limits
         self._arrays = residuals.tree, residuals.targets, residuals.state
-        self._stop = stopping.step, stopping.decrease, stopping.most_steps
+        self._end = (limits.low_rad, limits.high_rad), (stopping.step, stopping.decrease, stopping.most_steps)
         posture = np.zeros(POSTURE_SIZE)
         example = fit_subspace(np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, posture, 0.0)
         start = np.zeros(3 + POSTURE_SIZE)
-        self._minimise = specialise(minimise_in_subspace, *self._arrays, example, self._stop, start)
+        self._minimise = specialise(minimise_in_subspace, *self._arrays, example, *self._end, start)
 
     def solve(self, subspace: Subspace, ground: Floats, posture: Floats) -> IKSolution:
         """The minimum from a start: ground frame (3,) and posture (P,). Hinges are clipped to their limits at the end.
@@ -41,11 +40,9 @@ class SubspaceSolver:
         ArithmeticError when a reading is not finite.
         """
         start = np.concatenate([ground, posture])
-        qpos, cost, steps, converged = self._minimise(*self._arrays, subspace, self._stop, start)
+        qpos, cost, steps, converged = self._minimise(*self._arrays, subspace, *self._end, start)
         if steps < 0:
             raise ArithmeticError("The normal equations are not positive definite: is a reading not finite?")
-        qpos[7:] = self._limits.clip(qpos[7:])
-        self._residuals.evaluate(qpos)
         return IKSolution(qpos, cost, steps, converged)
 
 
@@ -75,13 +72,21 @@ def fit_subspace(postures: Singles, components: int, alpha: float, expected: Flo
 
 
 @compiled
-def gaussian_space(mean: Floats, covariance: Floats, other_mean: Floats, other_precision: Floats) -> Subspace:
-    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); mean and precisions (P,)."""
-    size = len(mean)
-    curvature = invert_positive_definite(covariance)
-    for i in range(size):
-        curvature[i, i] += other_precision[i]
-    return Subspace(mean, np.zeros((0, size)), curvature, other_precision * (other_mean - mean), np.zeros(size))
+def gaussian_space(
+    mean: Floats, covariance: Floats, hinge_mean: Floats, hinge_precision: Floats, hinge_weight: float
+) -> Subspace:
+    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); and one of the hinges alone.
+
+    The second has a mean and precisions (48,) and counts `hinge_weight` times. Rows and columns of the first beyond the
+    posture are left out.
+    """
+    linear, first = np.zeros(POSTURE_SIZE), POSTURE_SIZE - len(hinge_mean)
+    posture, curvature = mean[:POSTURE_SIZE], invert_positive_definite(covariance[:POSTURE_SIZE, :POSTURE_SIZE])
+    for i in range(len(hinge_mean)):
+        precision = hinge_weight * hinge_precision[i]
+        curvature[first + i, first + i] += precision
+        linear[first + i] = precision * (hinge_mean[i] - posture[first + i])
+    return Subspace(posture, np.zeros((0, POSTURE_SIZE)), curvature, linear, np.zeros(POSTURE_SIZE))
 
 
 @compiled

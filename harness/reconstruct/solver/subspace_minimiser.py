@@ -13,7 +13,7 @@ from harness.reconstruct.solver.ground_frame import qpos_from_posture
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
 from harness.reconstruct.solver.levenberg_marquardt import DAMPING_DECREASE, DAMPING_INCREASE
 from harness.reconstruct.solver.matrix_algebra import dot
-from harness.reconstruct.solver.normal_equations import StationTargets, evaluate, normal_equations
+from harness.reconstruct.solver.normal_equations import StationTargets, evaluate, normal_rows
 
 
 class Subspace(NamedTuple):
@@ -36,6 +36,8 @@ class Subspace(NamedTuple):
 
 _INITIAL_DAMPING = 1e-3
 """Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it."""
+_MAX_EXTRAPOLATED_STEP = 2e-3
+"""After a step with no larger component [m, rad] the next decrease is predicted: decreases shrink geometrically."""
 _MIN_DIAGONAL = 1e-6
 """Keeps the step at 0 for a ground frame that no reading determines."""
 
@@ -46,24 +48,42 @@ def minimise_in_subspace(
     targets: StationTargets,
     state: KinematicState,
     subspace: Subspace,
+    limits_rad: tuple[Floats, Floats],
     stop: tuple[float, float, int],
     z: Floats,
 ) -> tuple[Floats, float, int, bool]:
     """The posture of a subspace, and its ground frame, of least cost, from a start z (3 + P,).
 
-    `stop` is step, decrease, and most steps (`ik_solver.Stopping`). Returns the configuration (V + 1,), its cost, the
-    number of steps, and whether it converged; -1 steps as `levenberg_marquardt.minimise`.
+    `limits_rad` are the hinges' low and high limits, to which the result is clipped. `stop` is step, decrease, and most
+    steps (`ik_solver.Stopping`). Returns the configuration (V + 1,), which is evaluated last, its cost before it is
+    clipped, the number of steps, and whether it converged; -1 steps as `levenberg_marquardt.minimise`.
     """
-    directions = len(tree.depth)
-    hessian, descent = np.zeros((directions, directions)), np.empty(directions)
+    qpos, cost, steps, converged = _minimise(tree, targets, state, subspace, stop, z)
+    for i in range(7, len(qpos)):
+        qpos[i] = min(max(qpos[i], limits_rad[0][i - 7]), limits_rad[1][i - 7])
+    evaluate(tree, targets, state, qpos)
+    return qpos, cost, steps, converged
+
+
+@compiled
+def _minimise(
+    tree: KinematicTree,
+    targets: StationTargets,
+    state: KinematicState,
+    subspace: Subspace,
+    stop: tuple[float, float, int],
+    z: Floats,
+) -> tuple[Floats, float, int, bool]:
+    """`minimise_in_subspace` before the limits."""
+    rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
     normal, z_descent = np.empty((len(z), len(z))), np.empty(len(z))
     z[3:] = project_posture(subspace, z[3:])
     qpos = qpos_from_posture(z[3:], z[:3])
     cost = evaluate(tree, targets, state, qpos) + subspace_cost(subspace, z[3:])
-    damping = _INITIAL_DAMPING
+    damping, last_decrease = _INITIAL_DAMPING, np.nan  # no comparison with NaN is true
     for steps in range(1, stop[2] + 1):
-        normal_equations(tree, state, hessian, descent)
-        to_subspace(subspace, z, hessian, descent, normal, z_descent)
+        normal_rows(tree, state, rows, descent)
+        to_subspace(tree, subspace, z, rows, descent, normal, z_descent)
         while True:  # raise the damping until a step lowers the cost or is too short to matter
             step = solve_damped(subspace, normal, z_descent, damping)
             longest = np.abs(step).max()
@@ -75,7 +95,10 @@ def minimise_in_subspace(
             if next_cost <= cost or longest < stop[0]:
                 break
             damping *= DAMPING_INCREASE
-        converged = longest < stop[0] or cost - next_cost < stop[1]
+        decrease = cost - next_cost
+        predicted = decrease * decrease / last_decrease if longest < _MAX_EXTRAPOLATED_STEP else np.inf
+        converged = longest < stop[0] or decrease < stop[1] or predicted < stop[1]
+        last_decrease = decrease
         if next_cost <= cost:
             z, qpos, cost, damping = next_z, next_qpos, next_cost, damping / DAMPING_DECREASE
         if converged:
@@ -121,13 +144,20 @@ def _root_jacobian(z: Floats) -> Floats:
 
 @compiled
 def to_subspace(
-    subspace: Subspace, z: Floats, hessian: Floats, descent: Floats, normal: Floats, z_descent: Floats
+    tree: KinematicTree,
+    subspace: Subspace,
+    z: Floats,
+    rows: Floats,
+    descent: Floats,
+    normal: Floats,
+    z_descent: Floats,
 ) -> None:
     """Fill in the normal equations (3 + P, 3 + P), lower triangle, and the descent of z, from those of the tangent.
 
-    The subspace's cost is added. Tangent: translation 0 to 2, root rotation 3 to 5, hinges from 6. Of z: x, y 0 and 1,
-    yaw 2, height 3, tilt 4 to 6, hinges from 7. Hinges are the same in both, so only the seven leading rows and the
-    columns of the root are transformed, by the Jacobian of the root's motion (7, 6).
+    Those are rows (V, D) and descent (V,) of `normal_rows`. The subspace's cost is added. Tangent: translation 0 to 2,
+    root rotation 3 to 5, hinges from 6. Of z: x, y 0 and 1, yaw 2, height 3, tilt 4 to 6, hinges from 7. Hinges are the
+    same in both, so only the seven leading rows and the columns of the root are transformed, by the Jacobian of the
+    root's motion (7, 6). The root's directions are the first six ancestors of every hinge.
     """
     jacobian, root, rotation = np.zeros((7, 6)), np.empty((6, 6)), _root_jacobian(z)
     curvature = subspace.curvature
@@ -135,11 +165,11 @@ def to_subspace(
     jacobian[2, 3:], jacobian[4:, 3:] = rotation[0], rotation[1:]
     for k in range(6):
         for m in range(k + 1):
-            root[k, m] = root[m, k] = hessian[k, m]
+            root[k, m] = root[m, k] = rows[k, m]
     normal[:7, :7] = np.dot(np.dot(jacobian, root), jacobian.T)
     normal[3:7, 3:7] += curvature[:4, :4]
-    for r in range(6, len(hessian)):
-        row, tangent, prior = normal[r + 1], hessian[r], curvature[r - 2]
+    for r in range(6, len(rows)):
+        row, tangent, prior = normal[r + 1], rows[r], curvature[r - 2]
         row[0], row[1], row[3] = tangent[0], tangent[1], tangent[2] + prior[0]
         row[2] = rotation[0, 0] * tangent[3] + rotation[0, 1] * tangent[4] + rotation[0, 2] * tangent[5]
         for k in range(1, 4):
@@ -147,7 +177,9 @@ def to_subspace(
                 rotation[k, 0] * tangent[3] + rotation[k, 1] * tangent[4] + rotation[k, 2] * tangent[5] + prior[k]
             )
         for c in range(6, r + 1):
-            row[c + 1] = tangent[c] + prior[c - 2]
+            row[c + 1] = prior[c - 2]
+        for d in range(6, tree.depth[r] + 1):
+            row[tree.ancestors[r, d] + 1] += tangent[d]
     z_descent[:7] = np.dot(jacobian, descent[:6])
     z_descent[7:] = descent[6:]
     z_descent[3:] += subspace.linear - np.dot(curvature, z[3:] - subspace.mean)

@@ -174,3 +174,25 @@ def test_a_graph_follows_and_asks_for_everything_when_it_must() -> None:
     fresh, again = graph.begin_search(), graph.begin_search()
     for row in (5, 6, 7):
         np.testing.assert_array_equal(fresh.nearest(values[row], 9)[0], again.nearest(values[row], 9)[0])
+
+
+@pytest.mark.parametrize("name", [*ALL, "graph"])
+def test_offsets_are_the_vectors_minus_the_query(name: str) -> None:
+    """Along other axes perhaps: inner products of any two are the same."""
+    values = paths(4000, 12)
+    index = make_index(name, ArrayVectors(values), 60)
+    query = values[700] + np.float32(0.3)
+    rows, squared, offsets = index.nearest_with_offsets(query, 60)
+    np.testing.assert_array_equal(rows, index.nearest(query, 60)[0])
+    expected, spread = values[rows].astype(float) - query, float(np.sum(np.var(values, axis=0)))
+    np.testing.assert_allclose(offsets @ offsets.T, expected @ expected.T, rtol=0.01, atol=2e-3 * spread)
+    np.testing.assert_allclose(squared, np.vecdot(offsets, offsets), rtol=1e-3, atol=1e-6 * spread)
+
+
+def test_a_search_widens_until_it_has_enough(rng: np.random.Generator) -> None:
+    values = paths(4000, 12)
+    index = InvertedFile(ArrayVectors(values), 10)
+    rows, squared = index.nearest(values[100], 3500)
+    assert len(set(rows.tolist())) == 3500
+    assert rows[0] == 100
+    assert np.all(np.diff(squared) >= 0.0)

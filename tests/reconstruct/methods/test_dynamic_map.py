@@ -202,3 +202,23 @@ def test_a_session_learns_from_the_stations_that_report_until_there_is_a_history
     for i, frame in enumerate(walk.frames[:30]):
         whole, part = complete.step(frame), late.step(drop_stations(frame, [0]) if i == 0 else frame)
     np.testing.assert_allclose(part.qpos, whole.qpos, atol=1e-3)
+
+
+def test_the_factor_comes_before_the_floors_and_the_mean_is_within_the_limits(walk: Scene) -> None:
+    predictions = []
+    for spread, sigma_rad in ((1.0, 0.0), (2.0, 0.2)):
+        method = DynamicMap(
+            spread=spread, least_sigma_rad=sigma_rad, tilt_sigma_rad=0.1, height_sigma_m=0.03, widening=0.0
+        )
+        session = method.fit(walk.body, walk.examples, np.random.default_rng(0)).begin(walk.calibration)
+        for frame in walk.frames[:5]:
+            session.step(frame)
+        session.past = np.array(walk.take.qpos[4:1:-1])
+        session.limits.high_rad[7] = session.limits.low_rad[7] + 1e-3
+        predictions.append(session.predict())
+        assert session.limits.low_rad[7] <= predictions[-1].mean[11] <= session.limits.high_rad[7]
+    plain, wide = predictions
+    added = wide.covariance - 4.0 * plain.covariance
+    floors = np.array([0.03**2, *[0.1**2] * 3, *[0.0] * 48])
+    expected = np.diag(np.append(np.zeros(4), np.full(48, 0.2**2)) + floors - 4.0 * floors)
+    np.testing.assert_allclose(added[:52, :52], expected, atol=1e-7)

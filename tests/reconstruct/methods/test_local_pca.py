@@ -10,7 +10,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Stopping
+from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import (
@@ -20,7 +20,7 @@ from harness.reconstruct.solver.subspace_minimiser import (
     subspace_cost,
     to_subspace,
 )
-from tests.reconstruct.conftest import Scene, normal_equations_of
+from tests.reconstruct.conftest import Scene, normal_equations_of, normal_rows_of
 
 
 def postures_of(scene: Scene) -> Singles:
@@ -65,7 +65,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     expected = jacobian.T @ hessian @ jacobian
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)
-    to_subspace(space, z, hessian, descent, normal, found)
+    to_subspace(residuals.tree, space, z, *normal_rows_of(residuals), normal, found)
     np.testing.assert_allclose(np.tril(normal), np.tril(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
     np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
 
@@ -164,3 +164,39 @@ def test_the_smoothness_term_is_in_units_of_a_typical_change(walk: Scene) -> Non
 
     np.testing.assert_allclose(answers(0.2, 0.1), answers(20.0, 1.0), atol=1e-9)
     assert np.abs(answers(0.2, 0.1) - answers(2.0, 1.0)).max() > 1e-6
+
+
+def test_the_predicted_decrease_ends_a_solve_early_and_hardly_elsewhere(walk: Scene) -> None:
+    space = space_of(walk, 52)
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    limits, early = HingeLimits(walk.body), 0
+    for index in range(20, 40):
+        residuals.read(walk.frames[index])
+        ground, posture = ground_from_qpos(walk.take.qpos[index - 2]), posture_from_qpos(walk.take.qpos[index - 2])
+
+        def solve(stopping: Stopping, ground: Floats = ground, posture: Floats = posture) -> IKSolution:
+            return SubspaceSolver(residuals, limits, stopping).solve(space, ground, posture)
+
+        usual, exact = solve(Stopping(step=0.0)), solve(Stopping(1e-7, 1e-13))
+        before = solve(Stopping(step=0.0, most_steps=usual.steps - 1))
+        assert usual.converged
+        assert usual.cost - exact.cost < 3e-5
+        np.testing.assert_allclose(usual.qpos, exact.qpos, atol=1e-3)
+        early += before.cost - usual.cost > Stopping().decrease
+    assert early > 5, "solves that ended while the cost still fell by more"
+
+
+def test_a_result_is_within_the_limits_and_evaluated(walk: Scene) -> None:
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss()), HingeLimits(walk.body)
+    residuals.read(walk.frames[30])
+    posture = posture_from_qpos(walk.take.qpos[30])
+    hinge = int(np.flatnonzero(np.isfinite(limits.low_rad))[0])
+    limits.low_rad[hinge] = posture[4 + hinge] + 0.02
+    limits.high_rad[hinge] = posture[4 + hinge] + 0.03
+    solution = SubspaceSolver(residuals, limits, Stopping()).solve(
+        space_of(walk, 52), ground_from_qpos(walk.take.qpos[30]), posture
+    )
+    assert limits.low_rad[hinge] <= solution.qpos[7 + hinge] <= limits.high_rad[hinge]
+    evaluated = residuals.state.error.copy()
+    residuals.evaluate(solution.qpos)
+    np.testing.assert_array_equal(evaluated, residuals.state.error)

@@ -60,3 +60,31 @@ def test_time_never_steps_back() -> None:
     found = times_s([frame(i, 1.0 + k) for k, i in enumerate([0, 1, 2, 1, 0, 3])])
     assert found == sorted(found)
     assert found[-1] == pytest.approx(3 * PERIOD_S + found[4])
+
+
+def test_every_part_of_a_session_may_ask_for_the_same_frame() -> None:
+    clock, frames = DeviceTime(), [frame(i, 9.0 + i, missing) for i, missing in enumerate([(), (0, 1, 2, 3), ()])]
+    asked = [(clock.frame_time_s(f), clock.frame_time_s(f)) for f in frames]
+    assert [first for first, _ in asked] == [again for _, again in asked] == times_s(frames)
+
+
+def test_stamps_count_again_once_their_stations_are_back() -> None:
+    """Without stamps the host's clock continues from the last frame that had one."""
+    missing = [(), (), (0, 1, 2, 3), (0, 1, 2, 3), (), ()]
+    frames = [frame(i, 50.0 + 0.03 * i, without) for i, without in enumerate(missing)]
+    expected_s = [0.0, PERIOD_S, PERIOD_S + 0.03, PERIOD_S + 0.06, 4 * PERIOD_S, 5 * PERIOD_S]
+    np.testing.assert_allclose(times_s(frames), expected_s, atol=1e-12)
+
+
+def test_a_frame_of_other_stations_is_timed_by_the_host() -> None:
+    four = frame(0, 1.0)
+    fields = {name: getattr(four, name)[:2] for name in TrackerFrame.__slots__ if name != "received_s"}
+    two = replace(four, received_s=1.5, **fields)
+    assert times_s([four, two]) == [0.0, 0.5]
+
+
+def test_a_station_that_takes_over_counts_from_the_time_of_its_first_frame() -> None:
+    """That frame is timed by the host: no station of it has an earlier stamp."""
+    missing = [(1, 2, 3), (0, 2, 3), (0, 2, 3)]
+    found = times_s([frame(i, 20.0 + 0.03 * i, without) for i, without in enumerate(missing)])
+    np.testing.assert_allclose(found, [0.0, 0.03, 0.03 + PERIOD_S], atol=1e-12)

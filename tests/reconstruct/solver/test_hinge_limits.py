@@ -77,3 +77,11 @@ def test_near_adds_whole_turns_to_free_hinges_only() -> None:
     free = np.isinf(LIMITS.high_rad)
     np.testing.assert_allclose(moved[free], 0.5 + 2.0 * np.pi)
     np.testing.assert_allclose(moved[~free], 0.5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_between_two_configurations_hinges_take_the_shorter_way(share: float) -> None:
+    here, other = np.full(55, 0.1), np.full(55, 0.5)
+    here[7:], other[7:] = 7.0, 0.5
+    found, target = LIMITS.between(here, other, share), LIMITS.unwrap_near(other[7:], here[7:])
+    np.testing.assert_allclose(found, np.append(here[:7], (1.0 - share) * here[7:] + share * target))

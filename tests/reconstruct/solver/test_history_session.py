@@ -14,6 +14,7 @@ from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.stream.frame import TrackerFrame
+from harness.testing.frames import drop_stations
 from tests.reconstruct.conftest import Scene
 
 RISE = 0.001
@@ -105,3 +106,23 @@ def test_the_model_predicts_through_a_gap_and_local_pca_holds(walk: Scene, metho
         assert np.mean(off) < 0.5 * np.mean(still)
     else:
         np.testing.assert_array_equal(off, still)
+
+
+def test_the_history_has_hinges_within_half_a_turn(walk: Scene) -> None:
+    session = Counting(walk, 2)
+    free = 7 + int(np.flatnonzero(np.isinf(session.limits.high_rad))[0])
+    for turns in (-1.0, 1.0):
+        qpos = np.array(walk.take.qpos[0])
+        qpos[free] += 2.0 * np.pi * turns
+        session._push(qpos)
+        np.testing.assert_allclose(session.past[0], np.append(qpos[:7], session.limits.principal(qpos[7:])))
+        assert abs(session.past[0, free]) <= np.pi
+
+
+def test_readings_that_were_not_measured_contradict_nothing(walk: Scene) -> None:
+    session = Counting(walk, 2)
+    session.residuals.read(drop_stations(walk.frames[0], [0]))
+    session.residuals.evaluate(walk.take.qpos[0])
+    assert session.outlier_share() == 0.0
+    session.residuals.evaluate(np.append(walk.take.qpos[0][:3] + 1.0, walk.take.qpos[0][3:]))
+    assert session.outlier_share() == pytest.approx(0.5), "positions, not orientations"
