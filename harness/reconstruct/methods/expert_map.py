@@ -40,6 +40,7 @@ from harness.reconstruct.solver.fixed_lag import FixedLagSession
 from harness.reconstruct.solver.ground_frame import (
     HINGES,
     POSTURE_SIZE,
+    ground_and_posture,
     ground_from_qpos,
     posture_from_qpos,
     qpos_from_posture,
@@ -220,7 +221,7 @@ class ExpertMapSession(HistorySession):
             return
         residuals, prior = self.residuals, self._prior
         residuals.evaluate(self.qpos)
-        z = np.concatenate([ground_from_qpos(self.qpos), posture_from_qpos(self.qpos)])
+        z = ground_and_posture(self.qpos)
         found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
         self._angle_sigma_rad = np.sqrt(found.variance[HINGES])
         if not cold:
@@ -228,11 +229,7 @@ class ExpertMapSession(HistorySession):
 
     def _next_ground(self) -> Floats:
         """Ground frame (3,) after the last two, at the same speed."""
-        newest, before = ground_from_qpos(self.past[:2])
-        step = newest - before
-        step[2] -= 2.0 * np.pi * np.round(step[2] / (2.0 * np.pi))
-        out: Floats = newest + step
-        return out
+        return _extrapolate_ground(self.past[0], self.past[1])
 
     def _predict(self, history: bool) -> Subspace:
         """The product of the experts and, far from the examples, of the prior of `ik`."""
@@ -270,6 +267,16 @@ class ExpertMapSession(HistorySession):
         precision[HINGES] = weight * by_ik.precision[6:]
         linear[HINGES] = precision[HINGES] * (by_ik.qpos[7:] - mean[HINGES])
         return precision, linear
+
+
+@compiled
+def _extrapolate_ground(newest: Floats, before: Floats) -> Floats:
+    """Ground frame (3,) one step after those of two configurations (55,), at the same speed."""
+    ground, turn = np.empty(3), 2.0 * np.arctan2(newest[6], newest[3])
+    change = turn - 2.0 * np.arctan2(before[6], before[3])
+    ground[0], ground[1] = 2.0 * newest[0] - before[0], 2.0 * newest[1] - before[1]
+    ground[2] = turn + change - 2.0 * np.pi * np.round(change / (2.0 * np.pi))
+    return ground
 
 
 @compiled

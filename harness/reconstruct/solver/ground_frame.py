@@ -75,3 +75,16 @@ def qpos_from_posture(posture: Floats, ground: Floats) -> Floats:
     out[3], out[4], out[5], out[6] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
     out[7:] = posture[4:]
     return out
+
+
+@compiled
+def ground_and_posture(qpos: Floats) -> Floats:
+    """(P + 3,) ground frame, then posture, of one configuration (P + 3,): both functions above, compiled."""
+    out = np.empty(len(qpos))
+    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
+    level, lean = np.sqrt(w * w + z * z), np.sqrt(x * x + y * y)
+    factor = 2.0 * np.arctan2(lean, level) / max(level * lean, 1e-30)
+    out[0], out[1], out[2] = qpos[0], qpos[1], 2.0 * np.arctan2(z, w)
+    out[3], out[4], out[5], out[6] = qpos[2], factor * (x * w + y * z), factor * (y * w - x * z), 0.0
+    out[7:] = qpos[7:]
+    return out
