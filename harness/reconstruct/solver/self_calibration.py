@@ -26,9 +26,9 @@ _NOISE_RATE, _PRIOR_RATE = 0.1, 0.1
 """Powers of the ratios by which the standard deviations of the noise and the prior's variance move in a frame."""
 _PRIOR_FREEDOM = 36.0
 """Number of directions whose squares the prior's ratio is taken over: a smaller one reacts more."""
-_MIN_NOISE, _MAX_NOISE = 0.1, 1.2
+_MIN_NOISE, _MAX_NOISE = 0.1, 0.8
 """Limits of the standard deviations of the noise, as shares of those of the loss."""
-_MIN_PRIOR, _MAX_PRIOR = 0.7, 100.0
+_MIN_PRIOR, _MAX_PRIOR = 0.5, 100.0
 """Limits of the factor on the prior's covariance."""
 
 
