@@ -173,13 +173,10 @@ def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Flo
 
     The instant is the mean sampling time of the stations known so far. Their slots (S,) are updated.
     """
-    start_s, records, everyone = 0.0, 0, True
+    start_s, records = 0.0, 0
     for s in range(len(measured_s)):
-        here = not suspect[s] and not np.isnan(measured_s[s])
-        if not np.isnan(slot_s[s]):
-            everyone = everyone and here
-            if here:
-                start_s, records = start_s + measured_s[s] - slot_s[s], records + 1
+        if not suspect[s] and not np.isnan(measured_s[s] - slot_s[s]):
+            start_s, records = start_s + measured_s[s] - slot_s[s], records + 1
     if records == 0:
         for s in range(len(measured_s)):
             if not suspect[s] and not np.isnan(measured_s[s]):
@@ -187,7 +184,7 @@ def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Flo
     start_s /= records
     centre_s, known = 0.0, 0
     for s in range(len(measured_s)):
-        if not suspect[s] and not np.isnan(measured_s[s]) and (everyone or np.isnan(slot_s[s])):
+        if not suspect[s] and not np.isnan(measured_s[s]):
             slot_s[s] = measured_s[s] - start_s
         if not np.isnan(slot_s[s]):
             centre_s, known = centre_s + slot_s[s], known + 1
