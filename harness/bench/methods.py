@@ -38,14 +38,16 @@ from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.features.local_experts import HISTORY_AXES
 from harness.reconstruct.index import FlatIndex, make_index
 from harness.reconstruct.index.selection import AUTO
 from harness.reconstruct.methods.dynamic_map import DynamicMap
+from harness.reconstruct.methods.expert_map import FEATURES, ExpertMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.stream.frame import TrackerFrame
 
-TARGET_FPS = {"dynamic_map": 2000, "local_pca": 2000, "kernel_cca": 4000, "weighted_blend": 5000}
+TARGET_FPS = {"expert_map": 2000, "dynamic_map": 2000, "local_pca": 2000, "kernel_cca": 4000, "weighted_blend": 5000}
 """Frames per second on one core that each method must reach, including its final inverse kinematics."""
 UNTARGETED_METHODS = ("kernel_ridge", "ik")
 FRAMES, LARGE_FRAMES = 66_000, 1_000_000
@@ -164,6 +166,8 @@ def query_dimension(method: Method) -> int:
     stations = len(load_scenario(benchmark_clips.DEFAULT_SCENARIO).stations)
     if isinstance(method, LocalPca):
         return (POSTURE_SIZE + 3) * 2 - 3 + 9 * stations
+    if isinstance(method, ExpertMap):
+        return FEATURES + HISTORY_AXES
     if isinstance(method, DynamicMap) and method.search == "features":
         return method.regression.directions
     if isinstance(method, DynamicMap):

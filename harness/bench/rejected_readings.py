@@ -15,7 +15,10 @@ from harness.reconstruct.contract import Reconstructor, Session
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.stream.frame import TrackerFrame
 
-GATED_METHODS = ("ik", "local_pca", "dynamic_map", "weighted_blend", "kernel_cca", "best_match+ik", "kernel_ridge+ik")
+GATED_METHODS = (
+    *("ik", "local_pca", "dynamic_map", "expert_map", "weighted_blend", "kernel_cca"),
+    *("best_match+ik", "kernel_ridge+ik"),
+)
 MAX_REJECTED_SHARE = 1e-3
 FRAMES, CLIP_S = 16_000, 20.0
 """Frames of the database, and length of every held-out take [s]."""

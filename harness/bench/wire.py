@@ -27,7 +27,7 @@ from harness.stream.codec.items import STATION_CHARACTERS, record_type
 from harness.stream.codec.reader import FrameReader
 from harness.stream.codec.records import RecordFormat
 
-METHOD = "dynamic_map"
+METHOD = "expert_map"
 SECONDS, LONG_S = 15.0, 600.0
 """Duration of the measurement of each line, and with --large [s]."""
 MAX_ABOVE_TIMER_MS = 5.0

@@ -21,7 +21,7 @@ def add_bench(verbs: Verbs) -> None:
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
-    verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default dynamic_map)")
+    verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default expert_map)")
     verb.add_argument("--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5)")
     text = "accuracy: clips computed at the same time (default 1)"
     verb.add_argument("--jobs", type=positive_int, metavar="N", help=text)

@@ -47,8 +47,8 @@ def add_live(verbs: Verbs) -> None:
     )
     text = "scenario with the stations, their mounts, the body and the examples (see `harness list`)"
     verb.add_argument("--scenario", required=True, metavar="NAME", help=text)
-    text = "method that reconstructs (default dynamic_map)"
-    verb.add_argument("--method", default="dynamic_map", metavar="NAME", help=text)
+    text = "method that reconstructs (default expert_map)"
+    verb.add_argument("--method", default="expert_map", metavar="NAME", help=text)
     text = "clip whose performer wears the tracker; it is no example (default: the scenario's first)"
     verb.add_argument("--clip", help=text)
     verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=DEVICE_STATIONS_HELP)

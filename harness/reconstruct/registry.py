@@ -69,6 +69,7 @@ _ORIGINS = {
     "kernel_ridge": "kernel ridge regression, Saunders et al. 1998",
     "local_pca": "Chai & Hodgins 2005, as Liu et al. 2011 compare with it",
     "dynamic_map": "Liu et al. 2011, eq. 2 to 14",
+    "expert_map": "tabulated local experts; the prediction and likelihood of Liu et al. 2011",
     "weighted_blend": "Kim et al. 2012, what they compare with",
     "kernel_cca": "Kim et al. 2012, eq. 2 to 6",
 }

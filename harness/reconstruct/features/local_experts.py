@@ -18,7 +18,7 @@ from harness.reconstruct.features.moment_table import MomentTable, tabulate_mome
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
-_HISTORY_AXES = 40
+HISTORY_AXES = 40
 """Number of principal axes of the history."""
 _POSE_ERROR_RAD = float(np.deg2rad(2.0))
 """Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""
@@ -54,7 +54,7 @@ class LocalExperts:
         self._known, self._maps = np.ones(regression.size, bool), dict[bytes, FeatureMap]()
         self._directions = regression.directions(self._known)
         length = windows.size
-        self.history_axes: Floats = np.linalg.eigh(regression.scatter[:length, :length])[1][:, ::-1][:, :_HISTORY_AXES]
+        self.history_axes: Floats = np.linalg.eigh(regression.scatter[:length, :length])[1][:, ::-1][:, :HISTORY_AXES]
         """(D, H) principal axes of the windows."""
         self.history_axes = np.ascontiguousarray(self.history_axes)
         self.history_origin: Floats = regression.mean[:length] @ self.history_axes

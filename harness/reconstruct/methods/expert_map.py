@@ -63,7 +63,7 @@ _RIDGE = 1e-4
 """Ridge of the expert of readings and history, as a share of the features' variance."""
 _HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
 """Ridge and width of the expert of the history, and a further standard deviation of every hinge under it."""
-_DIRECTIONS = 32
+FEATURES = 32
 """Number of features of readings and history."""
 
 _LAG_WEIGHTS = {1: (0.15, 0.7, 0.15), 2: (0.02, 0.14, 0.68, 0.14, 0.02)}
@@ -133,7 +133,7 @@ class FittedExpertMap:
 
         def make() -> tuple[ReducedRankRegression, dict[int, LocalExperts]]:
             regression = ReducedRankRegression(
-                self.body, self.windows, calibration, ReducedRankOptions(directions=_DIRECTIONS)
+                self.body, self.windows, calibration, ReducedRankOptions(directions=FEATURES)
             )
             return regression, {id(regression): LocalExperts(regression)}
 
