@@ -18,7 +18,7 @@ from harness.reconstruct.features.moment_table import MomentTable, tabulate_mome
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
-HISTORY_AXES = 40
+HISTORY_AXES = 20
 """Number of principal axes of the history."""
 _POSE_ERROR_RAD = float(np.deg2rad(2.0))
 """Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""

@@ -20,8 +20,8 @@ from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.reconstruct.index.clustering import cluster_vectors
 
-MAX_CELLS = 512
-"""Largest number of cells: with 40 features and 52 targets a table then takes 9 MB."""
+MAX_CELLS = 448
+"""Largest number of cells: with 32 features and 52 targets a table then takes 6.6 MB."""
 EXAMPLES_PER_CELL = 50
 """Mean number of examples in a cell, while there are few."""
 _TINY = 1e-12
