@@ -89,7 +89,7 @@ def test_missing_predictors_are_replaced_by_their_regression(
 
 @pytest.mark.parametrize("measured", [without(0), without(0, 6), without(*range(6, 12))])
 def test_imputation_adds_the_covariance_of_what_the_regression_leaves(experts: LocalExperts, measured: Bools) -> None:
-    """That of the imputed features over the examples, and that of known predictors with errors as large as the ridge."""
+    """That of the imputed features over the examples, and that of known predictors that err as much as the ridge."""
     regression = experts.regression
     known, directions = regression.columns(measured), regression.directions(np.ones(regression.size, bool))
     predictors, _ = training_data(regression, len(regression.windows))

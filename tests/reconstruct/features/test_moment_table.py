@@ -1,5 +1,7 @@
 """Tabulated moments against weighted moments of the examples, and the conditional Gaussian against numpy."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -172,7 +174,7 @@ def test_noise_shrinks_the_regression_towards_the_mean(rng: np.random.Generator)
         covariances.append(covariance)
     np.testing.assert_allclose(means[2], 0.0, atol=1e-6)
     np.testing.assert_allclose(covariances[2], whole[6:, 6:], atol=1e-6)
-    for less, more in zip(covariances, covariances[1:], strict=False):
+    for less, more in pairwise(covariances):
         assert np.linalg.eigvalsh(more - less).min() > -1e-9
 
 
