@@ -365,7 +365,7 @@ def test_readings_of_several_moments_are_brought_to_one(walk: Scene, fitted: Fit
         follow(session, frames[: moment + 1])
         at_m = np.array([judge.targets_of(rows[moment])[0] for rows in late])
         away_m.append(np.linalg.norm(at_m - session.residuals.target_m, axis=2).mean(axis=1).min())
-    assert away_m[0] < 0.3 * away_m[1]
+    assert away_m[0] < 0.6 * away_m[1]
 
 
 def test_a_jump_is_gated_by_its_option(walk: Scene, fitted: FittedExpertMap) -> None:
