@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from harness.core.arrays import Floats, Singles
+from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.features import moment_table
 from harness.reconstruct.features.moment_table import LocalGaussian, condition, local_gaussian, tabulate_moments
@@ -38,7 +38,7 @@ def weighted_moments(pairs: Floats, weight: Floats) -> tuple[Floats, Floats]:
 
 
 def by_definition(
-    features: Singles, targets: Singles, cell: Floats, query: Floats, neighbours: int, width: float
+    features: Singles, targets: Singles, cell: Ints, query: Floats, neighbours: int, width: float
 ) -> tuple[Floats, Floats, float]:
     """Mean, covariance and nearest distance from the examples themselves, whose weights are those of their cells."""
     pairs = np.concatenate([features, targets], axis=1, dtype=float)

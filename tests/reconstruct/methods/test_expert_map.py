@@ -41,9 +41,12 @@ def follow(session: ExpertMapSession, frames: list[TrackerFrame]) -> list[Estima
     return [session.step(frame) for frame in frames]
 
 
-def warm(walk: Scene, fitted: FittedExpertMap, **options: float) -> ExpertMapSession:
+def warm(
+    walk: Scene, fitted: FittedExpertMap, widening: float = 150.0, history_weight: float = 0.5
+) -> ExpertMapSession:
     """A session that has followed ten frames and has read the next one."""
-    changed = replace(fitted, options=replace(fitted.options, **options))
+    options = replace(fitted.options, widening=widening, history_weight=history_weight)
+    changed = replace(fitted, options=options)
     session = changed.begin(walk.calibration)
     follow(session, walk.frames[:10])
     session.residuals.read(walk.frames[10])

@@ -29,7 +29,8 @@ SQUARES = Loss(robust=False)
 def subspace(mean: Floats, covariance: Floats, linear: Floats | None = None) -> Subspace:
     size = len(mean)
     linear = np.zeros(size) if linear is None else linear
-    return Subspace(mean, np.zeros((0, size)), np.linalg.inv(covariance), linear, np.zeros(size))
+    curvature: Floats = np.linalg.inv(covariance)
+    return Subspace(mean, np.zeros((0, size)), curvature, linear, np.zeros(size))
 
 
 def noisy(frame: TrackerFrame, position_m: float, orientation_rad: float, rng: np.random.Generator) -> TrackerFrame:
