@@ -40,7 +40,7 @@ class Posterior(NamedTuple):
     position: float
     """Mean expected whitened square of the measured positions' components."""
     orientation: float
-    """The same of the orientations."""
+    """Mean expected whitened square of the measured orientations' components."""
     prior: float
     """Expected squared Mahalanobis distance from the prior's mean, less its number of directions."""
 
