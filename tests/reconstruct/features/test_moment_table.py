@@ -66,7 +66,7 @@ def test_one_cell_holds_the_moments_of_all_examples() -> None:
     table, query = tabulate_moments(features, targets), np.array([0.0, -2.0, 1.0, 2.0])
     assert len(table.examples) == 1
     assert table.features == F
-    agrees(local_gaussian(table, query, 10, 1.0), by_definition(features, targets, np.zeros(50), query, 10, 1.0))
+    agrees(local_gaussian(table, query, 10, 1.0), by_definition(features, targets, np.zeros(50, int), query, 10, 1.0))
 
 
 @pytest.mark.parametrize("neighbours", [2, 9, 40, 100])

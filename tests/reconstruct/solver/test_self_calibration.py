@@ -29,7 +29,7 @@ SQUARES = Loss(robust=False)
 def subspace(mean: Floats, covariance: Floats, linear: Floats | None = None) -> Subspace:
     size = len(mean)
     linear = np.zeros(size) if linear is None else linear
-    curvature: Floats = np.linalg.inv(covariance)
+    curvature = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     return Subspace(mean, np.zeros((0, size)), curvature, linear, np.zeros(size))
 
 
