@@ -17,7 +17,8 @@ ALL: Bools = np.ones(12, bool)
 @pytest.fixture(scope="module")
 def experts(walk: Scene) -> LocalExperts:
     fitted = ExpertMap().fit(walk.body, walk.examples, np.random.default_rng(0))
-    return LocalExperts(fitted.begin(walk.calibration)._experts.regression)
+    regression, _ = fitted._trained(walk.calibration)
+    return LocalExperts(regression)
 
 
 def training_data(regression: ReducedRankRegression, rows: int = 300) -> tuple[Floats, Floats]:

@@ -48,14 +48,16 @@ def test_as_many_cells_as_vectors_leave_each_alone(count: int) -> None:
 
 
 def test_settings_of_faiss_come_back_after_an_error() -> None:
-    with single_threaded_faiss() as faiss:
-        inside = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
-    assert inside == (1, 256)
+    import faiss
+
+    own = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
+    before = 2, own[1]
+    assert before[1] != 256
     faiss.omp_set_num_threads(2)
-    before = faiss.cvar.distance_compute_blas_query_bs
-    assert before != 256
-    with pytest.raises(ValueError, match="planted"), single_threaded_faiss():
-        raise ValueError("planted")
-    after = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
-    faiss.omp_set_num_threads(1)
-    assert after == (2, before)
+    try:
+        with pytest.raises(ValueError, match="planted"), single_threaded_faiss() as inside:
+            assert (inside.omp_get_max_threads(), inside.cvar.distance_compute_blas_query_bs) == (1, 256)
+            raise ValueError("planted")
+        assert (faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs) == before
+    finally:
+        faiss.omp_set_num_threads(own[0])

@@ -26,11 +26,10 @@ from tests.reconstruct.conftest import Scene
 SQUARES = Loss(robust=False)
 
 
-def subspace(mean: Floats, covariance: Floats, linear: Floats | None = None) -> Subspace:
+def subspace(mean: Floats, covariance: Floats) -> Subspace:
     size = len(mean)
-    linear = np.zeros(size) if linear is None else linear
     curvature = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-    return Subspace(mean, np.zeros((0, size)), curvature, linear, np.zeros(size))
+    return Subspace(mean, np.zeros((0, size)), curvature, np.zeros(size), np.zeros(size))
 
 
 def noisy(frame: TrackerFrame, position_m: float, orientation_rad: float, rng: np.random.Generator) -> TrackerFrame:
@@ -71,8 +70,8 @@ def test_the_posterior_is_that_of_the_hessian_by_differences(
     residuals.read(masked(walk, 30, kinds))
     z = np.concatenate([ground_from_qpos(walk.take.qpos[30]), posture_from_qpos(walk.take.qpos[30])])
     z[7:] += 1e-3 * rng.normal(size=48)
-    offset, linear = 0.05 * rng.normal(size=52), rng.normal(size=52)
-    prior = subspace(z[3:] - offset, spread, linear)
+    offset = 0.05 * rng.normal(size=52)
+    prior = subspace(z[3:] - offset, spread)
     sigma, step = (loss.position_sigma_m, loss.orientation_sigma_rad), 1e-6
     slopes = [
         (errors_of(residuals, z + step * unit, sigma) - errors_of(residuals, z - step * unit, sigma)) / (2 * step)
@@ -96,7 +95,7 @@ def test_the_posterior_is_that_of_the_hessian_by_differences(
     ]
     assert found.position == pytest.approx(expected[0], rel=2e-3)
     assert found.orientation == pytest.approx(expected[1], rel=2e-3)
-    away = offset @ prior.curvature @ offset - 2.0 * linear @ offset
+    away = offset @ prior.curvature @ offset
     assert found.prior == pytest.approx(away + shares[2] - 52, abs=0.05)
 
 
