@@ -50,14 +50,21 @@ def test_as_many_cells_as_vectors_leave_each_alone(count: int) -> None:
 def test_settings_of_faiss_come_back_after_an_error() -> None:
     import faiss
 
-    own = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
-    before = 2, own[1]
-    assert before[1] != 256
-    faiss.omp_set_num_threads(2)
-    try:
-        with pytest.raises(ValueError, match="planted"), single_threaded_faiss() as inside:
-            assert (inside.omp_get_max_threads(), inside.cvar.distance_compute_blas_query_bs) == (1, 256)
+    def settings() -> tuple[int, int]:
+        return faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
+
+    def fail_inside() -> None:
+        with single_threaded_faiss():
+            assert settings() == (1, 256)
             raise ValueError("planted")
-        assert (faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs) == before
+
+    threads = faiss.omp_get_max_threads()
+    faiss.omp_set_num_threads(2)
+    before = settings()
+    assert before[1] != 256
+    try:
+        with pytest.raises(ValueError, match="planted"):
+            fail_inside()
+        assert settings() == before
     finally:
-        faiss.omp_set_num_threads(own[0])
+        faiss.omp_set_num_threads(threads)
