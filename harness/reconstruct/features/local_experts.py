@@ -20,6 +20,8 @@ from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 HISTORY_AXES = 20
 """Number of principal axes of the history."""
+_CACHED_MAPS = 64
+"""Largest number of combinations of missing readings whose maps are cached."""
 _POSE_ERROR_RAD = float(np.deg2rad(2.0))
 """Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""
 
@@ -77,13 +79,13 @@ class LocalExperts:
     def feature_map(self, measured: Bools, history: bool) -> FeatureMap:
         """The map to z from the readings that are `measured` (2 S,), and from the window if there is a `history`."""
         mask = np.append(measured, history).tobytes()
-        if mask not in self._maps:
+        out = self._maps.get(mask)
+        if out is None:
+            if len(self._maps) >= _CACHED_MAPS:
+                self._maps.clear()
             known = self.regression.columns(measured, history)
-            if known.all():
-                self._maps[mask] = self._map(self._directions)
-            else:
-                self._maps[mask] = self._imputed_map(known)
-        return self._maps[mask]
+            out = self._maps[mask] = self._map(self._directions) if known.all() else self._imputed_map(known)
+        return out
 
     def _imputed_map(self, known: Bools) -> FeatureMap:
         """The map from the known predictors (P,): others are replaced by their regression."""

@@ -67,15 +67,16 @@ def posterior(
     for i in range(size):
         total[i, i] += _MIN_DIAGONAL
     covariance = invert_positive_definite(total)
-    by_positions, by_prior = 0.0, 0.0
+    by_positions, by_prior, by_nothing = 0.0, 0.0, 0.0
     for i in range(size):
         for j in range(i + 1):
             share = covariance[i, j] if i == j else 2.0 * covariance[i, j]
             by_positions += share * of_positions[i, j]
             if j >= 3:
                 by_prior += share * prior.curvature[i - 3, j - 3]
+        by_nothing += _MIN_DIAGONAL * covariance[i, i]
     by_positions -= by_prior
-    by_orientations = size - by_positions - by_prior
+    by_orientations = size - by_positions - by_prior - by_nothing
     squares, numbers = np.zeros(2), np.zeros(2)
     for row in range(2 * count):
         precision = targets.precision[row]

@@ -1,0 +1,250 @@
+"""The posterior against numpy, and scales of noise and prior that are estimated from planted residuals."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.reconstruct.solver.ground_frame import (
+    HINGES,
+    ground_from_qpos,
+    posture_from_qpos,
+    qpos_from_posture,
+)
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.ik_solver import Stopping
+from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.self_calibration import Posterior, SelfCalibration, posterior
+from harness.reconstruct.solver.subspace import SubspaceSolver
+from harness.reconstruct.solver.subspace_minimiser import Subspace
+from harness.stream.frame import TrackerFrame
+from tests.reconstruct.conftest import Scene
+
+SQUARES = Loss(robust=False)
+
+
+def subspace(mean: Floats, covariance: Floats) -> Subspace:
+    size = len(mean)
+    curvature = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+    return Subspace(mean, np.zeros((0, size)), curvature, np.zeros(size), np.zeros(size))
+
+
+def noisy(frame: TrackerFrame, position_m: float, orientation_rad: float, rng: np.random.Generator) -> TrackerFrame:
+    shape = frame.position_m.shape
+    turned = rotations.multiply(rotations.exp(orientation_rad * rng.normal(size=shape)), frame.tracker_from_station)
+    return replace(
+        frame,
+        position_m=frame.position_m + position_m * rng.normal(size=shape),
+        tracker_from_station=turned,
+    )
+
+
+def masked(scene: Scene, index: int, kinds: str) -> TrackerFrame:
+    return scene.only(kinds)[index]
+
+
+def errors_of(residuals: Residuals, z: Floats, sigma: tuple[float, float]) -> Floats:
+    """(6 S,) whitened errors of positions, then of orientations; 0 where not measured."""
+    residuals.evaluate(qpos_from_posture(z[3:], z[:3]))
+    count = len(residuals.bones)
+    out: Floats = residuals.error / np.repeat(sigma, count)[:, None] * residuals.measured[:, None]
+    return out.ravel()
+
+
+@pytest.fixture
+def spread() -> Floats:
+    """(52, 52) covariance of a planted prior."""
+    root = np.random.default_rng(5).normal(size=(52, 80))
+    out: Floats = 0.01 * root @ root.T / 80.0 + 1e-4 * np.eye(52)
+    return out
+
+
+@pytest.mark.parametrize("kinds", ["pos+ori", "pos", "ori"])
+def test_the_posterior_is_that_of_the_hessian_by_differences(
+    walk: Scene, kinds: str, spread: Floats, rng: np.random.Generator
+) -> None:
+    loss, residuals = SQUARES, Residuals(walk.body, walk.calibration, SQUARES)
+    residuals.read(masked(walk, 30, kinds))
+    z = np.concatenate([ground_from_qpos(walk.take.qpos[30]), posture_from_qpos(walk.take.qpos[30])])
+    z[7:] += 1e-3 * rng.normal(size=48)
+    offset = 0.05 * rng.normal(size=52)
+    prior = subspace(z[3:] - offset, spread)
+    sigma, step = (loss.position_sigma_m, loss.orientation_sigma_rad), 1e-6
+    slopes = [
+        (errors_of(residuals, z + step * unit, sigma) - errors_of(residuals, z - step * unit, sigma)) / (2 * step)
+        for unit in np.eye(55)
+    ]
+    whitened, slope = errors_of(residuals, z, sigma), np.array(slopes).T
+    rows = 3 * len(residuals.bones)
+    of_positions, of_orientations = (part.T @ part for part in (slope[:rows], slope[rows:]))
+    of_prior = np.zeros((55, 55))
+    of_prior[3:, 3:] = prior.curvature
+    covariance = np.linalg.inv(of_positions + of_orientations + of_prior + 1e-6 * np.eye(55))
+    found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+    np.testing.assert_allclose(found.variance, np.diag(covariance)[3:], rtol=2e-3)
+    shares = [np.trace(covariance @ part) for part in (of_positions, of_orientations, of_prior)]
+    expected = [
+        (np.sum(part**2) + share) / rows if measured else 1.0
+        for part, share, measured in (
+            (whitened[:rows], shares[0], "pos" in kinds),
+            (whitened[rows:], shares[1], "ori" in kinds),
+        )
+    ]
+    assert found.position == pytest.approx(expected[0], rel=2e-3)
+    assert found.orientation == pytest.approx(expected[1], rel=2e-3)
+    away = offset @ prior.curvature @ offset
+    assert found.prior == pytest.approx(away + shares[2] - 52, abs=0.05)
+
+
+def test_the_shares_of_the_posterior_are_as_many_as_the_unknowns(walk: Scene, spread: Floats) -> None:
+    """At exact readings and at the prior's mean nothing but the shares remains."""
+    residuals = Residuals(walk.body, walk.calibration, SQUARES)
+    residuals.read(walk.frames[30])
+    qpos = walk.take.qpos[30]
+    residuals.evaluate(qpos)
+    z = np.concatenate([ground_from_qpos(qpos), posture_from_qpos(qpos)])
+    found = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
+    assert 18 * found.position + 18 * found.orientation + found.prior + 52 == pytest.approx(55.0, abs=1e-3)
+    assert min(found.position, found.orientation) > 0.0
+
+
+def test_the_state_is_left_as_it_was(walk: Scene, spread: Floats) -> None:
+    residuals = Residuals(walk.body, walk.calibration, SQUARES)
+    residuals.read(walk.frames[30])
+    residuals.evaluate(walk.take.qpos[31])
+    z = np.concatenate([ground_from_qpos(walk.take.qpos[31]), posture_from_qpos(walk.take.qpos[31])])
+    before = residuals.state.weight.copy(), residuals.state.error.copy()
+    one = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
+    two = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
+    np.testing.assert_array_equal(residuals.state.weight, before[0])
+    np.testing.assert_array_equal(residuals.state.error, before[1])
+    assert one.variance.tobytes() == two.variance.tobytes()
+    assert one[1:] == two[1:]
+
+
+def test_an_outlier_counts_as_30_squares_at_most(walk: Scene, spread: Floats) -> None:
+    residuals, found = Residuals(walk.body, walk.calibration, Loss()), []
+    z = np.concatenate([ground_from_qpos(walk.take.qpos[30]), posture_from_qpos(walk.take.qpos[30])])
+    for shift_m in (0.0, 0.5, 5.0):
+        position_m = np.array(walk.frames[30].position_m)
+        position_m[0, 0] += shift_m
+        residuals.read(replace(walk.frames[30], position_m=position_m))
+        residuals.evaluate(walk.take.qpos[30])
+        found.append(posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z))
+    none, large, larger = found
+    assert large.position == pytest.approx(larger.position, abs=0.05)
+    assert large.position - none.position == pytest.approx(30.0 / 18.0, abs=0.2)
+    assert large.orientation == pytest.approx(none.orientation, abs=0.1)
+
+
+def test_the_prior_is_judged_without_the_readings(walk: Scene, spread: Floats) -> None:
+    """One more standard deviation along one direction adds one to the squared distance."""
+    residuals = Residuals(walk.body, walk.calibration, SQUARES)
+    residuals.read(walk.frames[30])
+    residuals.evaluate(walk.take.qpos[30])
+    z = np.concatenate([ground_from_qpos(walk.take.qpos[30]), posture_from_qpos(walk.take.qpos[30])])
+    values, vectors = np.linalg.eigh(spread)
+    found = [
+        posterior(
+            residuals.tree,
+            residuals.targets,
+            residuals.state,
+            subspace(z[3:] - far * math.sqrt(values[40]) * vectors[:, 40], spread),
+            z,
+        )
+        for far in (0.0, 1.0, 3.0)
+    ]
+    assert [f.prior - found[0].prior for f in found] == pytest.approx([0.0, 1.0, 9.0], abs=1e-6)
+
+
+def calibrate(
+    scene: Scene, position_m: float, orientation_rad: float, spread_factor: float, outliers: float = 0.0
+) -> SelfCalibration:
+    """Scales after 800 frames of readings with planted noise, and of priors whose means err as planted.
+
+    The priors claim 0.01 for every number; under wider ones the scales converge more slowly. Of positions a share of
+    `outliers` is off by 0.5 m.
+    """
+    rng, loss = np.random.default_rng(3), Loss()
+    residuals, limits = Residuals(scene.body, scene.calibration, loss), HingeLimits(scene.body)
+    solver, scales = SubspaceSolver(residuals, limits, Stopping()), SelfCalibration(0.003, math.radians(0.5))
+    for index in range(800):
+        k = index % len(scene.frames)
+        frame, qpos = noisy(scene.frames[k], position_m, orientation_rad, rng), scene.take.qpos[k]
+        wild = 0.5 * (rng.random((6, 1)) < outliers) * np.array([1.0, 0.0, 0.0])
+        residuals.set_sigma(scales.position_sigma_m, scales.orientation_sigma_rad)
+        residuals.read(replace(frame, position_m=frame.position_m + wild))
+        true = posture_from_qpos(qpos)
+        mean = true + 0.01 * spread_factor * rng.normal(size=52)
+        mean[3] = 0.0
+        mean[HINGES] = limits.clip(mean[HINGES])
+        prior = subspace(mean, scales.prior * 0.01**2 * np.eye(52))
+        solution = solver.solve(prior, ground_from_qpos(qpos), mean)
+        z = np.concatenate([ground_from_qpos(solution.qpos), posture_from_qpos(solution.qpos)])
+        scales.update(posterior(residuals.tree, residuals.targets, residuals.state, prior, z))
+    return scales
+
+
+@pytest.mark.parametrize("position_mm", [1.0, 3.0])
+@pytest.mark.parametrize("orientation_deg", [0.1, 0.4])
+def test_the_noise_of_the_readings_is_found(walk: Scene, position_mm: float, orientation_deg: float) -> None:
+    scales = calibrate(walk, 1e-3 * position_mm, math.radians(orientation_deg), 1.0)
+    assert 1e3 * scales.position_sigma_m == pytest.approx(position_mm, rel=0.3)
+    assert math.degrees(scales.orientation_sigma_rad) == pytest.approx(orientation_deg, rel=0.3)
+
+
+def test_a_prior_that_errs_more_than_it_says_is_widened(walk: Scene) -> None:
+    narrow, right, wide = (calibrate(walk, 1e-3, math.radians(0.1), factor).prior for factor in (0.2, 1.0, 2.0))
+    assert narrow < right < wide
+    assert 1.5 < wide < 8.0
+
+
+def test_outliers_do_not_blow_up_the_noise(walk: Scene) -> None:
+    scales = calibrate(walk, 1e-3, math.radians(0.1), 1.0, outliers=0.02)
+    assert 0.7e-3 < scales.position_sigma_m < 2.5e-3
+    assert math.degrees(scales.orientation_sigma_rad) < 0.2
+
+
+def found(position: float = 1.0, orientation: float = 1.0, prior: float = 0.0) -> Posterior:
+    return Posterior(np.zeros(52), position, orientation, prior)
+
+
+def test_scales_start_and_stay_where_residuals_are_as_large_as_they_should_be() -> None:
+    scales = SelfCalibration(0.003, 0.01)
+    for _ in range(3):
+        scales.update(found())
+    assert (scales.position_sigma_m, scales.orientation_sigma_rad, scales.prior) == pytest.approx((0.003, 0.01, 1.0))
+
+
+def test_every_scale_follows_its_own_ratio() -> None:
+    for ratios, moved in (
+        (found(position=0.5), (True, False, False)),
+        (found(orientation=0.5), (False, True, False)),
+        (found(prior=18.0), (False, False, True)),
+    ):
+        scales = SelfCalibration(0.003, 0.01)
+        scales.update(ratios)
+        now = scales.position_sigma_m / 0.003, scales.orientation_sigma_rad / 0.01, scales.prior
+        assert tuple(abs(share - 1.0) > 1e-6 for share in now) == moved
+        assert all(0.8 < share < 1.3 for share in now), "slowly"
+
+
+def test_a_frame_moves_a_deviation_by_a_power_of_its_ratio() -> None:
+    scales = SelfCalibration(0.003, 0.01)
+    for expected in (0.9, 0.81):
+        scales.update(found(position=0.9**10))
+        assert scales.position_sigma_m == pytest.approx(0.003 * expected)
+
+
+@pytest.mark.parametrize("ratio", [0.0, -1.0, 1e-9, 1e9])
+def test_scales_keep_their_limits(ratio: float) -> None:
+    scales = SelfCalibration(0.003, 0.01)
+    for _ in range(200):
+        scales.update(found(ratio, ratio, 1e6 * (ratio - 1.0)))
+    share = 1.2 if ratio > 1.0 else 0.1
+    assert scales.position_sigma_m == pytest.approx(share * 0.003)
+    assert scales.orientation_sigma_rad == pytest.approx(share * 0.01)
+    assert scales.prior == pytest.approx(100.0 if ratio > 1.0 else 0.7)
