@@ -15,7 +15,9 @@ from harness.reconstruct.methods.expert_map import ExpertMap, ExpertMapSession, 
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.ground_frame import HINGES, posture_from_qpos
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD
+from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
 from harness.testing.contract_case import hash_motions
 from harness.testing.frames import drop_stations, exact_frames
@@ -225,6 +227,34 @@ def test_a_cold_start_with_the_anchor_of_a_performer_who_faces_elsewhere(walk: S
         qpos = moved(walk.take.qpos[:3], yaw, (1.0, 2.0, 0.0))
         estimates = walk.run(ExpertMap(), exact_frames(walk.body, walk.calibration, qpos))
         assert walk.off_m(estimates, qpos).max() < 0.03
+
+
+@pytest.mark.parametrize("costs", [(2.0, 1.0), (1.0, 2.0)])
+def test_of_two_starts_that_do_not_converge_the_cheaper_solution_counts(
+    walk: Scene, fitted: FittedExpertMap, costs: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = warm(walk, fitted)
+    planted = [IKSolution(walk.take.qpos[k], cost, 3, False) for k, cost in enumerate(costs)]
+    waiting = iter(planted)
+    monkeypatch.setattr(session._solver, "solve", lambda *_: next(waiting))
+    assert session.solve_next() is planted[int(np.argmin(costs))]
+
+
+def test_of_the_starts_of_a_cold_start_the_cheapest_solution_counts(
+    walk: Scene, fitted: FittedExpertMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = begin(fitted, walk)
+    session.residuals.read(walk.frames[0])
+    solve, found = session._solver.solve, list[IKSolution]()
+
+    def noted(prior: Subspace, ground: Floats, posture: Floats) -> IKSolution:
+        found.append(replace(solve(prior, ground, posture), cost=abs(0.7 - len(found))))
+        return found[-1]
+
+    monkeypatch.setattr(session._solver, "solve", noted)
+    best = session.solve_cold()
+    assert len(found) >= 2
+    assert best is min(found, key=lambda solution: solution.cost)
 
 
 def test_scales_follow_the_readings_but_not_a_cold_start(walk: Scene, fitted: FittedExpertMap) -> None:
