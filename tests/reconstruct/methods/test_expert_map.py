@@ -229,6 +229,16 @@ def test_a_cold_start_with_the_anchor_of_a_performer_who_faces_elsewhere(walk: S
         assert walk.off_m(estimates, qpos).max() < 0.03
 
 
+def test_deviations_of_a_fallback_after_a_cold_start_are_those_of_inverse_kinematics(
+    walk: Scene, fitted: FittedExpertMap
+) -> None:
+    session = begin(fitted, walk)
+    first, second = session.step(walk.frames[0]), session.step(drop_stations(walk.frames[1], [TORSO]))
+    assert (first.origin, second.origin) == (Origin.MODEL, Origin.FALLBACK)
+    assert (sigma_of(first) != POSTURE_PRIOR_SIGMA_RAD).all()
+    np.testing.assert_array_equal(sigma_of(second), POSTURE_PRIOR_SIGMA_RAD)
+
+
 @pytest.mark.parametrize("costs", [(2.0, 1.0), (1.0, 2.0)])
 def test_of_two_starts_that_do_not_converge_the_cheaper_solution_counts(
     walk: Scene, fitted: FittedExpertMap, costs: tuple[float, float], monkeypatch: pytest.MonkeyPatch
