@@ -85,7 +85,7 @@ class ExpertMap:
     """Variance of the weights over the squared distance within which half of the K examples lie."""
     history_weight: Annotated[float, Range(0.0, 1e3)] = 0.5
     """Power of the expert of the history in the product; 0 leaves it out."""
-    widening: Annotated[float, Range(0.0, 1e6)] = 100.0
+    widening: Annotated[float, Range(0.0, 1e6)] = 130.0
     """For performers unlike the examples, the covariance grows by f = 1 + (widening d^2)^2, where d is the RMS
     distance of the nearest examples per feature; the prior of `ik` takes part with the weight 1 - 1/f."""
     align: bool = True
