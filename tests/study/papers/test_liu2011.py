@@ -46,7 +46,7 @@ class Told(PaperStudy):
         for varied, scenario in variants(self.runs[run]):
             motion = scenario.motion
             shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-            setting: dict[str, Any] = {"varied": varied, "split": motion.split}
+            setting: dict[str, Any] = {"varied": varied, "split": motion.split, "lag": 0}
             setting["performer"] = "new" if motion.split == "subject" else "known"
             more = self.errors.get(motion.database, 0.0) + self.errors.get("share", 0.0) * (1.0 - motion.example_share)
             for clip, behaviour in zip(motion.test, shown, strict=True):

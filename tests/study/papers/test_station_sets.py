@@ -42,7 +42,7 @@ def test_a_set_is_named_in_the_papers_order() -> None:
 
 
 def test_rows_are_put_together_by_what_is_worn() -> None:
-    kind = {"method": "kernel_cca", "inputs": "pos+ori", "split": "sequence", "performer": "known"}
+    kind = {"method": "kernel_cca", "inputs": "pos+ori", "split": "sequence", "performer": "known", "lag": 0}
     kind |= {"behaviour": "walking"}
     rows = [
         {**kind, "varied": {"worn": worn}, "stations": worn, "clip": clip, "joint_angle_mean_deg": error}
