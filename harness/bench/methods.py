@@ -39,6 +39,7 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.local_experts import HISTORY_AXES
+from harness.reconstruct.features.moment_table import cells_for
 from harness.reconstruct.index import FlatIndex, make_index
 from harness.reconstruct.index.selection import AUTO
 from harness.reconstruct.methods.dynamic_map import DynamicMap
@@ -118,10 +119,16 @@ def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[Bench
 
 
 def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> BenchmarkRow:
-    """Memory above that of a process without a method, relative to one float32 copy of poses and query vectors."""
+    """Memory above that of a process without a method, relative to one float32 copy of poses and query vectors.
+
+    The tables of `expert_map` are counted apart.
+    """
     needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.resolve(name)))
-    used = peak_bytes - baseline_bytes
+    tables = _table_bytes(name, frames)
+    used = peak_bytes - baseline_bytes - tables
     text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
+    if tables:
+        text += f"; beside them {tables / 1e6:.0f} MB of tables"
     return BenchmarkRow(f"{name}, peak memory, {frames:,} frames", used / needed, "x", text, f"<= {MAX_MEMORY_RATIO:g}")
 
 
@@ -173,6 +180,14 @@ def query_dimension(method: Method) -> int:
     if isinstance(method, DynamicMap):
         return (POSTURE_SIZE + 3) * method.poses - 3
     return 10 * stations  # eq. 2 of Kim et al. 2012
+
+
+def _table_bytes(name: str, frames: int) -> int:
+    """Size of the moment tables of `expert_map` for a database of so many frames; 0 for other methods."""
+    if not isinstance(registry.resolve(name), ExpertMap):
+        return 0
+    sizes = [size + POSTURE_SIZE for size in (FEATURES, HISTORY_AXES)]
+    return sum(4 * cells_for(frames) * (size + size * (size + 1) // 2) for size in sizes)
 
 
 def config_hash(method: Method) -> str:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.reconstruct.database import Windows
 from harness.reconstruct.features.moment_table import MomentTable, tabulate_moments
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
@@ -22,6 +23,8 @@ HISTORY_AXES = 20
 """Number of principal axes of the history."""
 _CACHED_MAPS = 64
 """Largest number of combinations of missing readings whose maps are cached."""
+_CHUNK = 2048
+"""Number of windows that are processed at a time."""
 _POSE_ERROR_RAD = float(np.deg2rad(2.0))
 """Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""
 
@@ -61,20 +64,32 @@ class LocalExperts:
         self.history_axes = np.ascontiguousarray(self.history_axes)
         self.history_origin: Floats = regression.mean[:length] @ self.history_axes
         """(H,) image of their mean."""
-        count, rows = len(windows), np.arange(len(windows))
-        z = np.empty((count, self._directions.shape[1]), np.float32)
-        u = np.empty((count, self.history_axes.shape[1]), np.float32)
-        targets, done = np.empty((count, POSTURE_SIZE), np.float32), 0
-        for predictors, after in regression.training_data(windows, rows):
-            some = slice(done, done + len(predictors))
-            z[some], targets[some] = (predictors - regression.mean) @ self._directions, after
-            u[some] = predictors[:, :length] @ self.history_axes - self.history_origin
+        postures = _Postures(windows)
+        self.table: MomentTable = tabulate_moments(self._reading_features(), postures)
+        """Moments of z and the posture."""
+        self.history_table: MomentTable = tabulate_moments(self._history_features(), postures)
+        """Moments of u and the posture."""
+        windows.database.release_memory()
+
+    def _reading_features(self) -> Singles:
+        """(W, F) features z of all windows."""
+        regression, windows = self.regression, self.regression.windows
+        out, done = np.empty((len(windows), self._directions.shape[1]), np.float32), 0
+        for predictors, _ in regression.training_data(windows, np.arange(len(windows))):
+            out[done : done + len(predictors)] = (predictors - regression.mean) @ self._directions
             done += len(predictors)
         windows.database.release_memory()
-        self.table: MomentTable = tabulate_moments(z, targets)
-        """Moments of z and the posture."""
-        self.history_table: MomentTable = tabulate_moments(u, targets)
-        """Moments of u and the posture."""
+        return out
+
+    def _history_features(self) -> Singles:
+        """(W, H) features u of all windows."""
+        windows, weight = self.regression.windows, self.regression.options.window_weight
+        out = np.empty((len(windows), self.history_axes.shape[1]), np.float32)
+        for start in range(0, len(windows), _CHUNK):
+            some = slice(start, start + _CHUNK)
+            out[some] = (weight * windows.gather(some)) @ self.history_axes - self.history_origin
+        windows.database.release_memory()
+        return out
 
     def feature_map(self, measured: Bools, history: bool) -> FeatureMap:
         """The map to z from the readings that are `measured` (2 S,), and from the window if there is a `history`."""
@@ -117,3 +132,18 @@ class LocalExperts:
             places.T @ places,
             lever**2 * axes.T @ axes,
         )
+
+
+class _Postures:
+    """Postures after each of W windows, read when they are used (`moment_table.Targets`)."""
+
+    def __init__(self, windows: Windows) -> None:
+        self._windows, self._read = windows, 0
+
+    def __getitem__(self, rows: Ints, /) -> Singles:
+        out = self._windows.successors(rows)[:, :POSTURE_SIZE]
+        self._read += len(rows)
+        if self._read >= _CHUNK:
+            self._windows.database.release_memory()
+            self._read = 0
+        return out

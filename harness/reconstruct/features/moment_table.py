@@ -10,12 +10,11 @@ Gaussian with noisy inputs is the linear minimum mean square error estimator (Ka
 """
 
 import math
-from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from harness.core.arrays import Floats, Singles
+from harness.core.arrays import Floats, Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.reconstruct.index.clustering import cluster_vectors
@@ -53,33 +52,36 @@ class LocalGaussian(NamedTuple):
     """Mean squared distance of the examples of the nearest cell from the query."""
 
 
-def tabulate_moments(features: Singles, targets: Singles) -> MomentTable:
+class Targets(Protocol):
+    """Targets of N examples: an array (N, Y), or anything else that is indexed by rows."""
+
+    def __getitem__(self, rows: Ints, /) -> Singles:
+        """(K, Y) targets of these rows (K,)."""
+        ...
+
+
+def tabulate_moments(features: Singles, targets: Targets) -> MomentTable:
     """The table of N examples with features (N, F) and targets (N, Y)."""
-    total = len(features)
-    cells = max(1, min(MAX_CELLS, math.ceil(total / EXAMPLES_PER_CELL)))
-    cell = cluster_vectors(features, cells, generator(0, "moment table", total))
+    total, size = features.shape
+    cell = cluster_vectors(features, cells_for(total), generator(0, "moment table", total))
     order = np.argsort(cell, kind="stable")
-    ends = np.searchsorted(cell[order], np.arange(cells + 1))
-    lower = np.tril_indices(features.shape[1] + targets.shape[1])
-    rows = []
-    for first, last in pairwise(ends):
-        if first == last:
-            continue
-        members = order[first:last]
+    counts = np.bincount(cell)
+    counts = counts[counts > 0]
+    lower = np.tril_indices(size + targets[order[:1]].shape[1])
+    means, spread = np.empty((len(counts), lower[0][-1] + 1), np.float32), np.empty(len(counts))
+    scatters = np.empty((len(counts), len(lower[0])), np.float32)
+    for c, members in enumerate(np.split(order, np.cumsum(counts)[:-1])):
         pairs = np.concatenate([features[members], targets[members]], axis=1, dtype=float)
         mean = pairs.mean(axis=0)
-        centred = pairs - mean
-        scatter = centred.T @ centred
-        rows.append((len(members), mean, scatter[lower], np.trace(scatter[: features.shape[1], : features.shape[1]])))
-    count, means, scatters, traces = zip(*rows, strict=True)
-    counts = np.array(count, dtype=float)
-    return MomentTable(
-        features.shape[1],
-        counts,
-        np.array(means, np.float32),
-        np.array(scatters, np.float32),
-        np.array(traces) / counts,
-    )
+        pairs -= mean
+        scatter = pairs.T @ pairs
+        means[c], scatters[c], spread[c] = mean, scatter[lower], np.trace(scatter[:size, :size]) / len(members)
+    return MomentTable(size, counts.astype(float), means, scatters, spread)
+
+
+def cells_for(examples: int) -> int:
+    """Number of cells for so many examples."""
+    return max(1, min(MAX_CELLS, math.ceil(examples / EXAMPLES_PER_CELL)))
 
 
 @compiled
