@@ -152,6 +152,19 @@ class BadInput(HarnessError):
         return f"{self.place}{shorten(self.what, 2 * MAX_TEXT)} {shorten(self.advice, 2 * MAX_TEXT)}"
 
 
+class NothingMeasured(HarnessError):
+    """A folder of results without a measured cell: *incomplete* if cells failed, otherwise *not comparable*."""
+
+    def __init__(self, folder: Path | str, failed: int) -> None:
+        super().__init__(str(folder), failed)
+        self.folder, self.failed = self.args
+        self.outcome = Outcome.INCOMPLETE if failed else Outcome.NOT_COMPARABLE
+
+    def __str__(self) -> str:
+        folder, failed = shorten(self.folder), f" ({self.failed} failed)" if self.failed else ""
+        return f"{folder}: no cell was measured{failed}. `harness status {folder}` tells what became of its cells."
+
+
 class MissingExtra(HarnessError):
     """A part that needs a package of an optional extra, which is not installed."""
 

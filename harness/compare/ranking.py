@@ -32,6 +32,8 @@ class MethodRanking:
     """Method -> (C,) values, the lowest mean first."""
     results: Mapping[str, SignificanceResult]
     """Other method -> verdict on the first one against it, over the clips on which both were measured."""
+    differences: Mapping[str, float]
+    """Other method -> its mean minus that of the first one, over the clips on which both were measured."""
 
     @property
     def lowest(self) -> str:
@@ -81,7 +83,8 @@ def rank_methods(values: Mapping[str, ClipValues], metric: str) -> MethodRanking
     kept = [(line, margin) for line, margin in lines if len(line)]
     results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
     ordered = {name: columns[name] for name in (lowest, *others)}
-    return MethodRanking(metric, clips, ordered, dict(zip(others, results, strict=True)))
+    differences = {name: -float(line.mean()) for name, (line, _) in zip(others, kept, strict=False)}
+    return MethodRanking(metric, clips, ordered, dict(zip(others, results, strict=True)), differences)
 
 
 def find_best(values: Mapping[str, ClipValues], metric: str) -> str | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.report.kit.style import INK, SETTINGS, Chart, to_png, to_svg
+from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,11 +66,12 @@ def clear_plots(folder: Path) -> Path:
 def add_legend(figure: "Figure", axes: "Axes") -> None:
     """Name the lines of `axes` above the chart; the figure grows by the rows beyond the first."""
     handles, names = axes.get_legend_handles_labels()
-    room = _LETTERS * figure.get_figwidth() / _WIDTH_IN
+    scale = legend_scale()
+    room, row_in = _LETTERS * figure.get_figwidth() / _WIDTH_IN / scale, _ROW_IN * scale
     columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= room), 1)
     figure.legend(handles, names, loc="outside upper left", ncols=columns)
     further_rows = max(math.ceil(len(names) / columns) - 1, 0)
-    figure.set_figheight(figure.get_figheight() + _ROW_IN * further_rows)
+    figure.set_figheight(figure.get_figheight() + row_in * further_rows)
 
 
 def _legend_letters(names: Sequence[str], columns: int) -> int:
@@ -82,6 +83,13 @@ def decimate(x: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Every n-th point of a long line, so that about 1,500 points remain."""
     every = max(1, len(x) // _MOST_POINTS)
     return x[::every], values[::every]
+
+
+def insert_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """The curve with a NaN wherever frames are missing, so that no line is drawn across the gap."""
+    step_s = np.diff(time_s)
+    gaps = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
+    return np.insert(time_s, gaps, time_s[gaps - 1]), np.insert(values, gaps, np.nan)
 
 
 def spread_positions(wanted: Sequence[float], gap: float) -> list[float]:

@@ -18,6 +18,10 @@ DASHES: tuple[Any, ...] = ("solid", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 
 """Line styles; the next one is used each time all colours have been used."""
 STYLES = len(COLOURS) * len(DASHES)
 """Number of lines that can be told apart."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+"""Markers of series, in the order of their use."""
+MUTED = "#98a1ab"
+"""Grey of lines in the background of highlighted ones."""
 SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 10.0,
@@ -46,6 +50,29 @@ SETTINGS: dict[Any, Any] = {
     "path.simplify_threshold": 0.5,
 }
 """Settings for `matplotlib.rc_context` while a chart is drawn; none of them stays set."""
+PRINT_SETTINGS: dict[Any, Any] = {
+    **SETTINGS,
+    "font.family": "DejaVu Sans",  # comes with matplotlib, so that every machine writes the same bytes
+    "font.size": 8.0,
+    "axes.titlesize": 7.5,
+    "axes.titleweight": "normal",
+    "axes.labelsize": 7.5,
+    "axes.linewidth": 0.6,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.fontsize": 7.0,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.1,
+    "hatch.linewidth": 0.5,
+    "pdf.fonttype": 42,  # TrueType, which journals ask for; matplotlib's default is Type 3
+    "svg.fonttype": "path",  # looks the same on a machine without the font
+}
+"""Settings of figures for papers: text of 7 to 8 pt at the final size, fonts in the file."""
+_NOTE_SHARE = 0.875
 
 
 @dataclass(frozen=True)
@@ -80,21 +107,54 @@ class Chart:
         return text.replace("<defs>", f"<style>{rules}</style><defs>", 1)
 
 
-def to_svg(figure: "Figure", name: str) -> str:
+def to_svg(figure: "Figure", name: str, settings: dict[Any, Any] = SETTINGS) -> str:
     """The figure as SVG text; the same figure gives the same bytes."""
     import matplotlib
 
     file = io.StringIO()
-    with matplotlib.rc_context({**SETTINGS, "svg.hashsalt": name}):
+    with matplotlib.rc_context({**settings, "svg.hashsalt": name}):
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
     return file.getvalue()
 
 
-def to_png(figure: "Figure") -> bytes:
+def to_png(figure: "Figure", dpi: int = 130) -> bytes:
     """The figure as PNG on white; the same figure gives the same bytes."""
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=130, facecolor="white", metadata={"Software": None})
+    figure.savefig(file, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
     return file.getvalue()
+
+
+def to_pdf(figure: "Figure", settings: dict[Any, Any] = PRINT_SETTINGS) -> bytes:
+    """The figure as PDF with its fonts; the same figure gives the same bytes."""
+    import matplotlib
+
+    file = io.BytesIO()
+    with matplotlib.rc_context(settings):
+        figure.savefig(file, format="pdf", metadata=dict.fromkeys(("CreationDate", "Creator", "Producer")))
+    return file.getvalue()
+
+
+def note_size() -> float:
+    """Size of notes inside a chart [pt], a little smaller than its text; inside `rc_context` only."""
+    import matplotlib
+
+    return _NOTE_SHARE * float(matplotlib.rcParams["font.size"])
+
+
+def mark_scale() -> float:
+    """Size of markers and offsets relative to those of pages, which have text of 10 pt; inside `rc_context` only."""
+    import matplotlib
+
+    return float(matplotlib.rcParams["font.size"]) / float(SETTINGS["font.size"])
+
+
+def legend_scale() -> float:
+    """Size of the text of legends relative to that of pages; inside `rc_context` only."""
+    import matplotlib
+    from matplotlib.font_manager import FontProperties
+
+    size = FontProperties(size=matplotlib.rcParams["legend.fontsize"]).get_size_in_points()
+    return float(size) / float(SETTINGS["font.size"])
 
 
 def line_style(n: int) -> dict[str, Any]:
@@ -103,6 +163,21 @@ def line_style(n: int) -> dict[str, Any]:
         "color": COLOURS[n % len(COLOURS)],
         "linestyle": DASHES[n // len(COLOURS) % len(DASHES)],
     }
+
+
+def print_line_style(n: int) -> dict[str, Any]:
+    """Colour, dashes and marker of the n-th series in print: neighbours differ in all three, also without colour."""
+    return {
+        "color": COLOURS[n % len(COLOURS)],
+        "linestyle": DASHES[n % len(DASHES)],
+        "marker": MARKERS[(n + n // len(MARKERS)) % len(MARKERS)],
+    }
+
+
+def muted_line_style(n: int) -> dict[str, Any]:
+    """Dashes and marker of the n-th grey series behind highlighted ones; the first four have no marker."""
+    marker = (None, *MARKERS)[n // len(DASHES) % (1 + len(MARKERS))]
+    return {"color": MUTED, "linestyle": DASHES[n % len(DASHES)], "marker": marker}
 
 
 def hide_frame(axes: "Axes") -> None:

@@ -1,17 +1,15 @@
 """Charts of a placement study: error by number of stations, rankings with ties, contributions, searches, stability."""
 
 import itertools
-import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.core.seeds import generator
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
 from harness.report.kit.text import list_first, to_file_name
+from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
 from harness.report.placement.wording import (
     TIE_NOTE,
     format_error,
@@ -29,7 +27,6 @@ from harness.results.placement_findings import (
     PlacementSearch,
     RankAgreement,
     Ranking,
-    StationSetResult,
 )
 
 if TYPE_CHECKING:
@@ -37,55 +34,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
-_ROW_IN, _FRAME_IN, _MOST_ROWS, _LETTERS = 0.24, 0.9, 20, 96
-"""Heights of a row and of the frame [in]; most rows of a ranking; letters of the names of all best sets together."""
+_ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20
+"""Heights of a row and of the frame [in]; most rows of a ranking."""
 
 
 def pareto_chart(findings: PlacementFindings) -> Chart:
     """Error against the number of stations: every set as a point, the best of each size joined, ties circled."""
-    means: dict[int, list[float]] = {}
-    for tried in sorted(findings.tried, key=lambda tried: len(tried.stations)):
-        if tried.mean is not None:
-            means.setdefault(len(tried.stations), []).append(tried.mean)
-    best = [(b, t) for b in findings.best if (t := findings.of(b.stations)) and t.mean is not None]
-    positions = {size: n for n, size in enumerate(means)}
-    letters = max(_LETTERS // len(positions), 8)
-
-    def draw(figure: "Figure") -> None:
-        axes = figure.subplots()
-        for size, x in positions.items():
-            spread = min(0.3, 0.02 * len(means[size]))
-            jittered = x + generator(0, "pareto", str(size)).uniform(-spread, spread, len(means[size]))
-            axes.plot(jittered, means[size], "o", color=FAINT, markersize=2.6, alpha=0.45, markeredgewidth=0.0)
-        front = [(positions[len(b.stations)], _mean_or_nan(t)) for b, t in best if b.on_front]
-        axes.plot([x for x, _ in front], [y for _, y in front], color=_BEST, drawstyle="steps-post", alpha=0.5)
-        for b, t in best:
-            x, bottom = positions[len(b.stations)], _mean_or_nan(t) if t.low is None else t.low
-            if t.low is not None and t.high is not None:
-                axes.vlines(x, t.low, t.high, color=INK, linewidth=1.3)
-            ties = [_mean_or_nan(tied) for tie in b.ties if (tied := findings.of(tie)) and tied.mean is not None]
-            axes.plot([x] * len(ties), ties, "o", color="none", markeredgecolor=_OTHER, markersize=6.5)
-            face = _BEST if b.on_front else PAPER
-            axes.plot(x, _mean_or_nan(t), "o", color=face, markeredgecolor=_BEST, markersize=6.5, zorder=3)
-            name = textwrap.fill(set_name(b.stations), letters)
-            axes.annotate(
-                name,
-                (x, bottom),
-                xytext=(0, -5),
-                textcoords="offset points",
-                ha="center",
-                va="top",
-                fontsize=8.5,
-                linespacing=1.05,
-            )
-        axes.set_xticks(list(positions.values()), [_size_label(findings, size) for size in positions])
-        axes.set_xlim(-0.6, len(positions) - 0.4)
-        axes.set_xlabel("stations")
-        axes.set_ylabel(f"{findings.metric} [{findings.unit}]")
-        low, high = axes.get_ylim()
-        axes.set_ylim(low - 0.16 * (high - low), high)  # space for the names below
-        axes.grid(False, axis="x")
-
+    best = measured_best(findings)
     rates = {t.rate_hz for t in findings.tried}
     rate = f" Below each number: the rate that the link can carry ({findings.link})." if len(rates) > 1 else ""
     values = "; ".join(f"{len(b.stations)}: {set_name(b.stations)}, {format_error(findings, t)}" for b, t in best)
@@ -95,22 +50,10 @@ def pareto_chart(findings: PlacementFindings) -> Chart:
         "Grey: every set that was tried. Blue: the best set of each size with the 95 % interval of its mean; filled if "
         f"no smaller set is better. Circles: sets tied with it.{rate}",
         f"Error against the number of stations; the best set of each size is {values}.",
-        draw,
+        lambda figure: draw_pareto(figure, findings, f"{findings.metric} [{findings.unit}]"),
         4.2,
         raster=True,
     )
-
-
-def _mean_or_nan(tried: StationSetResult) -> float:
-    """The mean of a set; NaN if it was not measured."""
-    return math.nan if tried.mean is None else tried.mean
-
-
-def _size_label(findings: PlacementFindings, size: int) -> str:
-    """The number of stations, and the rate if it depends on the size of the set."""
-    rates = {tried.rate_hz for tried in findings.tried}
-    rates_of_size = {tried.rate_hz for tried in findings.tried if len(tried.stations) == size}
-    return f"{size}\n{'/'.join(f'{rate:g}' for rate in sorted(rates_of_size))} Hz" if len(rates) > 1 else str(size)
 
 
 def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) -> Chart:
@@ -190,7 +133,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
         axes.plot(
-            [_mean_or_nan(tried) for *_, tried in measured],
+            [mean_or_nan(tried) for *_, tried in measured],
             [n for n, *_ in measured],
             color=_BEST,
             linewidth=1.2,
@@ -201,7 +144,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
             if tried.low is not None and tried.high is not None:
                 axes.hlines(n, tried.low, tried.high, color=FAINT, linewidth=1.0)
             face = _BEST if significant or n == 0 else PAPER
-            axes.plot(_mean_or_nan(tried), n, "o", color=face, markeredgecolor=_BEST, markersize=6.5, zorder=3)
+            axes.plot(mean_or_nan(tried), n, "o", color=face, markeredgecolor=_BEST, markersize=6.5, zorder=3)
         _label_rows(axes, [_step_label(step.changed, step.tied) or "start" for _, step, _ in measured])
         axes.set_yticks([n for n, *_ in measured])
         axes.set_xlabel(f"{findings.metric} [{findings.unit}]")

@@ -1,13 +1,16 @@
 """Charts of a run's page: error over time with station quality, errors per joint, error distribution."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.report.kit.chart import add_legend, decimate, draw_chart
+from harness.report.kit.chart import add_legend, decimate, draw_chart, insert_gaps
+from harness.report.kit.distribution_chart import draw_distribution
+from harness.report.kit.metric_labels import metric_label
+from harness.report.kit.scales import set_log_scale, set_root_scale
 from harness.report.kit.style import (
     COLOURS,
     FAINT,
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-AXIS_LABELS = {PRIMARY_METRIC: "joint angle error [deg]", SECONDARY_METRIC: "joint position error [mm]"}
+AXIS_LABELS = {metric: metric_label(metric) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
 """Metric -> label of its axis."""
 SIGMA_BAND_NOTE = (
     " Shaded: up to the mean standard deviation that a method states for the hinges of a frame. Well-stated ones put "
@@ -48,9 +51,9 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
         for trace in (trace for trace in shown if trace.series in run.charted_series):
             values = np.where(trace.scored, trace.errors[PRIMARY_METRIC], np.nan)
-            time_s, values = decimate(*_insert_gaps(trace.time_s, values))
+            time_s, values = decimate(*insert_gaps(trace.time_s, values))
             error.plot(time_s, values, label=trace.series, **line_style(run.charted_series.index(trace.series)))
-        _set_log_scale(error, "y")
+        set_log_scale(error, "y")
         for trace in (trace for trace in shown if trace.series in run.charted_series and len(trace.sigma_deg)):
             _draw_sigma_band(error, trace, line_style(run.charted_series.index(trace.series))["color"])
         error.set_ylabel(AXIS_LABELS[PRIMARY_METRIC])
@@ -112,20 +115,14 @@ def error_per_joint(run: RunData, series: str) -> Chart:
 
 def error_distribution(run: RunData) -> Chart:
     """Cumulative distribution of the errors of every method."""
-    shares = np.concatenate([np.linspace(0.0, 0.98, 150), np.linspace(0.981, 1.0, 60)])
+
+    def values(metric: str, name: str) -> Floats:
+        parts = [t.errors[metric][t.scored] for t in run.traces if t.series == name]
+        return np.concatenate(parts or [np.empty(0)])
 
     def draw(figure: "Figure") -> None:
-        for axes, metric in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS, strict=True):
-            for n, name in enumerate(run.charted_series):
-                values = np.concatenate(
-                    [t.errors[metric][t.scored] for t in run.traces if t.series == name] or [np.empty(0)]
-                )
-                values = values[np.isfinite(values)]
-                if len(values):
-                    axes.plot(np.quantile(values, shares), 100.0 * shares, label=name, **line_style(n))
-            _set_log_scale(axes, "x")
-            axes.set_xlabel(AXIS_LABELS[metric])
-            axes.set_ylim(0.0, 100.0)
+        for axes, (metric, label) in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS.items(), strict=True):
+            draw_distribution(axes, {name: values(metric, name) for name in run.charted_series}, label, line_style)
         first = figure.axes[0]
         first.set_ylabel("frames below the error [%]")
         add_legend(figure, first)
@@ -169,7 +166,7 @@ def _draw_sigma_band(axes: "Axes", trace: Trace, colour: str) -> None:
     """Shade the area up to the mean standard deviation of a frame's hinges."""
     bottom, top = axes.get_ylim()
     mean_deg = np.where(trace.scored, trace.sigma_deg.mean(axis=1), np.nan)
-    time_s, mean_deg = decimate(*_insert_gaps(trace.time_s, mean_deg))
+    time_s, mean_deg = decimate(*insert_gaps(trace.time_s, mean_deg))
     axes.fill_between(time_s, bottom, np.maximum(mean_deg, bottom), color=colour, alpha=0.13, linewidth=0)
     axes.set_ylim(bottom, np.nanmax(mean_deg, initial=top))
 
@@ -187,46 +184,6 @@ def draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
     axes.hlines(places, low, high, color=FAINT, linewidth=1.0)
     axes.barh(places, q3 - q1, left=q1, height=0.62, color=colour, alpha=0.55)
     axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
-
-
-def _set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
-    """Make an axis logarithmic, with plain numbers, unless no value on it is above zero (a perfect method)."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    column = 0 if side == "x" else 1
-    values = np.concatenate([np.asarray(line.get_data()[column], dtype=float) for line in axes.lines] or [np.zeros(1)])
-    if np.nanmax(values, initial=0.0) > 0.0:
-        axes.set(**{f"{side}scale": "log"})
-        axis = axes.xaxis if side == "x" else axes.yaxis
-        few = np.nanmin(values[values > 0.0]) * 300.0 < np.nanmax(values)
-        axis.set_major_locator(LogLocator(subs=(1.0,) if few else (1.0, 2.0, 5.0)))
-        axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-
-
-def set_root_scale(axes: "Axes") -> None:
-    """Give the x axis a square-root scale from 0, with plain numbers."""
-    axes.set_xscale("function", functions=(np.sqrt, np.square))
-    axes.set_xlim(left=0.0)
-    ticks = _root_ticks(axes.get_xlim()[1])
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-
-
-def _root_ticks(end: float) -> list[float]:
-    """Round tick values for a square-root axis from 0 to `end`, spaced widely enough to be read."""
-    ticks = [0.0]
-    for power in range(-3, 5):
-        for tick in (digit * 10.0**power for digit in (1, 2, 5)):
-            if tick <= end and np.sqrt(tick) - np.sqrt(ticks[-1]) > 0.09 * np.sqrt(end):
-                ticks.append(tick)
-    return ticks
-
-
-def _insert_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """The curve with a NaN wherever frames are missing, so that no line is drawn across the gap."""
-    step_s = np.diff(time_s)
-    gaps = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
-    return np.insert(time_s, gaps, time_s[gaps - 1]), np.insert(values, gaps, np.nan)
 
 
 def _mean(parts: Sequence[Floats]) -> float:

@@ -139,7 +139,12 @@ def read_run(out: Path) -> RunData:
     check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
     run = RunData(out, manifest, last_varied(summary), (), summary)
-    return replace(run, traces=tuple(_trace(run, _cell_of_row(run, row)) for row in run.cells))
+    return replace(run, traces=read_traces(run, run.cells))
+
+
+def read_traces(run: RunData, rows: Sequence[Row]) -> tuple[Trace, ...]:
+    """The traces of some cells of a run, by their rows in its summary; BadFile for a damaged or edited cell."""
+    return tuple(_trace(run, _cell_of_row(run, row)) for row in rows)
 
 
 def _cell_of_row(run: RunData, row: Row) -> Cell:

@@ -1,6 +1,6 @@
 """Rankings of the series of a run, from the rows of its summary: for the headline, the terminal and bold cells."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,17 +28,20 @@ UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
 """Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
 
 
-def group_values(cells: Sequence[Row], methods: Sequence[Row], behaviour: str | None = None) -> GroupedValues:
+def group_values(
+    cells: Sequence[Row], methods: Sequence[Row], behaviour: str | None = None, metrics: Iterable[str] = MARGINS
+) -> GroupedValues:
     """The values of one behaviour, or of all.
 
     `cells` are rows of a summary, and `methods` are its methods, which name the series.
     """
+    metrics = tuple(metrics)
     collected: dict[RankingGroup, dict[str, dict[str, dict[str, list[float]]]]] = {}
     for row in sorted(cells, key=lag_of):
         if behaviour in (None, row["behaviour"]):
             of_group = collected.setdefault(RankingGroup(row["performer"], lag_of(row)), {})
             of_series = of_group.setdefault(series_name(row, methods), {})
-            for metric in MARGINS:
+            for metric in metrics:
                 if row.get(metric) is not None:
                     of_series.setdefault(metric, {}).setdefault(row["clip"], []).append(float(row[metric]))
     return {

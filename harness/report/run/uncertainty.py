@@ -10,9 +10,10 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.text_table import Table
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.scales import set_root_scale
 from harness.report.kit.style import COLOURS, INK, Chart
 from harness.report.kit.table import html_table
-from harness.report.run.charts import draw_boxes, set_root_scale
+from harness.report.run.charts import draw_boxes
 from harness.report.run.data import RunData, Trace
 from harness.results.sigma_table import SIGMA_COLUMNS, format_sigma_scores
 from harness.score.uncertainty import SigmaSums, sum_sigma

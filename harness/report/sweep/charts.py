@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.core.number_format import format_number
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
-from harness.report.kit.style import COLOURS, GRID, Chart, line_style
+from harness.report.kit.style import COLOURS, GRID, MARKERS, Chart, line_style
 from harness.report.kit.text import shorten, to_file_name
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -24,7 +24,6 @@ _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
 _LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 4, 8, 44, 5
 """Letters of a name next to an axis, and its most rows; most lines with names at their ends; letters of a name in a
 legend; most tick labels of a logarithmic axis."""
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _LOG_SCALE_RATIO = 30.0
 """The axis is logarithmic if the last of its positive values is more than this many times the first."""
 
@@ -173,7 +172,7 @@ def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
 
 def _marker(curve: Curve) -> str:
     """The marker of a curve, so that curves differ in shape as well as in colour."""
-    return _MARKERS[(curve.colour_index + curve.colour_index // len(COLOURS)) % len(_MARKERS)]
+    return MARKERS[(curve.colour_index + curve.colour_index // len(COLOURS)) % len(MARKERS)]
 
 
 def _curve_mean(curve: Curve) -> float:

@@ -1,0 +1,73 @@
+"""Figures for papers: PDF, SVG or PNG, as wide as a column or a page. The same data give the same bytes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from harness.errors import BadInput, UnknownName
+from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("pdf", "svg", "png")
+WIDTHS_MM = (85, 170)
+"""Widths of one and of two columns of a journal page [mm]."""
+MM_PER_IN = 25.4
+_MOST_HIGH_MM = 240.0
+"""Height of a journal page [mm]."""
+_PNG_DPI = 300
+
+
+@dataclass(frozen=True)
+class PrintFigure:
+    """A figure for a paper that is not drawn yet."""
+
+    name: str
+    """File name without its suffix."""
+    caption: str
+    """Sentences for the caption: what is shown, on how many clips, and what the marks mean."""
+    draw: Callable[["Figure"], None]
+    """Draws on an empty figure; its width is that of the paper, and its height may be changed."""
+    height_mm: float
+
+
+@dataclass(frozen=True)
+class DrawnFigure:
+    """The content of a figure's file, and the size that it has in print."""
+
+    data: bytes
+    width_mm: float
+    height_mm: float
+
+
+def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
+    """Draw a figure in one of FORMATS at one of WIDTHS_MM.
+
+    UnknownName for another format, BadInput for another width and for a figure that is higher than a page.
+    """
+    if fmt not in FORMATS:
+        raise UnknownName("format of figures", fmt, FORMATS)
+    if width_mm not in WIDTHS_MM:
+        raise BadInput(f"A figure {width_mm} mm wide.", f"Choose {' or '.join(map(str, WIDTHS_MM))} mm.")
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(PRINT_SETTINGS):
+        drawn = Figure(figsize=(width_mm / MM_PER_IN, figure.height_mm / MM_PER_IN), layout="constrained")
+        figure.draw(drawn)
+        height_mm = drawn.get_figheight() * MM_PER_IN
+        if height_mm > _MOST_HIGH_MM:
+            advice = f"A page has {_MOST_HIGH_MM:.0f} mm. Show fewer methods (--methods) or conditions (--condition)."
+            raise BadInput(f"The figure would be {height_mm:.0f} mm high.", advice)
+        return DrawnFigure(_to_bytes(drawn, figure.name, fmt), float(width_mm), height_mm)
+
+
+def _to_bytes(drawn: "Figure", name: str, fmt: str) -> bytes:
+    match fmt:
+        case "pdf":
+            return to_pdf(drawn)
+        case "svg":
+            return to_svg(drawn, name, PRINT_SETTINGS).encode()
+        case _:
+            return to_png(drawn, _PNG_DPI)
