@@ -26,12 +26,14 @@ from harness.commands.live import add_live
 from harness.commands.mocap import add_mocap
 from harness.commands.paper import add_paper
 from harness.commands.placement import add_placement
+from harness.commands.plot import add_plot
 from harness.commands.record import add_record
 from harness.commands.replay import add_replay
 from harness.commands.report import add_report
 from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
+from harness.commands.table import add_table
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
@@ -44,6 +46,8 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
         add_check,
         add_run,
         add_report,
+        add_plot,
+        add_table,
         add_export,
         add_baseline,
         add_compare,
@@ -60,12 +64,12 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return its exit code (see `harness.errors.Outcome`)."""
     words, content = list(sys.argv[1:] if argv is None else argv), None
-    as_json = "--json" in words
+    as_json, prints_file = "--json" in words, False
     with hold_interrupts():
         try:
             with accept_interrupts():
                 args = build_parser().parse_args(words)
-                as_json = args.json
+                as_json, prints_file = args.json, getattr(args, "prints_file", False)
                 outcome = _run_verb(words, args)
         except SystemExit as ended:  # argparse has printed the help or its complaint
             outcome = Outcome.REFUSED if ended.code else Outcome.PASS
@@ -73,6 +77,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.exit(print_last(text + "\n" if ended.code else "", outcome))
         except (KeyboardInterrupt, Exception) as error:
             outcome, content = describe_ending(words, error)
+        if prints_file and not as_json:  # stdout is the content of a file
+            print(outcome.word, file=sys.stderr)
+            return outcome.exit_code
         if not as_json:
             return print_last(f"{outcome.word}\n", outcome)
         ended_early = content is not None  # else the verb has printed its JSON

@@ -8,6 +8,7 @@ from harness.experiment.scenario import Scenario, load_scenario, shipped_scenari
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic
 from harness.reconstruct import registry
+from harness.report.figures.kinds import KINDS
 from harness.score.metrics import DEFINITIONS
 from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS
@@ -30,6 +31,7 @@ def build_catalogue() -> dict[str, dict[str, str]]:
             "noise": "white, slow and session errors, and the device's clock",
             "default": "all of it: also excursions, echoes, short losses and the error of fast motion",
         },
+        "figures": {name: kind.text for name, kind in KINDS.items()},
         "metrics": {name: f"[{d.unit}] {d.text}" for name, d in {**DEFINITIONS, **SIGMA_DEFINITIONS}.items()},
     }
 

@@ -8,7 +8,10 @@ from harness.errors import Outcome
 
 def add_list(verbs: Verbs) -> None:
     add_verb(
-        verbs, "list", "list the methods, scenarios, studies, synthetic takes, noise presets and metrics", run_list
+        verbs,
+        "list",
+        "list the methods, scenarios, studies, synthetic takes, noise presets, figures and metrics",
+        run_list,
     )
 
 

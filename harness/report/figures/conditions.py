@@ -1,0 +1,166 @@
+"""The conditions of a run, each with the methods that may be ranked together, as figures and tables select them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from harness.compare.margins import MARGINS
+from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
+from harness.errors import BadInput, NothingMeasured, UnknownName
+from harness.report.kit.ranking import name_lag
+from harness.report.run.data import Row, lag_of, series_name
+from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
+from harness.results.cell import varied_text
+from harness.results.integrity import check_folder
+from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results.storage import read_summary
+from harness.score.metrics import DEFINITIONS
+
+RANKING_METRICS = tuple(
+    name for name, margin in MARGINS.items() if margin.rise_is_worse and name not in UNRANKED_METRICS
+)
+"""Metrics that rank methods: a lower value is better, and a margin says which difference matters."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunCondition:
+    """One combination of varied values, known or new performers, and one lag: its cells are ranked together."""
+
+    varied: Mapping[str, Any]
+    group: RankingGroup
+    parts: tuple[str, ...]
+    """Texts of what distinguishes it from the other conditions of the run; empty if it is the only one."""
+    cells: tuple[Row, ...]
+    """Rows of the summary."""
+    methods: tuple[Row, ...]
+    """Rows of the summary's methods, which name the series."""
+
+    @property
+    def name(self) -> str:
+        """Name, such as "noise=clean, new performers"; empty if the run has only one condition."""
+        return ", ".join(self.parts)
+
+    @property
+    def series(self) -> tuple[str, ...]:
+        """Names of what is compared: methods, qualified by inputs and split where these vary, in the run's order."""
+        return tuple(dict.fromkeys(map(self.series_of, self.cells)))
+
+    @property
+    def behaviours(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(str(row["behaviour"]) for row in self.cells))
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(str(row["clip"]) for row in self.cells))
+
+    def series_of(self, row: Row) -> str:
+        """The series that the row of a cell belongs to."""
+        return series_name(row, self.methods)
+
+    def values(self, behaviour: str | None = None) -> Mapping[str, ClipValues]:
+        """Series -> metric -> clip -> mean over its cells, of one behaviour or of all."""
+        groups = group_values(self.cells, self.methods, behaviour, DEFINITIONS)
+        return groups.get(self.group, {})
+
+    def rank(self, metric: str = PRIMARY_METRIC, behaviour: str | None = None) -> MethodRanking | None:
+        """The ranking by one of RANKING_METRICS; None when the series share no clip."""
+        return rank_methods(self.values(behaviour), metric)
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionSet:
+    """The conditions of a run, and how much of it was measured."""
+
+    folder: Path
+    conditions: tuple[RunCondition, ...]
+    finished: int
+    planned: int
+
+    def select(self, condition: str = "", methods: Sequence[str] = ()) -> "ConditionSet":
+        """The conditions that have all parts of a name such as "noise=clean", with these methods, in their order.
+
+        Without a name or without methods, all of them. UnknownName for a condition or method that the run lacks.
+        """
+        chosen = self.conditions
+        if condition:
+            parts = {part.strip() for part in condition.split(",")}
+            chosen = tuple(each for each in chosen if parts <= set(each.parts))
+            if not chosen:
+                raise UnknownName("condition of the run", condition, [each.name for each in self.conditions])
+        if methods:
+            chosen = _select_methods(chosen, methods)
+        return replace(self, conditions=chosen)
+
+    @property
+    def missing_note(self) -> str:
+        """Sentence of a caption about cells that were not measured; empty without such cells."""
+        missing = self.planned - self.finished
+        return f" {missing:,} of {self.planned:,} planned cells were not measured." if missing else ""
+
+
+def read_conditions(folder: Path) -> ConditionSet:
+    """Read the conditions of the run in a folder, in the order of its cells.
+
+    BadFile when it holds no finished run or a damaged one, NothingMeasured when no cell has a joint-angle error.
+    """
+    check_folder(folder)
+    summary = read_summary(folder)
+    cells: Sequence[Row] = summary["cells"]
+    if all(row[PRIMARY_METRIC] is None for row in cells):
+        raise NothingMeasured(folder, len(summary["failures"]))
+    keys = list[tuple[Mapping[str, Any], RankingGroup]]()
+    for row in cells:
+        if (key := (row["varied"], _group_of(row))) not in keys:
+            keys.append(key)
+    groups = {group for _, group in keys}
+    several = [len({getattr(group, name) for group in groups}) > 1 for name in RankingGroup._fields]
+    keys.sort(key=lambda key: key[1].lag)
+    conditions = (_condition(*key, several, cells, summary["methods"]) for key in keys)
+    return ConditionSet(folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"])
+
+
+def _condition(
+    varied: Mapping[str, Any], group: RankingGroup, several: Sequence[bool], cells: Sequence[Row], rows: Sequence[Row]
+) -> RunCondition:
+    several_performers, several_lags = several
+    performers = f"{group.performer} performers" if several_performers and group.performer else ""
+    lag = (name_lag(group.lag) if group.lag else "no lag") if several_lags else ""
+    return RunCondition(
+        varied,
+        group,
+        tuple(part for part in (varied_text(varied), performers, lag) if part),
+        tuple(row for row in cells if (row["varied"], _group_of(row)) == (varied, group)),
+        tuple(row for row in rows if row["performer"] == group.performer),
+    )
+
+
+def _group_of(row: Row) -> RankingGroup:
+    return RankingGroup(row["performer"], lag_of(row))
+
+
+def _select_methods(conditions: Sequence[RunCondition], names: Sequence[str]) -> tuple[RunCondition, ...]:
+    """The conditions with the cells of some methods, named as the method or as the series, in the order of the names.
+
+    A condition without any of them is left out.
+    """
+    known = dict.fromkeys(str(row["method"]) for each in conditions for row in each.cells)
+    known |= dict.fromkeys(name for each in conditions for name in each.series)
+    for name in names:
+        if name not in known:
+            raise UnknownName("method of the run", name, known)
+    selected = []
+    for each in conditions:
+        cells = [row for name in names for row in each.cells if name in (row["method"], each.series_of(row))]
+        if cells:
+            selected.append(replace(each, cells=tuple({row["key"]: row for row in cells}.values())))
+    return tuple(selected)
+
+
+def check_metric(metric: str, known: Iterable[str], kind: str) -> None:
+    """UnknownName when a metric does not exist, BadInput when it exists but is none of the known ones."""
+    known = tuple(known)
+    if metric not in DEFINITIONS:
+        raise UnknownName("metric", metric, known)
+    if metric not in known:
+        raise BadInput(f"{metric} is no {kind}.", f"Choose one of {', '.join(known)}.")

@@ -1,0 +1,44 @@
+"""The figure `ranking`: mean error of each method and its paired difference to the lowest, one panel a condition."""
+
+from harness.compare.paired_statistics import MIN_CLIPS
+from harness.core.number_format import count_noun
+from harness.errors import BadInput
+from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, check_metric
+from harness.report.figures.selection import FigureSelection
+from harness.report.kit.metric_labels import quantity
+from harness.report.kit.print_figure import PrintFigure
+from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, ranking_height_mm
+from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.score.metrics import DEFINITIONS
+
+
+def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
+    """The ranking of every selected condition, by the statistics of `harness compare`."""
+    metric = selection.metric
+    check_metric(metric, RANKING_METRICS, "metric that ranks methods")
+    ranked = [(each.name, each.rank(metric)) for each in run.conditions]
+    panels = [RankingPanel(name, ranking) for name, ranking in ranked if ranking]
+    if not panels:
+        raise BadInput(f"No clip of {run.folder} has {metric} of every method.", "Choose methods with --methods.")
+    unit = DEFINITIONS[metric].unit
+    return PrintFigure(
+        "ranking" if metric == PRIMARY_METRIC else f"ranking_{metric}",
+        _caption(run, metric, panels),
+        lambda figure: draw_ranking(figure, panels, quantity(metric), unit),
+        ranking_height_mm(panels),
+    )
+
+
+def _caption(run: ConditionSet, metric: str, panels: list[RankingPanel]) -> str:
+    counts = list(dict.fromkeys(count_noun(len(panel.ranking.clips), "clip") for panel in panels))
+    sentences = [f"Mean {quantity(metric)} on {' and '.join(counts)} with its 95 % interval over clips."]
+    if any(panel.ranking.results for panel in panels):
+        sentences += [
+            "Right: paired difference to the method with the lowest mean, with its 95 % interval.",
+            "Tied: no significant difference that exceeds the margin (sign-flip test over clips, Holm's correction).",
+        ]
+    if any(len(panel.ranking.clips) < MIN_CLIPS for panel in panels):
+        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference.")
+    unranked = len(run.conditions) - len(panels)
+    sentences += [f"In {count_noun(unranked, 'condition')} the methods share no clip."] if unranked else []
+    return " ".join(sentences) + run.missing_note

@@ -1,0 +1,161 @@
+"""The table of a run for a paper: the mean of each metric with its interval, by condition and method."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
+from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
+from harness.core.number_format import format_number
+from harness.errors import BadInput, UnknownName
+from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
+from harness.report.figures.source import find_kind
+from harness.results.cell import varied_text
+from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.score.metrics import DEFINITIONS
+
+Standing = Literal["lowest", "tied", "worse", ""]
+"""What the ranking says of a value; "" for a metric that ranks no methods, and without a ranking."""
+DEFAULT_METRICS = (PRIMARY_METRIC, SECONDARY_METRIC)
+
+
+@dataclass(frozen=True)
+class MetricValue:
+    """One metric of one method in one condition."""
+
+    metric: str
+    mean: float | None
+    """Mean over the clips on which it was measured, each averaged over its cells first."""
+    low: float | None = None
+    """Ends of the 95 % interval of the mean; None with fewer than two clips."""
+    high: float | None = None
+    clips: int = 0
+    standing: Standing = ""
+    bold: bool = False
+    """Whether it is the lowest mean or tied with it, and some other method is worse."""
+
+    def formatted(self) -> tuple[str, str]:
+        """The mean, and the interval in brackets: "1.67", "[1.52, 1.83]"; a dash and nothing if not measured."""
+        if self.mean is None:
+            return "–", ""
+        unit = DEFINITIONS[self.metric].unit
+        mean = format_number(self.mean, unit)
+        if self.low is None or self.high is None:
+            return mean, ""
+        return mean, f"[{format_number(self.low, unit)}, {format_number(self.high, unit)}]"
+
+
+@dataclass(frozen=True)
+class ResultsRow:
+    """One method in one condition."""
+
+    condition: tuple[str, ...]
+    """A text for each of `ResultsTable.condition_names`."""
+    method: str
+    values: tuple[MetricValue, ...]
+
+    @property
+    def clips(self) -> int:
+        """The largest number of clips behind a value."""
+        return max(value.clips for value in self.values)
+
+
+@dataclass(frozen=True)
+class ResultsTable:
+    """A table of a run."""
+
+    condition_names: tuple[str, ...]
+    """What distinguishes conditions: varied keys, performers, lag, behaviour; empty if there is one condition."""
+    metrics: tuple[str, ...]
+    rows: tuple[ResultsRow, ...]
+    """The rows of a condition follow each other."""
+    note: str
+    """Sentences that explain the values."""
+
+
+def build_table(
+    folder: Path,
+    metrics: Sequence[str] = DEFAULT_METRICS,
+    *,
+    methods: Sequence[str] = (),
+    condition: str = "",
+    by_behaviour: bool = False,
+) -> ResultsTable:
+    """The table of the run in `folder`; behaviours are pooled unless `by_behaviour`.
+
+    A value is bold by the ranking that the terminal and the page use (`rank_methods`). UnknownName for a metric,
+    method or condition that does not exist, BadInput for a folder that holds no run, BadFile for a damaged one,
+    NothingMeasured for one without a measured cell.
+    """
+    for metric in metrics:
+        if metric not in DEFINITIONS:
+            raise UnknownName("metric", metric, DEFINITIONS)
+    if find_kind(folder) == "placement":
+        raise BadInput(f"{folder} is a placement study.", "Name a run; `harness report` writes the tables of a study.")
+    run = read_conditions(folder).select(condition, methods)
+    names = _condition_names(run, by_behaviour)
+    rows, few = [], False
+    for each in run.conditions:
+        for behaviour in each.behaviours if by_behaviour else (None,):
+            values = each.values(behaviour)
+            rankings = {m: rank_methods(values, m) for m in metrics if m in RANKING_METRICS}
+            few |= any(len(ranking.clips) < MIN_CLIPS for ranking in rankings.values() if ranking)
+            texts = tuple(_condition_text(each, name, behaviour) for name in names)
+            rows += [
+                ResultsRow(texts, series, tuple(_value(metric, values[series], series, rankings) for metric in metrics))
+                for series in each.series
+                if series in values
+            ]
+    return ResultsTable(names, tuple(metrics), tuple(rows), _note(run, rows, few))
+
+
+def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
+    varied = dict.fromkeys(key for each in run.conditions for key in each.varied)
+    groups = {each.group for each in run.conditions}
+    further = {
+        "performers": len({group.performer for group in groups}) > 1,
+        "lag": len({group.lag for group in groups}) > 1,
+        "behaviour": by_behaviour,
+    }
+    return (*varied, *(name for name, shown in further.items() if shown))
+
+
+def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -> str:
+    match name:
+        case "performers":
+            return condition.group.performer
+        case "lag":
+            return str(condition.group.lag)
+        case "behaviour":
+            return (behaviour or "").replace("_", " ")
+        case _:
+            return varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
+
+
+def _value(metric: str, values: ClipValues, series: str, rankings: Mapping[str, MethodRanking | None]) -> MetricValue:
+    by_clip = np.array(list(values.get(metric, {}).values()))
+    if not len(by_clip):
+        return MetricValue(metric, None)
+    low, high = mean_interval(by_clip) if len(by_clip) > 1 else (None, None)
+    ranking = rankings.get(metric)
+    standing = _standing(ranking, series) if ranking else ""
+    bold = standing in ("lowest", "tied") and ranking is not None and bool(ranking.others("better"))
+    return MetricValue(metric, float(by_clip.mean()), low, high, len(by_clip), standing, bold)
+
+
+def _standing(ranking: MethodRanking, series: str) -> Standing:
+    if series == ranking.lowest:
+        return "lowest" if ranking.results else ""
+    return "worse" if ranking.results[series].verdict == "better" else "tied"
+
+
+def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
+    sentences = ["Mean over clips and its 95 % interval."]
+    if any(value.bold for row in rows for value in row.values):
+        sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")
+    if few:
+        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference, so nothing is bold there.")
+    return " ".join(sentences) + run.missing_note

@@ -1,0 +1,116 @@
+"""Formats of the table of a run: LaTeX with booktabs, Markdown, and CSV with all digits."""
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+
+from harness.errors import UnknownName
+from harness.report.figures.table import MetricValue, ResultsTable
+from harness.report.kit.metric_labels import metric_label
+
+_LATEX = {
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "−": "$-$",
+    "–": "--",
+    "³": r"\textsuperscript{3}",
+    "×": r"$\times$",
+}
+"""Character -> what LaTeX prints as it."""
+
+
+def to_latex(table: ResultsTable) -> str:
+    """A tabular environment with booktabs rules; a condition is named in its first row, and space precedes it."""
+    columns = "l" * (len(table.condition_names) + 1) + "r" * (len(table.metrics) + 1)
+    lines = [
+        r"% needs \usepackage{booktabs}",
+        f"% {table.note}",
+        rf"\begin{{tabular}}{{{columns}}}",
+        r"\toprule",
+        _latex_row([_escape_latex(title) for title in _titles(table)]),
+        r"\midrule",
+    ]
+    before: tuple[str, ...] | None = None
+    for row in table.rows:
+        if before is not None and row.condition != before:
+            lines.append(r"\addlinespace")
+        condition = [""] * len(row.condition) if row.condition == before else map(_escape_latex, row.condition)
+        values = [_latex_value(value) for value in row.values]
+        lines.append(_latex_row([*condition, _escape_latex(row.method), str(row.clips), *values]))
+        before = row.condition
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def _latex_row(cells: Sequence[str]) -> str:
+    text = f"{' & '.join(cells)} \\\\"
+    return f"{{}}{text}" if text.startswith("[") else text  # a bracket would be the argument of the row before
+
+
+def _latex_value(value: MetricValue) -> str:
+    mean, interval = (_escape_latex(text) for text in value.formatted())
+    return " ".join(part for part in (rf"\textbf{{{mean}}}" if value.bold else mean, interval) if part)
+
+
+def _escape_latex(text: str) -> str:
+    return "".join(_LATEX.get(sign, sign) for sign in text)
+
+
+def to_markdown(table: ResultsTable) -> str:
+    """A table as GitHub and MkDocs read it, and the note below it."""
+    titles = _titles(table)
+    texts = len(table.condition_names) + 1
+    rules = ["---" if n < texts else "--:" for n in range(len(titles))]
+    rows = [
+        [*map(_escape_markdown, row.condition), f"`{row.method}`", str(row.clips), *map(_markdown_value, row.values)]
+        for row in table.rows
+    ]
+    lines = [f"| {' | '.join(cells)} |" for cells in (map(_escape_markdown, titles), rules, *rows)]
+    return "\n".join([*lines, "", table.note]) + "\n"
+
+
+def _markdown_value(value: MetricValue) -> str:
+    mean, interval = value.formatted()
+    return f"{f'**{mean}**' if value.bold else mean} {interval}".strip()
+
+
+def _escape_markdown(text: str) -> str:
+    return "".join(f"\\{sign}" if sign in "\\|*_`<" else sign for sign in text)
+
+
+def to_csv(table: ResultsTable) -> str:
+    """A line for each row; a metric has the columns NAME, NAME.low, NAME.high, NAME.clips and NAME.standing.
+
+    Fields are empty where nothing was measured or ranked. Numbers have nine digits.
+    """
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    parts = ("", ".low", ".high", ".clips", ".standing")
+    writer.writerow([*table.condition_names, "method", *(f"{name}{part}" for name in table.metrics for part in parts)])
+    for row in table.rows:
+        values = [field for value in row.values for field in _csv_fields(value)]
+        writer.writerow([*row.condition, row.method, *values])
+    return file.getvalue()
+
+
+def _csv_fields(value: MetricValue) -> list[str]:
+    numbers = ["" if number is None else f"{number:.9g}" for number in (value.mean, value.low, value.high)]
+    return [*numbers, str(value.clips), value.standing]
+
+
+def _titles(table: ResultsTable) -> list[str]:
+    return [*table.condition_names, "method", "clips", *map(metric_label, table.metrics)]
+
+
+TABLE_FORMATS: dict[str, Callable[[ResultsTable], str]] = {"latex": to_latex, "markdown": to_markdown, "csv": to_csv}
+
+
+def format_table(table: ResultsTable, fmt: str) -> str:
+    """The table in one of TABLE_FORMATS; UnknownName for another one."""
+    if fmt not in TABLE_FORMATS:
+        raise UnknownName("format of tables", fmt, TABLE_FORMATS)
+    return TABLE_FORMATS[fmt](table)

@@ -1,0 +1,77 @@
+"""Errors over time of the cells of one condition, by series, and the series that a figure highlights."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.compare.ranking import MethodRanking
+from harness.errors import BadInput, UnknownName
+from harness.report.figures.conditions import ConditionSet, RunCondition
+from harness.report.figures.selection import FigureSelection
+from harness.report.run.data import Row, RunData, Trace, last_varied, read_traces
+from harness.results.manifest import Manifest
+from harness.results.storage import read_summary
+
+_CONTROL = "ik"
+"""The control unless another one is chosen: the method that needs no examples."""
+
+
+@dataclass(frozen=True)
+class Highlights:
+    """The series in colour."""
+
+    leader: str
+    """The series with the lowest mean error."""
+    control: str | None
+    """The series that it is shown against; None if there is no other."""
+
+    def role(self, series: str) -> str:
+        """What a legend adds to the name of a series."""
+        return {self.leader: " (lowest mean)", self.control: " (control)"}.get(series, "")
+
+
+def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondition:
+    """The condition of a figure that shows one: the last varied values, causal methods, known performers.
+
+    It has the chosen clip, if any. UnknownName for a clip that no condition has.
+    """
+    chosen = run.conditions
+    if selection.clip:
+        chosen = tuple(each for each in chosen if selection.clip in each.clips)
+        if not chosen:
+            clips = dict.fromkeys(clip for each in run.conditions for clip in each.clips)
+            raise UnknownName("clip of the run", selection.clip, clips)
+    last = chosen[-1].varied
+    return next(each for each in chosen if each.varied == last and each.group.lag == chosen[0].group.lag)
+
+
+def choose_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:
+    """The series with the lowest mean joint angle error, and the control.
+
+    UnknownName for a control that the condition lacks, BadInput when the methods share no clip.
+    """
+    ranking: MethodRanking | None = condition.rank()
+    if ranking is None:
+        raise BadInput("The methods share no measured clip.", "Choose methods with --methods.")
+    others = [name for name in ranking.values if name != ranking.lowest]
+    wanted = selection.control or _CONTROL
+    found = [name for name in others if name == wanted or name.startswith(f"{wanted} (")]
+    if selection.control and not found:
+        raise UnknownName("control among the methods shown", selection.control, others)
+    return Highlights(ranking.lowest, next(iter(found or others), None))
+
+
+def read_series(
+    folder: Path, condition: RunCondition, keep: Callable[[str, Row], bool]
+) -> Mapping[str, Sequence[Trace]]:
+    """Series -> traces of the cells of a condition that `keep` accepts by series and row; in the condition's order.
+
+    BadFile for a damaged cell.
+    """
+    summary = read_summary(folder)
+    run = RunData(folder, Manifest.read(folder / "manifest.json"), last_varied(summary), (), summary)
+    rows = [row for row in condition.cells if keep(condition.series_of(row), row)]
+    found: dict[str, list[Trace]] = {}
+    for row, trace in zip(rows, read_traces(run, rows), strict=True):
+        found.setdefault(condition.series_of(row), []).append(trace)
+    return found
