@@ -5,7 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from harness.errors import MAX_TEXT, BadFile, BadInput, HarnessError, UnknownName, name_file, shorten
+from harness.errors import (
+    MAX_TEXT,
+    BadFile,
+    BadInput,
+    HarnessError,
+    NothingMeasured,
+    Outcome,
+    UnknownName,
+    name_file,
+    shorten,
+)
 from harness.experiment.scenario import load_scenario
 
 
@@ -18,6 +28,7 @@ def test_any_text_becomes_a_short_line(text: str) -> None:
         BadFile(text, text, text, text, 3),
         BadInput(text, text),
         UnknownName(text, text, [text] * 100),
+        NothingMeasured(text, 2),
     )
     for error in errors:
         assert str(error).isprintable()
@@ -40,3 +51,9 @@ def test_the_innermost_file_is_named_also_after_pickling() -> None:
     with pytest.raises(HarnessError) as refused, name_file(Path("outer")), name_file(Path("inner")):
         raise BadInput("a = 1.", "Use 2.")
     assert str(pickle.loads(pickle.dumps(refused.value))) == "inner: a = 1. Use 2."  # noqa: S301  # our own bytes
+
+
+def test_the_outcome_of_nothing_measured_survives_pickling() -> None:
+    for failed, outcome in ((0, Outcome.NOT_COMPARABLE), (3, Outcome.INCOMPLETE)):
+        error = pickle.loads(pickle.dumps(NothingMeasured("run", failed)))  # noqa: S301  # our own bytes
+        assert (error.outcome, "(3 failed)" in str(error)) == (outcome, failed > 0)

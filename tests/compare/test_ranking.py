@@ -29,6 +29,18 @@ def rank(results: ResultSet, metric: str = PRIMARY_METRIC) -> MethodRanking:
     return ranking
 
 
+def test_differences_are_those_of_the_means() -> None:
+    ranking = rank(scattered(1, 8))
+    means = ranking.means
+    assert list(ranking.differences) == list(ranking.results)
+    for name, difference in ranking.differences.items():
+        assert difference == pytest.approx(means[name] - means[ranking.lowest])
+        result = ranking.results[name]
+        assert result.low is not None
+        assert result.high is not None
+        assert result.low <= -difference <= result.high
+
+
 def scattered(seed: int, clips: int) -> ResultSet:
     """Methods whose errors are 0.7 to 1.3 times as large, with scatter over clips."""
     rng = generator(seed, "ranking")

@@ -19,6 +19,7 @@ def texts_apart(figure: Figure) -> None:
 
 
 def _ticks(axis: Axis) -> list[Text]:
-    """The tick labels that are drawn, which are those within the limits."""
+    """The tick labels that are drawn: those within the limits, and of axes that share a scale those of one."""
     low, high = sorted(axis.get_view_interval())
-    return [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]
+    labels = [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]
+    return [label for label in labels if label.get_visible()]

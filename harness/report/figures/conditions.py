@@ -87,7 +87,8 @@ class ConditionSet:
             parts = {part.strip() for part in condition.split(",")}
             chosen = tuple(each for each in chosen if parts <= set(each.parts))
             if not chosen:
-                raise UnknownName("condition of the run", condition, [each.name for each in self.conditions])
+                known = dict.fromkeys(part for each in self.conditions for part in each.parts)
+                raise UnknownName("condition of the run", condition, known)
         if methods:
             chosen = _select_methods(chosen, methods)
         return replace(self, conditions=chosen)

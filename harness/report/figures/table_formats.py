@@ -65,9 +65,10 @@ def to_markdown(table: ResultsTable) -> str:
     titles = _titles(table)
     texts = len(table.condition_names) + 1
     rules = ["---" if n < texts else "--:" for n in range(len(titles))]
+    names = ["`" + row.method.replace("|", "\\|") + "`" for row in table.rows]  # a bar would end the cell even here
     rows = [
-        [*map(_escape_markdown, row.condition), f"`{row.method}`", str(row.clips), *map(_markdown_value, row.values)]
-        for row in table.rows
+        [*map(_escape_markdown, row.condition), name, str(row.clips), *map(_markdown_value, row.values)]
+        for name, row in zip(names, table.rows, strict=True)
     ]
     lines = [f"| {' | '.join(cells)} |" for cells in (map(_escape_markdown, titles), rules, *rows)]
     return "\n".join([*lines, "", table.note]) + "\n"

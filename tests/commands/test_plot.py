@@ -1,0 +1,69 @@
+"""`harness plot` as a user meets it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from tests.compare.sides import side, write_run
+from tests.report.figures.made_up import ranked_run
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return ranked_run(tmp_path_factory.mktemp("plot") / "run")
+
+
+def test_it_names_the_file_its_size_and_a_caption(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(run), "--out", "r.svg", "--methods", "ik,expert_map", "--width", "170"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("figure: r.svg (170 x ")
+    assert lines[1].startswith("caption: Mean joint angle error on 15 clips with its 95 % interval over clips.")
+    assert lines[-1] == "pass"
+    assert Path("r.svg").is_file()
+    assert main(["plot", str(run), "--out", "r.svg"]) == 2
+    assert "r.svg exists." in capsys.readouterr().err
+    assert main(["plot", str(run), "--out", "r.svg", "--force", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["path"], said["kind"], said["width_mm"], said["outcome"]) == ("r.svg", "ranking", 85.0, "pass")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--kind rankin", "Did you mean 'ranking'?"),
+        ("--format pfd", "Did you mean 'pdf'?"),
+        ("--metric mpjpe_m", "Did you mean 'mpjpe_mm'?"),
+        ("--methods ikk", "Did you mean 'ik'?"),
+        ("--kind time --clip walk_1", "Did you mean 'walk_"),
+        ("--kind time --control ikk", "Did you mean 'ik'?"),
+        ("--kind placement", "It is for a placement study."),
+        ("--width 100", "Choose 85 or 170 mm."),
+        ("--condition noise=clean", "no condition of the run called 'noise=clean'. Known: none."),
+    ],
+)
+def test_what_is_refused_says_why(
+    words: str, said: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plot", str(run), "--out", str(tmp_path / "x"), *words.split()]) == 2
+    ended = capsys.readouterr()
+    assert ended.out.splitlines() == ["refused"]
+    assert said in ended.err
+    assert len(ended.err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("failed", "code", "word"), [((), 3, "not comparable"), (("ik on walk_1",), 4, "incomplete")])
+def test_a_run_without_a_measured_cell_ends_as_the_run_did(
+    failed: tuple[str, ...], code: int, word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = write_run(tmp_path / "run", side(metrics={"joint_angle_mean_deg": None}, failed=failed))
+    for verb in ("plot", "table"):
+        assert main([verb, str(out)]) == code
+        ended = capsys.readouterr()
+        assert word in ended.out + ended.err
+        assert "no cell was measured" in ended.err

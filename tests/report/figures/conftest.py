@@ -1,0 +1,25 @@
+"""Runs that several tests draw."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.report.fabricate import Plan, fabricate
+from tests.report.figures.made_up import conditions_run, ranked_run
+
+
+@pytest.fixture(scope="session")
+def ranked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return ranked_run(tmp_path_factory.mktemp("ranked") / "run")
+
+
+@pytest.fixture(scope="session")
+def conditions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return conditions_run(tmp_path_factory.mktemp("conditions") / "run")
+
+
+@pytest.fixture(scope="session")
+def framed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two clips with frames, four methods, each with twice the errors in the second condition."""
+    plan = Plan(("walking",), takes=2, duration_s=3.0, varied=({"noise": "clean"}, {"noise": "default"}))
+    return fabricate(tmp_path_factory.mktemp("framed") / "run", plan)

@@ -1,0 +1,92 @@
+"""Conditions of a run: which there are, how they are chosen, and that each is ranked as the terminal ranks it."""
+
+from pathlib import Path
+
+import pytest
+
+from harness.errors import BadFile, BadInput, NothingMeasured, Outcome, UnknownName
+from harness.report.figures.conditions import check_metric, read_conditions
+from harness.report.run.ranking import describe_rankings
+from harness.results.storage import read_summary
+from tests.compare.sides import side, write_run
+from tests.report.fabricate import Plan, fabricate
+from tests.report.figures.made_up import ranked_run
+
+
+def test_a_run_of_one_condition_needs_no_name(ranked: Path) -> None:
+    (only,) = read_conditions(ranked).conditions
+    assert only.name == ""
+    assert only.series == ("expert_map", "twin_map", "ik", "mean_pose")
+    assert len(only.clips) == 15
+
+
+def test_varied_values_and_performers_are_conditions(conditions: Path) -> None:
+    run = read_conditions(conditions)
+    names = [f"noise={noise}, {who} performers" for noise in ("clean", "default") for who in ("known", "new")]
+    assert [each.name for each in run.conditions] == names
+    assert [len(each.clips) for each in run.conditions] == [8, 3, 8, 3]
+    for each in run.conditions:
+        assert {row["performer"] for row in each.cells} == {each.group.performer}
+        assert {row["noise"] for row in each.cells} == {each.varied["noise"]}
+    assert [each.name for each in run.select("noise=clean").conditions] == names[:2]
+    assert [each.name for each in run.select("new performers, noise=default").conditions] == names[3:]
+    with pytest.raises(UnknownName, match=r"no condition of the run called 'noise=cleen'\. Did you mean 'noise=clean'"):
+        run.select("noise=cleen")
+
+
+def test_each_lag_is_a_condition(tmp_path: Path) -> None:
+    plan = Plan(("walking",), {"ik": 1.0, "late": 0.5}, duration_s=2.0, lags={"late": 2})
+    run = read_conditions(fabricate(tmp_path / "run", plan))
+    assert [each.name for each in run.conditions] == ["no lag", "a lag of 2 frames"]
+    assert [each.series for each in run.conditions] == [("ik",), ("late (lag 2)",)]
+
+
+def test_methods_are_chosen_in_the_order_of_their_names(ranked: Path) -> None:
+    run = read_conditions(ranked).select(methods=["mean_pose", "ik"])
+    assert run.conditions[0].series == ("mean_pose", "ik")
+    ranking = run.conditions[0].rank()
+    assert ranking is not None
+    assert list(ranking.values) == ["ik", "mean_pose"]
+    with pytest.raises(UnknownName, match="Did you mean 'expert_map'"):
+        read_conditions(ranked).select(methods=["expert_mapp"])
+
+
+def test_the_ranking_is_that_of_the_terminal(ranked: Path) -> None:
+    ((text, lowest),) = describe_rankings(read_summary(ranked), "motion")
+    ranking = read_conditions(ranked).conditions[0].rank()
+    assert ranking is not None
+    assert ranking.lowest == lowest == "expert_map"
+    assert ranking.others("better") == ["ik", "mean_pose"]
+    assert "It is better than ik, mean_pose." in text
+    assert "Cannot tell whether it is better than twin_map" in text
+
+
+@pytest.mark.parametrize(("failed", "outcome"), [((), Outcome.NOT_COMPARABLE), (("ik on walk_1",), Outcome.INCOMPLETE)])
+def test_a_run_without_a_measured_cell_has_the_outcome_of_the_run(
+    failed: tuple[str, ...], outcome: Outcome, tmp_path: Path
+) -> None:
+    write_run(tmp_path / "run", side(metrics={"joint_angle_mean_deg": None}, failed=failed))
+    with pytest.raises(NothingMeasured, match="no cell was measured") as refused:
+        read_conditions(tmp_path / "run")
+    assert refused.value.outcome is outcome
+
+
+def test_cells_that_failed_are_counted(tmp_path: Path) -> None:
+    run = read_conditions(write_run(tmp_path / "run", side(failed=("ik on walk_99",))))
+    assert run.missing_note == " 1 of 9 planned cells were not measured."
+    assert read_conditions(ranked_run(tmp_path / "whole")).missing_note == ""
+
+
+def test_a_damaged_summary_is_refused(tmp_path: Path) -> None:
+    out = ranked_run(tmp_path / "run")
+    (out / "summary.json").write_text("{}")
+    with pytest.raises(BadFile):
+        read_conditions(out)
+
+
+def test_a_metric_that_does_not_fit_is_told_from_one_that_does_not_exist() -> None:
+    check_metric("mpjpe_mm", ("mpjpe_mm",), "metric that ranks methods")
+    with pytest.raises(UnknownName, match="Did you mean 'mpjpe_mm'"):
+        check_metric("mpjpe_m", ("mpjpe_mm",), "metric that ranks methods")
+    with pytest.raises(BadInput, match="lag_ms is no metric that ranks methods"):
+        check_metric("lag_ms", ("mpjpe_mm",), "metric that ranks methods")

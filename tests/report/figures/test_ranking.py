@@ -1,0 +1,119 @@
+"""The ranking figure: every method is named, leader and ties are marked, and few clips are called few."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.text import Text
+
+from harness.compare.paired_statistics import mean_interval
+from harness.errors import BadInput
+from harness.report.figures.conditions import read_conditions
+from harness.report.figures.ranking import ranking_figure
+from harness.report.figures.selection import FigureSelection
+from harness.report.kit.ranking_chart import wrap_name
+from harness.report.kit.style import COLOURS, FAINT
+from tests.compare.sides import cell, side, write_run
+from tests.report.drawing import texts_apart
+from tests.report.figures.made_up import drawn, ranked_run, spans
+
+
+@pytest.mark.parametrize("width_mm", [85, 170])
+def test_rows_have_the_means_intervals_and_differences_of_the_ranking(ranked: Path, width_mm: int) -> None:
+    run = read_conditions(ranked)
+    ranking = run.conditions[0].rank()
+    assert ranking is not None
+    with drawn(ranking_figure(run, FigureSelection()), width_mm) as figure:
+        means, differences = figure.axes
+        assert [text.get_text() for text in means.get_yticklabels()] == list(ranking.values)
+        dots = [float(np.ravel(line.get_xdata())[0]) for line in means.lines]
+        np.testing.assert_allclose(dots, list(ranking.means.values()))
+        np.testing.assert_allclose(
+            spans(means.collections, 0), [mean_interval(values) for values in ranking.values.values()]
+        )
+        shown = [float(np.ravel(line.get_xdata())[0]) for line in differences.lines[1:]]
+        np.testing.assert_allclose(shown, [0.0, *ranking.differences.values()])
+        expected = [(-r.high, -r.low) for r in ranking.results.values() if r.low is not None and r.high is not None]
+        np.testing.assert_allclose(spans(differences.collections, 0), expected)
+        texts_apart(figure)
+
+
+def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None:
+    with drawn(ranking_figure(read_conditions(ranked), FigureSelection())) as figure:
+        marks = [(line.get_marker(), to_hex(line.get_color())) for line in figure.axes[0].lines]
+        assert marks == [("D", COLOURS[1]), ("o", COLOURS[1]), ("s", FAINT), ("s", FAINT)]
+        assert figure.axes[0].get_yticklabels()[0].get_fontweight() == "bold"
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == ["lowest mean", "tied with it", "worse"]
+        assert figure.axes[0].get_xlabel().split() == ["joint", "angle", "error", "[deg]"]
+
+
+def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
+    figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
+    assert "Fewer than 6 clips cannot show a difference." in figure.caption
+    with drawn(figure) as shown:
+        heading = shown.axes[0].get_title(loc="left")
+        assert " ".join(heading.split()) == "4 clips: differences cannot be shown"
+        assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o"}
+
+
+def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
+    figure = ranking_figure(read_conditions(conditions), FigureSelection())
+    with drawn(figure) as shown:
+        headings = [" ".join(axes.get_title(loc="left").split()) for axes in shown.axes[::2]]
+        assert headings == [
+            "noise=clean, known performers (8 clips)",
+            "noise=clean, new performers (3 clips): differences cannot be shown",
+            "noise=default, known performers (8 clips)",
+            "noise=default, new performers (3 clips): differences cannot be shown",
+        ]
+        assert len({axes.get_xlim() for axes in shown.axes[::2]}) == 1
+        written = [text for text in shown.findobj(Text) if " ".join(text.get_text().split()) in headings]
+        assert len(written) == 4
+        for text in written:  # the layout does not know how wide a heading is
+            assert text.get_window_extent().x1 <= shown.bbox.x1
+        texts_apart(shown)
+
+
+def test_long_names_stay_on_the_figure(tmp_path: Path) -> None:
+    long = "dynamic_map[widening=200,gate.reach_m=0.5]+ik"
+    out = write_run(tmp_path / "run", side(methods={long: 1.0, "ik": 2.0}, inputs="pos+torso_ori"))
+    with drawn(ranking_figure(read_conditions(out), FigureSelection())) as figure:
+        texts_apart(figure)
+        left, right = figure.axes
+        assert left.get_window_extent().width > 0.2 * figure.bbox.width
+        assert right.get_window_extent().width > 0.2 * figure.bbox.width
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("ik", 1),
+        ("dynamic_map:literal", 1),
+        ("dynamic_map[widening=200,gate.reach_m=0.5]+ik", 3),
+        ("x" * 100, 3),
+    ],
+)
+def test_names_are_broken_where_they_have_parts(name: str, lines: int) -> None:
+    wrapped = wrap_name(name)
+    assert wrapped.count("\n") == lines - 1
+    assert max(map(len, wrapped.splitlines())) <= 25
+    if len(name) < 60:
+        assert wrapped.replace("\n", "") == name
+
+
+def test_one_method_has_no_difference(ranked: Path) -> None:
+    figure = ranking_figure(read_conditions(ranked).select(methods=["ik"]), FigureSelection())
+    assert "difference" not in figure.caption
+    with drawn(figure) as shown:
+        assert len(shown.axes) == 1
+
+
+def test_methods_without_a_common_clip_are_not_ranked(tmp_path: Path) -> None:
+    results = side()
+    cells = (cell("a", "ik"), cell("b", "expert_map"))
+    out = write_run(tmp_path / "run", replace(results, cells=cells, planned=2))
+    with pytest.raises(BadInput, match="No clip of"):
+        ranking_figure(read_conditions(out), FigureSelection())

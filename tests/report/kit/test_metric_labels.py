@@ -1,0 +1,13 @@
+"""Labels of metrics name the quantity and the unit."""
+
+from harness.report.kit.metric_labels import metric_label, quantity
+from harness.score.metrics import DEFINITIONS
+
+
+def test_every_label_ends_with_the_unit_and_no_two_metrics_share_one() -> None:
+    labels = {name: metric_label(name) for name in DEFINITIONS}
+    assert all(label.endswith(f" [{DEFINITIONS[name].unit}]") for name, label in labels.items())
+    assert len(set(labels.values())) == len(labels)
+    assert not any("_" in label for label in labels.values())
+    assert metric_label("joint_angle_mean_deg") == "joint angle error [deg]"
+    assert quantity("frames_held") == "frames held"
