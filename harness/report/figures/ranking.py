@@ -7,9 +7,12 @@ from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, che
 from harness.report.figures.selection import FigureSelection
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.print_figure import PrintFigure
-from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, ranking_height_mm
+from harness.report.kit.ranking_chart import RankingPanel, draw_ranking
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
+
+_HEIGHT_MM = 60.0
+"""Height before the rows are counted."""
 
 
 def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
@@ -25,7 +28,7 @@ def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure
         "ranking" if metric == PRIMARY_METRIC else f"ranking_{metric}",
         _caption(run, metric, panels),
         lambda figure: draw_ranking(figure, panels, quantity(metric), unit),
-        ranking_height_mm(panels),
+        _HEIGHT_MM,
     )
 
 

@@ -18,12 +18,12 @@ _LOWEST: Mapping[str, Any] = {"marker": "D", "color": COLOURS[1], "label": "lowe
 _TIED: Mapping[str, Any] = {"marker": "o", "color": COLOURS[1], "markerfacecolor": PAPER, "label": "tied with it"}
 _WORSE: Mapping[str, Any] = {"marker": "s", "color": FAINT, "label": "worse"}
 """Marks of a row; they differ in shape and filling, so that they can be told apart without colour."""
-_ROW_MM, _FRAME_MM, _TITLE_MM = 4.2, 20.0, 8.0
-"""Height of a line of text of a row, of axis and legend, and of a panel's title [mm]."""
-_LETTERS, _MOST_LINES, _TITLE_LETTERS_PER_IN = 24, 3, 10.0
-"""Letters of a line of a name, its most lines, and letters of a line of a title for each inch of the figure."""
-_ONE_LINE_FROM_IN = 6.0
-"""Width of a figure from which on labels of axes have one line, in text of 10 pt [in]."""
+_ROW_IN, _FRAME_IN, _TITLE_IN = 0.2, 0.95, 0.4
+"""Heights in text of 10 pt [in]: a line of text of a row, axis and legend, the heading of a panel."""
+_NAME_LETTERS, _LABEL_LETTERS, _HEADING_LETTERS = 5.0, 4.0, 13.0
+"""Letters of a line for each inch of width, in text of 10 pt: of a name, of the label of an axis, of a heading."""
+_MOST_LINES = 3
+"""Most lines of a name."""
 _DOT, _LINE = 4.4, 1.6
 """Size of a dot and width of an interval in text of 10 pt [pt]."""
 
@@ -44,84 +44,85 @@ class RankingPanel:
         too_few = ": differences cannot be shown" if clips < MIN_CLIPS and self.ranking.results else ""
         return f"{self.title} ({counted}){too_few}" if self.title else f"{counted}{too_few}"
 
-    @property
-    def names(self) -> list[str]:
-        """The name of each row in several lines."""
-        return [wrap_name(name) for name in self.ranking.values]
-
-    @property
-    def lines(self) -> int:
-        """Lines of text of all rows."""
-        return sum(1 + name.count("\n") for name in self.names)
+    def wrapped_names(self, letters: int) -> list[str]:
+        """The name of each row, in lines of about so many letters."""
+        return [wrap_name(name, letters) for name in self.ranking.values]
 
 
-def wrap_name(name: str, letters: int = _LETTERS) -> str:
+def wrap_name(name: str, letters: int) -> str:
     """A name in at most three lines, broken at blanks, commas, brackets, colons and plus signs where possible."""
     breakable = "".join(f"{sign} " if sign in ",:+" else f" {sign}" if sign in "[(" else sign for sign in name)
     lines = textwrap.wrap(breakable, letters) if len(name) > letters else [name]
     for sign in ",:+":
         lines = [line.replace(f"{sign} ", sign) for line in lines]
     lines = [line.replace(" [", "[") for line in lines]
-    kept = lines[:_MOST_LINES]
-    return "\n".join(kept) + ("…" if len(lines) > _MOST_LINES else "")
-
-
-def ranking_height_mm(panels: Sequence[RankingPanel]) -> float:
-    """Height of the chart in print [mm]."""
-    return _FRAME_MM + sum(_TITLE_MM + _ROW_MM * panel.lines for panel in panels)
+    return "\n".join(lines[:_MOST_LINES]) + ("…" if len(lines) > _MOST_LINES else "")
 
 
 def draw_ranking(figure: "Figure", panels: Sequence[RankingPanel], quantity: str, unit: str) -> None:
     """Draw the panels below each other: means on the left, differences to the lowest mean on the right.
 
-    Without any other method to compare with there are means alone.
+    Without any other method to compare with there are means alone. The figure gets the height that the rows need.
     """
     from matplotlib.ticker import MaxNLocator
 
-    compared = any(panel.ranking.results for panel in panels)
-    ratios = [panel.lines + 0.6 for panel in panels]
-    grid = figure.subplots(len(panels), 1 + compared, sharex="col", squeeze=False, height_ratios=ratios)
-    for row, panel in zip(grid, panels, strict=True):
-        _draw_means(row[0], panel)
+    scale, compared = mark_scale(), any(panel.ranking.results for panel in panels)
+    width = figure.get_figwidth() / scale
+    names = [panel.wrapped_names(int(_NAME_LETTERS * width)) for panel in panels]
+    lines = [sum(1 + name.count("\n") for name in of) for of in names]
+    figure.set_figheight(scale * (_FRAME_IN + sum(_TITLE_IN + _ROW_IN * count for count in lines)))
+    grid = figure.subplots(len(panels), 1 + compared, sharex="col", squeeze=False, height_ratios=lines)
+    for row, panel, of in zip(grid, panels, names, strict=True):
+        places = _places(of)
+        _draw_means(row[0], panel.ranking, places)
+        row[0].set_yticks(places, of)
+        row[0].get_yticklabels()[0].set_fontweight("bold")
         if compared:
-            _draw_differences(row[1], panel.ranking)
+            _draw_differences(row[1], panel.ranking, places)
         for axes in row:
-            axes.set_ylim(len(panel.ranking.values) - 0.4, -0.6)
+            axes.set_ylim(places[-1] + 0.6 + 0.5 * of[-1].count("\n"), -0.6 - 0.5 * of[0].count("\n"))
             axes.grid(False, axis="y")
             axes.tick_params(axis="y", length=0)
-        _draw_heading(row, panel.heading, int(_TITLE_LETTERS_PER_IN * figure.get_figwidth() / mark_scale()))
-    gap = "\n" if compared and figure.get_figwidth() < _ONE_LINE_FROM_IN * mark_scale() else " "
+        _draw_heading(row, textwrap.fill(panel.heading, int(_HEADING_LETTERS * width)))
     for axes, name in zip(grid[-1], (quantity, "difference to the lowest"), strict=False):
-        axes.set_xlabel(f"{name}{gap}[{unit}]")
+        letters = int((1.0 if compared else 2.0) * _LABEL_LETTERS * width)
+        axes.set_xlabel(textwrap.fill(f"{name} [{unit}]", letters))
         axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     if compared:
         _add_legend(figure, panels)
 
 
-def _draw_heading(row: Sequence["Axes"], heading: str, letters: int) -> None:
-    """Write the heading over the whole row: the layout leaves its height free, but not its width."""
-    text = textwrap.fill(heading, letters)
-    row[0].set_title(text, loc="left").set_in_layout(False)
-    row[-1].set_title("\n".join(" " for _ in text.splitlines()), loc="right")
+def _places(names: Sequence[str]) -> list[float]:
+    """The vertical position of each row: lines of text from the middle of the first one."""
+    heights = [1 + name.count("\n") for name in names]
+    return [sum(heights[:n]) + 0.5 * (heights[n] - heights[0]) for n in range(len(heights))]
 
 
-def _draw_means(axes: "Axes", panel: RankingPanel) -> None:
-    ranking = panel.ranking
-    for y, (name, values) in enumerate(ranking.values.items()):
+def _draw_heading(row: Sequence["Axes"], heading: str) -> None:
+    """Write the heading from the left edge of the figure; the layout leaves its height free, but not its width."""
+    row[-1].set_title("\n".join(" " for _ in heading.splitlines()), loc="right")
+    start = ("figure fraction", "axes fraction")
+    size = row[0].title.get_fontsize()
+    note = row[0].annotate(
+        heading, (0.01, 1.0), (0, 4), xycoords=start, textcoords="offset points", va="bottom", fontsize=size
+    )
+    note.set_in_layout(False)
+
+
+def _draw_means(axes: "Axes", ranking: MethodRanking, places: Sequence[float]) -> None:
+    for y, (name, values) in zip(places, ranking.values.items(), strict=True):
         style = _mark(ranking, name)
         if len(values) > 1:
             axes.hlines(y, *mean_interval(values), color=style["color"], linewidth=_LINE * mark_scale())
         _draw_dot(axes, float(values.mean()), y, style)
-    axes.set_yticks(range(len(panel.names)), panel.names)
-    axes.get_yticklabels()[0].set_fontweight("bold")
 
 
-def _draw_differences(axes: "Axes", ranking: MethodRanking) -> None:
+def _draw_differences(axes: "Axes", ranking: MethodRanking, places: Sequence[float]) -> None:
     axes.axvline(0.0, color=INK, linewidth=0.7)
-    for y, name in enumerate(ranking.values):
+    for y, name in zip(places, ranking.values, strict=True):
         style = _mark(ranking, name)
-        if y == 0:
+        if name == ranking.lowest:
             _draw_dot(axes, 0.0, y, style)
             continue
         result, difference = ranking.results[name], ranking.differences[name]

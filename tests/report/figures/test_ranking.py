@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
-from matplotlib.text import Text
 
 from harness.compare.paired_statistics import mean_interval
 from harness.errors import BadInput
@@ -54,35 +53,31 @@ def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
     figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
     assert "Fewer than 6 clips cannot show a difference." in figure.caption
     with drawn(figure) as shown:
-        heading = shown.axes[0].get_title(loc="left")
-        assert " ".join(heading.split()) == "4 clips: differences cannot be shown"
+        (heading,) = shown.axes[0].texts
+        assert heading.get_text() == "4 clips: differences cannot be shown"
         assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o"}
 
 
 def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
     figure = ranking_figure(read_conditions(conditions), FigureSelection())
     with drawn(figure) as shown:
-        headings = [" ".join(axes.get_title(loc="left").split()) for axes in shown.axes[::2]]
-        assert headings == [
+        assert [" ".join(text.get_text().split()) for axes in shown.axes for text in axes.texts] == [
             "noise=clean, known performers (8 clips)",
             "noise=clean, new performers (3 clips): differences cannot be shown",
             "noise=default, known performers (8 clips)",
             "noise=default, new performers (3 clips): differences cannot be shown",
         ]
         assert len({axes.get_xlim() for axes in shown.axes[::2]}) == 1
-        written = [text for text in shown.findobj(Text) if " ".join(text.get_text().split()) in headings]
-        assert len(written) == 4
-        for text in written:  # the layout does not know how wide a heading is
-            assert text.get_window_extent().x1 <= shown.bbox.x1
         texts_apart(shown)
 
 
 def test_long_names_stay_on_the_figure(tmp_path: Path) -> None:
-    long = "dynamic_map[widening=200,gate.reach_m=0.5]+ik"
-    out = write_run(tmp_path / "run", side(methods={long: 1.0, "ik": 2.0}, inputs="pos+torso_ori"))
+    methods = {f"dynamic_map[widening={n},gate.reach_m=0.5]+ik": float(n) for n in (1, 2, 3)} | {"ik": 2.0}
+    out = write_run(tmp_path / "run", side(methods=methods))
     with drawn(ranking_figure(read_conditions(out), FigureSelection())) as figure:
         texts_apart(figure)
         left, right = figure.axes
+        assert left.get_yticklabels()[0].get_text().count("\n") == 2
         assert left.get_window_extent().width > 0.2 * figure.bbox.width
         assert right.get_window_extent().width > 0.2 * figure.bbox.width
 
@@ -97,7 +92,7 @@ def test_long_names_stay_on_the_figure(tmp_path: Path) -> None:
     ],
 )
 def test_names_are_broken_where_they_have_parts(name: str, lines: int) -> None:
-    wrapped = wrap_name(name)
+    wrapped = wrap_name(name, 24)
     assert wrapped.count("\n") == lines - 1
     assert max(map(len, wrapped.splitlines())) <= 25
     if len(name) < 60:
