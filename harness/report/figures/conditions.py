@@ -9,6 +9,7 @@ from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
 from harness.errors import BadInput, NothingMeasured, UnknownName
 from harness.report.kit.ranking import name_lag
+from harness.report.kit.text import list_first
 from harness.report.run.data import Row, lag_of, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
 from harness.results.cell import varied_text
@@ -17,6 +18,7 @@ from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary
 from harness.score.metrics import DEFINITIONS
 
+_MOST_NAMED = 6
 RANKING_METRICS = tuple(
     name for name, margin in MARGINS.items() if margin.rise_is_worse and name not in UNRANKED_METRICS
 )
@@ -156,6 +158,12 @@ def _select_methods(conditions: Sequence[RunCondition], names: Sequence[str]) ->
         if cells:
             selected.append(replace(each, cells=tuple({row["key"]: row for row in cells}.values())))
     return tuple(selected)
+
+
+def describe_absent(series: Iterable[str], shown: Iterable[str]) -> str:
+    """Sentence of a caption on the series that a figure cannot show; empty if it shows all of them."""
+    absent = sorted(set(series) - set(shown))
+    return f" Not measured: {list_first(absent, _MOST_NAMED)}." if absent else ""
 
 
 def check_metric(metric: str, known: Iterable[str], kind: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.report.figures.conditions import ConditionSet, check_metric
+from harness.report.figures.conditions import ConditionSet, check_metric, describe_absent
 from harness.report.figures.selection import FigureSelection
 from harness.report.figures.traces import choose_condition, read_series
 from harness.report.kit.chart import add_legend
@@ -46,7 +46,7 @@ def distribution_figure(run: ConditionSet, selection: FigureSelection) -> PrintF
     return PrintFigure(
         "cdf" if metric == WORST_METRICS[0] else f"cdf_{metric}",
         f"Share of frames whose {quantity(metric)} is below a value: {frames:,} frames of {where}. Curves further left "
-        f"are better. The axis is logarithmic.{run.missing_note}",
+        f"are better. The axis is logarithmic.{describe_absent(condition.series, measured)}{run.missing_note}",
         draw,
         _HEIGHT_MM,
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.compare.ranking import shared_clips
 from harness.errors import BadInput
-from harness.report.figures.conditions import ConditionSet, RunCondition, check_metric
+from harness.report.figures.conditions import ConditionSet, RunCondition, check_metric, describe_absent
 from harness.report.figures.selection import FigureSelection
 from harness.report.figures.traces import Highlights, choose_condition, choose_highlights, read_series
 from harness.report.kit.chart import add_legend, insert_gaps
@@ -46,7 +46,8 @@ def over_time_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigu
     return PrintFigure(
         f"time_{to_file_name(clip)}" + ("" if metric == WORST_METRICS[0] else f"_{metric}"),
         f"{quantity(metric).capitalize()} over time on {where}. {_describe(highlights)} "
-        f"The warm-up is left out. The axis is logarithmic.{run.missing_note}",
+        "The warm-up is left out. The axis is logarithmic."
+        f"{describe_absent(condition.series, traces)}{run.missing_note}",
         lambda figure: _draw(figure, traces, metric, highlights),
         _HEIGHT_MM,
     )

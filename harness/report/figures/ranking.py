@@ -3,7 +3,7 @@
 from harness.compare.paired_statistics import MIN_CLIPS
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, check_metric
+from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, check_metric, describe_absent
 from harness.report.figures.selection import FigureSelection
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.print_figure import PrintFigure
@@ -19,22 +19,25 @@ def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure
     """The ranking of every selected condition, by the statistics of `harness compare`."""
     metric = selection.metric
     check_metric(metric, RANKING_METRICS, "metric that ranks methods")
-    ranked = [(each.name, each.rank(metric)) for each in run.conditions]
-    panels = [RankingPanel(name, ranking) for name, ranking in ranked if ranking]
+    ranked = [(each, ranking) for each in run.conditions if (ranking := each.rank(metric))]
+    panels = [RankingPanel(each.name, ranking) for each, ranking in ranked]
     if not panels:
         raise BadInput(f"No clip of {run.folder} has {metric} of every method.", "Choose methods with --methods.")
     unit = DEFINITIONS[metric].unit
     return PrintFigure(
         "ranking" if metric == PRIMARY_METRIC else f"ranking_{metric}",
-        _caption(run, metric, panels),
+        _caption(run, metric, [each for each, _ in ranked], panels),
         lambda figure: draw_ranking(figure, panels, quantity(metric), unit),
         _HEIGHT_MM,
     )
 
 
-def _caption(run: ConditionSet, metric: str, panels: list[RankingPanel]) -> str:
+def _caption(run: ConditionSet, metric: str, shown: list[RunCondition], panels: list[RankingPanel]) -> str:
     counts = list(dict.fromkeys(count_noun(len(panel.ranking.clips), "clip") for panel in panels))
-    sentences = [f"Mean {quantity(metric)} on {' and '.join(counts)} with its 95 % interval over clips."]
+    fewer = any(len(panel.ranking.clips) < len(each.clips) for each, panel in zip(shown, panels, strict=True))
+    clips = " and ".join(counts) + (" that all methods were measured on" if fewer else "")
+    interval = " with its 95 % interval over clips" if any(len(panel.ranking.clips) > 1 for panel in panels) else ""
+    sentences = [f"Mean {quantity(metric)} on {clips}{interval}."]
     if any(panel.ranking.results for panel in panels):
         sentences += [
             "Right: paired difference to the method with the lowest mean, with its 95 % interval.",
@@ -44,4 +47,6 @@ def _caption(run: ConditionSet, metric: str, panels: list[RankingPanel]) -> str:
         sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference.")
     unranked = len(run.conditions) - len(panels)
     sentences += [f"In {count_noun(unranked, 'condition')} the methods share no clip."] if unranked else []
-    return " ".join(sentences) + run.missing_note
+    expected = (name for each in shown for name in each.series)
+    absent = describe_absent(expected, (name for panel in panels for name in panel.ranking.values))
+    return " ".join(sentences) + absent + run.missing_note

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile, BadInput, NothingMeasured, Outcome, UnknownName
-from harness.report.figures.conditions import check_metric, read_conditions
+from harness.report.figures.conditions import check_metric, describe_absent, read_conditions
 from harness.report.run.ranking import describe_rankings
 from harness.results.storage import read_summary
 from tests.compare.sides import side, write_run
@@ -82,6 +82,11 @@ def test_a_damaged_summary_is_refused(tmp_path: Path) -> None:
     (out / "summary.json").write_text("{}")
     with pytest.raises(BadFile):
         read_conditions(out)
+
+
+def test_what_a_figure_cannot_show_is_named() -> None:
+    assert describe_absent(["a", "b", "c"], ["b"]) == " Not measured: a, c."
+    assert describe_absent(["a"], ["a"]) == ""
 
 
 def test_a_metric_that_does_not_fit_is_told_from_one_that_does_not_exist() -> None:

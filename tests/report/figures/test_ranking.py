@@ -106,6 +106,21 @@ def test_one_method_has_no_difference(ranked: Path) -> None:
         assert len(shown.axes) == 1
 
 
+def test_methods_that_were_not_measured_and_clips_that_not_all_share_are_named(tmp_path: Path) -> None:
+    whole = side(methods={"ik": 2.0, "expert_map": 1.0}, clips=8)
+    silent = side(methods={"silent": 1.0}, clips=8, metrics={"joint_angle_mean_deg": None})
+    cells = (*whole.cells[:-1], *silent.cells)
+    out = write_run(tmp_path / "run", replace(whole, cells=cells, planned=len(cells)))
+    caption = ranking_figure(read_conditions(out), FigureSelection()).caption
+    assert caption.startswith("Mean joint angle error on 7 clips that all methods were measured on with its 95 %")
+    assert caption.endswith(" Not measured: silent.")
+
+
+def test_one_clip_has_no_interval(tmp_path: Path) -> None:
+    caption = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=1)), FigureSelection()).caption
+    assert caption.startswith("Mean joint angle error on 1 clip. Right:")
+
+
 def test_methods_without_a_common_clip_are_not_ranked(tmp_path: Path) -> None:
     results = side()
     cells = (cell("a", "ik"), cell("b", "expert_map"))
