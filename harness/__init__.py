@@ -9,7 +9,7 @@ The public names, which are imported when they are first used:
 | `load`           | loads the folder of a run or sweep: results of each cell, arrays of each frame        |
 | `compare_runs`   | compares two results and tells whether the second is worse                            |
 | `methods`        | lists the registered methods by name                                                  |
-| `read_clip`      | reads a motion file: AMC, BVH or AMASS npz                                            |
+| `read_clip`      | reads a motion file: AMC, BVH, MVNX or AMASS npz                                      |
 | `simulate_clip`  | simulates what a tracker reports while a clip is performed                            |
 | `score_estimate` | scores an estimated motion against the truth                                          |
 | `Is900`          | reads frames from an IS-900 at a serial port or TCP address                           |

@@ -4,7 +4,10 @@ import argparse
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
+
+_FORMATS = ("bvh", "trc", "mot", "sto", "csv", "tum", "glb")
+"""`mocap.write.export.FORMATS`, which help shows without importing numpy."""
 
 
 def add_export(verbs: Verbs) -> None:
@@ -12,14 +15,27 @@ def add_export(verbs: Verbs) -> None:
         verbs, "export", "write the true and estimated motion of a run for other programs", run_export, "out"
     )
     verb.add_argument("run", type=Path, help="folder written by `harness run`")
-    verb.add_argument("--format", required=True, choices=["bvh", "trc", "csv", "tum"], help="format of the files")
+    verb.add_argument("--format", required=True, choices=_FORMATS, help="format of the files")
+    text = "only these {}: names or patterns such as {}; may be repeated (default: all)"
+    verb.add_argument("--clip", action="append", default=[], metavar="A,B", help=text.format("clips", "walking_*"))
+    verb.add_argument("--method", action="append", default=[], metavar="A,B", help=text.format("methods", "ik*"))
     verb.add_argument("--force", action="store_true", help="overwrite files that exist")
 
 
 def run_export(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.write.export import export
-    from harness.results.storage import read_cells
+    from harness.experiment.run_export import export_run
 
     folder = args.out or args.run / "export" / args.format
-    files = export(read_cells(args.run), args.format, folder, force=args.force)
+    clips, methods = _entries("clip", args.clip), _entries("method", args.method)
+    files = export_run(args.run, args.format, folder, clips=clips, methods=methods, force=args.force)
     return print_result(args, {"files": [str(f) for f in files]}, f"{len(files)} files in {folder}")
+
+
+def _entries(flag: str, texts: list[str]) -> list[str]:
+    """The entries of lists that are separated by commas outside brackets; BadInput for an empty entry."""
+    from harness.core.options import split_outside_brackets
+
+    entries = [entry for text in texts for entry in split_outside_brackets(text, ",")]
+    if not all(entries):
+        raise BadInput(f"--{flag} {','.join(texts)!r} names no {flag}.", "Separate names by commas: A,B.")
+    return entries

@@ -15,7 +15,7 @@ def add_inspect(verbs: Verbs) -> None:
         run_inspect,
         "mocap",
     )
-    verb.add_argument("file", type=Path, help="an AMC, BVH, C3D or AMASS npz file")
+    verb.add_argument("file", type=Path, help="an AMC, BVH, MVNX, C3D or AMASS npz file")
     verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second of a file that records no rate")
     text = "metres per unit of length of a file that records no unit"
     verb.add_argument("--unit", metavar="M", type=float, help=text)

@@ -30,7 +30,7 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
         print(note, file=sys.stderr)
     if not entries:
         raise BadInput(
-            "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .npz and .c3d files."
+            "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .mvnx, .npz and .c3d files."
         )
     return print_result(args, {"clips": [entry.as_dict() for entry in entries]}, *(entry.line() for entry in entries))
 

@@ -23,7 +23,7 @@ from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.remote_method import hash_method
-from harness.experiment.scenario import Scenario, ScenarioMotion
+from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,
@@ -49,10 +49,12 @@ from harness.simulate.trajectory import Trajectory
 
 def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
     """Nominal mounts of the stations that are worn."""
-    return tuple(
-        Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
-        for name, s in scenario.worn_stations.items()
-    )
+    return tuple(mount_of(name, station) for name, station in scenario.worn_stations.items())
+
+
+def mount_of(name: str, station: Station) -> Mount:
+    """Nominal mount of a station."""
+    return Mount(name, station.bone, station.along, float(np.deg2rad(station.around_deg)), station.stand_off_m)
 
 
 def tracker_of(scenario: Scenario) -> TrackerConfig:

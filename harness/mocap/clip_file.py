@@ -9,7 +9,7 @@ from harness.core.skeleton import unwrap_angles
 from harness.errors import BadFile, BadInput
 from harness.mocap.index import rate_from_index, unknown_rate_error
 
-FORMATS = ("amc", "bvh", "npz", "c3d")
+FORMATS = ("amc", "bvh", "mvnx", "npz", "c3d")
 """Suffixes of motion files, the preferred one first. C3D files hold markers and cannot be read as a clip."""
 CMU_NAME = re.compile(r"(\d+_\d+)(_poses|_stageii)?")
 """Subject and trial of CMU's library ("13_17"), with the endings that AMASS adds."""
@@ -18,11 +18,11 @@ _ASF_FOLDERS_ABOVE = 3
 
 
 def read_clip(path: Path | str, rate_hz: float | None = None) -> Clip:
-    """Read the motion in an AMC, BVH or AMASS npz file; the suffix tells the format.
+    """Read the motion in an AMC, BVH, MVNX (Xsens) or AMASS npz file; the suffix tells the format.
 
     The clip is in world axes (x forward, y left, z up) [m] with unwrapped angles [rad]. An AMC file moves the skeleton
     of its ASF file (CMU: 30 bones), which is found beside it or up to two folders above. BVH files, of CMU's
-    conversion or written by this package, and AMASS files are fitted to the 24 bones of `core.humanoid24`.
+    conversion or written by this package, MVNX and AMASS files are fitted to the 24 bones of `core.humanoid24`.
 
     `rate_hz` is the frame rate of an AMC file, which records none [Hz]; without it, the `manifest.csv` of a folder
     above must name the rate. Raises BadFile for a file that cannot be read; BadInput for an AMC file of unknown rate,
@@ -42,12 +42,16 @@ def read_library_file(path: Path, top: Path, rate_hz: float | None) -> Clip:
     """`read_clip` for a file of the library in the folder `top`; `rate_hz` is used for AMC files only [Hz]."""
     kind = motion_format(path)
     if kind == "c3d":
-        advice = "Give its AMC, BVH or npz file; `harness.mocap.read.c3d.read_c3d` reads the markers."
+        advice = "Give its AMC, BVH, MVNX or npz file; `harness.mocap.read.c3d.read_c3d` reads the markers."
         raise BadInput(f"{path.name} is a C3D file, which holds markers.", advice)
     if kind == "bvh":
         from harness.mocap.read.bvh import read_bvh_clip
 
         clip = read_bvh_clip(path)
+    elif kind == "mvnx":
+        from harness.mocap.read.mvnx import read_mvnx_clip
+
+        clip = read_mvnx_clip(path)
     elif kind == "npz":
         from harness.mocap.read.amass import read_amass_clip
 

@@ -16,7 +16,7 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
-from harness.mocap.clip_file import find_skeleton_file, motion_format
+from harness.mocap.clip_file import find_skeleton_file, motion_format, read_library_file
 from harness.mocap.index import INDEX_NAME, rate_from_index, unknown_rate_error
 from harness.mocap.inspection import Inspection
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
@@ -33,6 +33,8 @@ ROOT_HEIGHT_IN_LEGS = (0.05, 5.0)
 UPRIGHT_SHARE = 0.4
 """Least share of frames with the head over the feet; the cartwheels of 49_08 have 0.59."""
 RATE_IN_FILE = "recorded in the file"
+_IN_METRES = {"mvnx": "MVNX", "npz": "AMASS"}
+"""Formats that are always in metres, and their names."""
 FOOT_HEIGHT_SHARE = 0.12
 """Joints no higher in the rest pose than this share of its height belong to the feet."""
 
@@ -40,7 +42,7 @@ FOOT_HEIGHT_SHARE = 0.12
 def inspect_file(
     path: Path | str, *, rate_hz: float | None = None, unit: float | None = None, library: LibraryFolders | None = None
 ) -> Inspection:
-    """Inspect an AMC, BVH, AMASS npz or C3D file.
+    """Inspect an AMC, BVH, MVNX, AMASS npz or C3D file.
 
     `unit` is the length of 1 in the file [m]. The index of a folder of `library` may name the file's rate, and the
     library may hold the motion that was recorded with the markers of a C3D file. Raises BadFile for a file that cannot
@@ -59,16 +61,15 @@ def inspect_file(
     if kind == "c3d":
         return _inspect_c3d(path, unit, library)
     if unit is not None:
-        raise BadInput(f"{path.name} is in metres, as all AMASS files are.", "Leave out --unit.")
-    from harness.mocap.read.amass import read_amass_clip
-
-    facts = inspect_clip(read_amass_clip(path))
+        raise BadInput(f"{path.name} is in metres, as all {_IN_METRES[kind]} files are.", "Leave out --unit.")
+    facts = inspect_clip(read_library_file(path, path.parent, None))
     return replace(
         facts,
-        format="npz",
-        height_m=None,
+        name=path.stem,
+        format=kind,
+        height_m=None if kind == "npz" else facts.height_m,
         rate_evidence=RATE_IN_FILE,
-        unit_evidence="AMASS is in metres",
+        unit_evidence=f"{_IN_METRES[kind]} is in metres",
         up=f"z ({facts.up})",
     )
 

@@ -15,7 +15,7 @@ class Inspection:
 
     name: str
     format: str
-    """`amc`, `bvh`, `npz`, `c3d` or `clip` (in memory)."""
+    """`amc`, `bvh`, `mvnx`, `npz`, `c3d` or `clip` (in memory)."""
     frames: int
     rate_hz: float
     rate_evidence: str

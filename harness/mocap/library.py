@@ -1,8 +1,8 @@
 """A motion library: motion files in one or several folders, found by clip name and loaded on request.
 
 A clip's name is its subject and trial, such as "13_17". Copies in several formats share the name; the format that
-says most is loaded: AMC (with its ASF), then BVH, then AMASS npz. C3D files are listed, but hold markers instead of the
-motion of a skeleton. What the files do not say (behaviour, rate) comes from the index of each folder
+says most is loaded: AMC (with its ASF), then BVH, MVNX and AMASS npz. C3D files are listed, but hold markers instead of
+the motion of a skeleton. What the files do not say (behaviour, rate) comes from the index of each folder
 (`harness.mocap.index`).
 """
 
@@ -28,7 +28,7 @@ class LibraryEntry:
 
     name: str
     format: str
-    """`amc`, `bvh`, `npz` or `c3d`."""
+    """`amc`, `bvh`, `mvnx`, `npz` or `c3d`."""
     path: Path
     subject: str
     behaviour: str = ""

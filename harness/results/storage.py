@@ -5,7 +5,7 @@ inputs, the method and the source of both, so that edited code never reuses stal
 """
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -104,18 +104,20 @@ def read_summary(out: Path) -> dict[str, Any]:
     return content
 
 
-def read_cells(out: Path) -> Iterator[Cell]:
-    """The finished cells of a run or sweep in planned order, read one at a time.
+def read_cells(out: Path, keys: Collection[str] | None = None) -> Iterator[Cell]:
+    """The finished cells of a run or sweep, or those with one of `keys`, in planned order, read one at a time.
 
     BadFile for a folder that holds no run or a damaged one, at once and not when the first cell is read.
     """
     check_folder(out)
-    return _indexed_cells(out)
+    return _indexed_cells(out, keys)
 
 
-def _indexed_cells(out: Path) -> Iterator[Cell]:
+def _indexed_cells(out: Path, keys: Collection[str] | None) -> Iterator[Cell]:
     with CellIndex(out, read_only=True) as index:
         for row in index.rows():
+            if keys is not None and row["key"] not in keys:
+                continue
             cell = read_cell(cell_folder(out, row["key"]))
             check_row(index.path, row, as_row(cell))
             yield cell

@@ -54,7 +54,7 @@ from harness.study.placement.config import base_scenario, load_placement_study
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
-from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip
+from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
 from tests.reconstruct.database.test_motion_database import make_take
 from tests.report import fabricate, fabricate_paper, fabricate_placement, fabricate_sweep
@@ -287,6 +287,14 @@ KINDS: dict[str, Kind] = {
         Kind("amc", _make_acclaim, ("91_01.amc",), TEXT, _inspect("91_01.amc"), "inspect {}/91_01.amc --rate 120"),
         Kind(
             "bvh", _write("91_01.bvh", bvh_text(clip(6))), ("*",), TEXT, _inspect("91_01.bvh"), "inspect {}/91_01.bvh"
+        ),
+        Kind(
+            "mvnx",
+            _write("91_01.mvnx", mvnx_text(clip(6))),
+            ("*",),
+            TEXT,
+            _inspect("91_01.mvnx"),
+            "inspect {}/91_01.mvnx",
         ),
         Kind("amass", _write("91_01.npz", _npz()), ("*",), NPZ, _inspect("91_01.npz"), "inspect {}/91_01.npz"),
         Kind("c3d header", _write("x.c3d", _c3d()), ("*",), BYTES, lambda folder: check_header(folder / "x.c3d")),

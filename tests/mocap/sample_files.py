@@ -15,15 +15,24 @@ from harness.core.skeleton import Skeleton
 from harness.mocap.read.amass import JOINTS, SMPL_MAP
 from harness.mocap.read.asf import INCH_M, WORLD_FROM_ASF
 from harness.mocap.read.bvh import CMU_MAP
+from harness.mocap.read.joint_clip import FROM_T_POSE
+from harness.mocap.read.mvnx import SEGMENTS
 
 UNIT_M = INCH_M / 0.45
 LEFT_OUT = ("thorax", "lwrist", "rwrist")
 """Bones whose length CMU's BVH conversion leaves out."""
 
 
-def clip(frames: int = 24, *, name: str = "91_01", rate_hz: float = 120.0, wild: bool = False) -> Clip:
-    """Smooth motion of the mean skeleton about a crouch; `wild` angles come near to gimbal lock and wrap."""
-    skeleton = standard_skeleton()
+def clip(
+    frames: int = 24,
+    *,
+    name: str = "91_01",
+    rate_hz: float = 120.0,
+    wild: bool = False,
+    skeleton: Skeleton | None = None,
+) -> Clip:
+    """Smooth motion of a skeleton (the mean one) about a crouch; `wild` angles come near to gimbal lock and wrap."""
+    skeleton = skeleton or standard_skeleton()
     rng = np.random.default_rng(7)
     t = np.arange(frames)[:, None] / rate_hz
     phase = rng.uniform(0.0, 6.0, size=len(skeleton.axes))
@@ -154,6 +163,95 @@ def amass_arrays(motion: Clip) -> dict[str, Floats]:
             local = rotations.multiply(rotations.multiply(smpl_from_ours, local), rotations.inverse(smpl_from_ours))
         poses[:, 3 * j : 3 * j + 3] = rotations.log(local)
     return {"poses": poses, "trans": np.array(motion.root_m), "mocap_framerate": np.array(motion.rate_hz)}
+
+
+_BONE_OF_SEGMENT = {
+    "Pelvis": "root",
+    "L5": "lowerback",
+    "L3": "upperback",
+    "T12": "upperback",
+    "T8": "thorax",
+    "Neck": "lowerneck",
+    "Head": "head",
+    **{
+        f"{side}{segment}": f"{s}{bone}"
+        for side, s in (("Right", "r"), ("Left", "l"))
+        for segment, bone in (
+            *(("Shoulder", "clavicle"), ("UpperArm", "humerus"), ("ForeArm", "wrist"), ("Hand", "hand")),
+            *(("UpperLeg", "femur"), ("LowerLeg", "tibia"), ("Foot", "foot"), ("Toe", "foot")),
+        )
+    },
+}
+
+
+def mvnx_text(motion: Clip, *, version: int = 4, newline: str = "\n") -> str:
+    """The motion as an MVNX file in the layout of MVN 2019 (version 4) or MVN Studio 4 (version 3).
+
+    The head's segment follows the last bone of its chain, and the forearm's the wrist bone.
+    """
+    world, offset = _mvn_orientations(motion), _mvn_offsets(motion.skeleton)
+    pelvis = -0.5 * (offset["RightUpperLeg"] + offset["LeftUpperLeg"])  # the hips' middle, seen from the root
+    offset = {name: vector + (pelvis if SEGMENTS[name] == "Pelvis" else 0.0) for name, vector in offset.items()}
+    place = {"Pelvis": motion.root_m - rotations.rotate(world["Pelvis"], pelvis)}
+    for name, parent in SEGMENTS.items():
+        if parent:
+            place[name] = place[parent] + rotations.rotate(world[parent], offset[name])
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
+    if version == 3:
+        lines.append('<!DOCTYPE mvnx SYSTEM "http://www.xsens.com/mvn/mvnx/schema.dtd">')
+    lines += [f'<mvnx xmlns="http://www.xsens.com/mvn/mvnx" version="{version}">', '<mvn version="a test"/>']
+    lines += ["<comment>made by a test &amp; not by MVN</comment>"]
+    lines += [f'<subject label="{motion.subject}" frameRate="{motion.rate_hz:g}" segmentCount="23">', "<segments>"]
+    lines += _mvn_segment_lines(offset, motion.skeleton, "pos_s" if version == 3 else "pos_b")
+    lines += ["</segments>", '<frames segmentCount="23" sensorCount="17" jointCount="22">']
+    turns, places = np.stack([world[name] for name in SEGMENTS], 1), np.stack([place[name] for name in SEGMENTS], 1)
+    frames = [(-1, "identity" if version == 4 else "npose"), *((t, "normal") for t in range(len(motion)))]
+    for t, kind in frames:
+        turn = turns[t] if t >= 0 else np.tile(rotations.IDENTITY, (23, 1))
+        index = f'index="{t}" ' if t >= 0 else ""
+        lines += [f'<frame time="{max(t, 0)}" {index}tc="" ms="0" type="{kind}">']
+        lines += [f"<orientation>{_words(turn.ravel())}</orientation>"]
+        lines += [f"<position>{_words(places[t].ravel())}</position>", "<velocity>0 0 0</velocity>", "</frame>"]
+    return newline.join([*lines, "</frames>", "</subject>", '<securityCode code="0"/>', "</mvnx>", ""])
+
+
+def _mvn_orientations(motion: Clip) -> dict[str, Floats]:
+    world = _world_from_bone(motion)
+    return {
+        segment: rotations.multiply(world[bone], rotations.inverse(np.array(FROM_T_POSE.get(bone, rotations.IDENTITY))))
+        for segment, bone in _BONE_OF_SEGMENT.items()
+    }
+
+
+def _mvn_offsets(skeleton: Skeleton) -> dict[str, Floats]:
+    """Origin of each segment in the axes of the one above it, the pelvis taken to lie at the root [m]."""
+
+    def vector(bone: str) -> Floats:
+        turn = np.array(FROM_T_POSE.get(bone, rotations.IDENTITY))
+        return rotations.rotate(turn, skeleton.bone_m[skeleton.index(bone)])
+
+    offset = {"L5": np.zeros(3), "L3": vector("lowerback"), "T12": 0.5 * vector("upperback")}
+    offset |= {"T8": 0.5 * vector("upperback"), "Neck": vector("thorax"), "Head": vector("lowerneck")}
+    for side, s in (("Right", "r"), ("Left", "l")):
+        offset |= {f"{side}Shoulder": vector("thorax"), f"{side}UpperArm": vector(f"{s}clavicle")}
+        offset |= {f"{side}ForeArm": vector(f"{s}humerus"), f"{side}Hand": vector(f"{s}radius") + vector(f"{s}wrist")}
+        offset |= {f"{side}UpperLeg": vector(f"{s}hipjoint"), f"{side}LowerLeg": vector(f"{s}femur")}
+        offset |= {f"{side}Foot": vector(f"{s}tibia"), f"{side}Toe": vector(f"{s}foot")}
+    return offset
+
+
+def _mvn_segment_lines(offset: dict[str, Floats], skeleton: Skeleton, tag: str) -> list[str]:
+    lines = []
+    top = skeleton.bone_m[skeleton.index("upperneck")] + skeleton.bone_m[skeleton.index("head")]
+    for number, name in enumerate(SEGMENTS, 1):
+        points = {f"p{name}Landmark": np.array([0.01, 0.02, 0.03])}
+        points |= {f"j{name}Origin": np.zeros(3)} if name != "Pelvis" else {}
+        points |= {f"j{child}Origin": offset[child] for child, parent in SEGMENTS.items() if parent == name}
+        points |= {"pTopOfHead": top} if name == "Head" else {}
+        lines += [f'<segment label="{name}" id="{number}">', "<points>"]
+        lines += [f'<point label="{p}"><{tag}>{_words(place)}</{tag}></point>' for p, place in points.items()]
+        lines += ["</points>", "</segment>"]
+    return lines
 
 
 def write_clip(folder: Path, motion: Clip) -> Path:

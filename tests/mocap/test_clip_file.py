@@ -7,18 +7,19 @@ import pytest
 
 from harness.errors import BadFile, BadInput
 from harness.mocap.clip_file import read_clip
-from tests.mocap.sample_files import amass_arrays, bvh_text, clip, write_clip
+from tests.mocap.sample_files import amass_arrays, bvh_text, clip, mvnx_text, write_clip
 
 
 def test_every_format_gives_the_same_motion(tmp_path: Path) -> None:
     motion = clip()
     amc = write_clip(tmp_path, motion)
-    bvh, npz = tmp_path / "91_02.bvh", tmp_path / "91_03_poses.npz"
+    bvh, npz, mvnx = (tmp_path / name for name in ("91_02.bvh", "91_03_poses.npz", "91_04.mvnx"))
     bvh.write_text(bvh_text(motion))
     np.savez(npz, allow_pickle=False, **amass_arrays(motion))
+    mvnx.write_text(mvnx_text(motion))
     femur = motion.skeleton.dof_of_bone[motion.skeleton.index("lfemur")]
-    for path, rate_hz, name in ((amc, 120.0, "91_01"), (bvh, None, "91_02"), (npz, None, "91_03")):
-        read = read_clip(str(path), rate_hz)
+    for path, name in ((amc, "91_01"), (bvh, "91_02"), (npz, "91_03"), (mvnx, "91_04")):
+        read = read_clip(str(path), 120.0 if path is amc else None)
         assert (read.name, read.subject, read.rate_hz, len(read)) == (name, "91", 120.0, len(motion))
         np.testing.assert_allclose(read.root_m, motion.root_m, atol=1e-6)
         angles_rad = read.angles_rad[:, read.skeleton.dof_of_bone[read.skeleton.index("lfemur")]]

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
-from harness.mocap.read import amass, bvh
+from harness.mocap.read import amass, bvh, mvnx
 from harness.mocap.read.acclaim import read_amc, read_asf
 from harness.mocap.read.c3d_header import check_header
 from harness.mocap.read.joint_clip import JointClip
-from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip
+from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 
 SKELETON = standard_skeleton()
 QUICK = settings(
@@ -42,6 +42,7 @@ SOUND: dict[str, tuple[bytes, Callable[[Path], object]]] = {
     "asf": (asf_text(SKELETON).encode(), read_asf),
     "amc": (amc_text(clip(3)).encode(), lambda path: read_amc(path, SKELETON, rate_hz=120.0)),
     "bvh": (bvh_text(clip(2)).encode(), bvh.read_bvh),
+    "mvnx": (mvnx_text(clip(2)).encode(), mvnx.read_mvnx),
     "npz": (_npz(), amass.read_amass),
     "c3d": (_c3d(), check_header),
 }

@@ -8,14 +8,14 @@ import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import MotionLibrary
-from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, write_clip
+from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, mvnx_text, write_clip
 
 INDEX = "path,subject,trial,behaviour,frames,fps,note\n91/91_01.amc,91,01,walking,24,60,limps\n"
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Four clips: 91_01 in three formats, 91_02 as BVH, 91_03 as npz, 91_04 as C3D only."""
+    """Five clips: 91_01 in three formats, 91_02 as BVH, 91_03 as npz, 91_04 as C3D only, 91_05 as MVNX."""
     motion = clip()
     write_clip(tmp_path, motion)
     (tmp_path / "manifest.csv").write_text(INDEX)
@@ -25,18 +25,20 @@ def folder(tmp_path: Path) -> Path:
     for name in ("91_01", "91_03"):
         np.savez(tmp_path / "deep" / "down" / f"{name}_poses.npz", allow_pickle=False, **amass_arrays(motion))
     (tmp_path / "deep" / "91_04.c3d").write_bytes(b"not read before it is asked for")
+    (tmp_path / "deep" / "91_05.MVNX").write_text(mvnx_text(motion))
     (tmp_path / "readme.txt").write_text("no motion")
     return tmp_path
 
 
 def test_clips_are_found_by_name_whatever_their_format(folder: Path) -> None:
     library = MotionLibrary(folder)
-    assert library.names() == ("91_01", "91_02", "91_03")
+    assert library.names() == ("91_01", "91_02", "91_03", "91_05")
     assert {entry.name: entry.format for entry in library.entries()} == {
         "91_01": "amc",
         "91_02": "bvh",
         "91_03": "npz",
         "91_04": "c3d",
+        "91_05": "mvnx",
     }
     assert sorted(copy.suffix for copy in library.entry("91_01").copies) == [".bvh", ".npz"]
     told = library.entry("91_01").as_dict()
@@ -51,7 +53,7 @@ def test_what_is_loaded_carries_what_the_index_knows(folder: Path) -> None:
     assert (found.rate_hz, found.notes, len(found)) == (60.0, ("limps",), 24)
 
 
-@pytest.mark.parametrize("name", ["91_02", "91_03"])
+@pytest.mark.parametrize("name", ["91_02", "91_03", "91_05"])
 def test_other_formats_load_on_the_24_bones(folder: Path, name: str) -> None:
     found = MotionLibrary(folder).load(name)
     assert (found.name, found.rate_hz, len(found.skeleton.names)) == (name, 120.0, 24)
@@ -115,7 +117,7 @@ def test_links_inside_the_folder_are_followed_and_loops_end(folder: Path) -> Non
     (folder / "deep" / "loop").symlink_to(folder, target_is_directory=True)
     library = MotionLibrary(folder)
     assert library.ignored_paths == ()
-    assert library.names() == ("91_01", "91_02", "91_03", "walk")
+    assert library.names() == ("91_01", "91_02", "91_03", "91_05", "walk")
     assert len(library.entry("91_01").copies) == 2
     walk = library.load("walk")
     assert (walk.name, walk.rate_hz, walk.behaviour) == ("walk", 60.0, "walking")
@@ -134,7 +136,7 @@ def test_a_library_of_two_folders_has_the_clips_of_both(folder: Path, tmp_path_f
     write_clip(other, clip(name="92_01"))
     (other / "91_02.bvh").write_bytes((folder / "deep" / "91_02.bvh").read_bytes())
     library = MotionLibrary([folder, other], rate_hz=100.0)
-    assert library.names() == ("91_01", "91_02", "91_03", "92_01")
+    assert library.names() == ("91_01", "91_02", "91_03", "91_05", "92_01")
     assert (library.load("91_01").rate_hz, library.load("92_01").rate_hz) == (60.0, 100.0)
     assert library.entry("91_02").copies == (other / "91_02.bvh",)
     assert MotionLibrary((folder, str(folder))).entries() == MotionLibrary(folder).entries()

@@ -23,7 +23,7 @@ from harness.core.npz_file import read_npz
 from harness.errors import BadFile
 from harness.mocap.read.asf import WORLD_FROM_ASF
 from harness.mocap.read.file_checks import LIMIT_BYTES, MAX_VALUE, check_size
-from harness.mocap.read.joint_clip import BoneMapping, JointClip, JointMap, to_clip
+from harness.mocap.read.joint_clip import FROM_T_POSE, BoneMapping, JointClip, JointMap, to_clip
 
 JOINTS: tuple[tuple[str, int], ...] = (
     ("pelvis", -1),
@@ -56,16 +56,7 @@ _POSE_WIDTHS = (72, 156, 165)
 _RATE_KEYS = ("mocap_framerate", "mocap_frame_rate")
 
 
-def _axis_quaternion(axis: int, angle_deg: float) -> tuple[float, float, float, float]:
-    w, x, y, z = rotations.exp(np.deg2rad(angle_deg) * np.eye(3)[axis])
-    return float(w), float(x), float(y), float(z)
-
-
 def _smpl_map() -> dict[str, BoneMapping]:
-    """The mapping, with the differences of the rest poses.
-
-    In the skeleton's rest pose the legs are 20 deg abducted and the elbows' axes rotated by 30 deg; in SMPL's not.
-    """
     mapping = {
         "root": BoneMapping("pelvis"),
         "lowerback": BoneMapping("spine1"),
@@ -75,17 +66,17 @@ def _smpl_map() -> dict[str, BoneMapping]:
         "upperneck": BoneMapping("neck"),
         "head": BoneMapping("head"),
     }
-    for side, s, out_deg in (("left", "l", -20.0), ("right", "r", 20.0)):
+    for side, s in (("left", "l"), ("right", "r")):
         mapping[f"{s}clavicle"] = BoneMapping(f"{side}_collar")
-        mapping[f"{s}humerus"] = BoneMapping(f"{side}_shoulder", joint_from_bone=_axis_quaternion(1, 30.0))
-        mapping[f"{s}radius"] = BoneMapping(f"{side}_elbow", joint_from_bone=_axis_quaternion(1, 30.0))
+        mapping[f"{s}humerus"] = BoneMapping(f"{side}_shoulder")
+        mapping[f"{s}radius"] = BoneMapping(f"{side}_elbow")
         mapping[f"{s}wrist"] = BoneMapping(f"{side}_elbow")
         mapping[f"{s}hand"] = BoneMapping(f"{side}_wrist")
         mapping[f"{s}hipjoint"] = BoneMapping("pelvis")
-        mapping[f"{s}femur"] = BoneMapping(f"{side}_hip", joint_from_bone=_axis_quaternion(0, out_deg))
-        mapping[f"{s}tibia"] = BoneMapping(f"{side}_knee", joint_from_bone=_axis_quaternion(0, out_deg))
-        mapping[f"{s}foot"] = BoneMapping(f"{side}_ankle", joint_from_bone=_axis_quaternion(0, out_deg))
-    return mapping
+        mapping[f"{s}femur"] = BoneMapping(f"{side}_hip")
+        mapping[f"{s}tibia"] = BoneMapping(f"{side}_knee")
+        mapping[f"{s}foot"] = BoneMapping(f"{side}_ankle")
+    return {bone: to.with_rest_pose(FROM_T_POSE.get(bone)) for bone, to in mapping.items()}
 
 
 SMPL_MAP: JointMap = _smpl_map()

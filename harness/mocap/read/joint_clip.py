@@ -1,4 +1,4 @@
-"""Motion as free rotations of joints (BVH, AMASS), and its fit to the hinges of the 24-bone skeleton.
+"""Motion as free rotations of joints (BVH, MVNX, AMASS), and its fit to the hinges of the 24-bone skeleton.
 
 A joint rotates everything below it; in the rest pose every joint's frame is parallel to the world. The fit goes from
 the root outwards. Each bone gets the hinge angles that bring its world orientation closest to that of the joint that
@@ -85,10 +85,32 @@ class BoneMapping:
 
     joint: str
     tip: str | None = None
-    """Joint whose rest offset is the bone's vector; None where the file does not have the bone's length."""
+    """Joint at the bone's far end; None where the file does not have the bone's length."""
     joint_from_bone: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     """Bone's frame in the joint's frame in the rest pose, where the file's rest pose differs from the skeleton's."""
+    start: str | None = None
+    """Joint at the bone's near end, and for "root" the joint at its place; None for the joint above `tip`, and for the
+    first joint."""
 
+    def with_rest_pose(self, joint_from_bone: tuple[float, float, float, float] | None) -> "BoneMapping":
+        """The mapping with another `joint_from_bone`; unchanged for None."""
+        return self if joint_from_bone is None else replace(self, joint_from_bone=joint_from_bone)
+
+
+def _axis_quaternion(axis: int, angle_deg: float) -> tuple[float, float, float, float]:
+    w, x, y, z = rotations.exp(np.deg2rad(angle_deg) * np.eye(3)[axis])
+    return float(w), float(x), float(y), float(z)
+
+
+FROM_T_POSE: Mapping[str, tuple[float, float, float, float]] = {
+    **{f"{s}{bone}": _axis_quaternion(1, 30.0) for s in "lr" for bone in ("humerus", "radius")},
+    **{f"l{bone}": _axis_quaternion(0, -20.0) for bone in ("femur", "tibia", "foot")},
+    **{f"r{bone}": _axis_quaternion(0, 20.0) for bone in ("femur", "tibia", "foot")},
+}
+"""`joint_from_bone` for files whose rest pose is a T with straight legs, and whose elbows then bend about the vertical.
+
+In the skeleton's rest pose the legs are 20 deg abducted and the elbows' axes rotated by 30 deg.
+"""
 
 JointMap = Mapping[str, BoneMapping]
 """The mapping of each of the 24 bones, and of "root"."""
@@ -120,7 +142,9 @@ def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
     name it.
     """
     skeleton, notes = _build_skeleton(joint_clip, joint_map)
-    _, world_from_joint = joint_clip.world()
+    position_m, world_from_joint = joint_clip.world()
+    place = joint_map["root"].start
+    root_m = joint_clip.root_m if place is None else position_m[:, joint_clip.names.index(place)]
     targets = {bone: _target_orientation(joint_clip, world_from_joint, to) for bone, to in joint_map.items()}
     fitted: dict[int, Floats] = {-1: targets["root"]}
     angles = np.zeros((len(joint_clip), len(skeleton.axes)))
@@ -139,7 +163,7 @@ def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
         behaviour=joint_clip.behaviour,
         skeleton=skeleton,
         rate_hz=joint_clip.rate_hz,
-        root_m=joint_clip.root_m,
+        root_m=root_m,
         world_from_root=rotations.continuous(targets["root"]),
         angles_rad=unwrap_angles(skeleton, angles),
         notes=(*joint_clip.notes, *notes),
@@ -157,11 +181,13 @@ def _build_skeleton(joint_clip: JointClip, joint_map: JointMap) -> tuple[Skeleto
     """The 24 bones with the file's lengths, and notes about lengths that were filled in."""
     _check_map(joint_clip, joint_map)
     mean = standard_skeleton()
-    bone_m = np.zeros((mean.bone_count, 3))
+    bone_m, rest_m = np.zeros((mean.bone_count, 3)), joint_clip.rest_m()
     for b, bone in enumerate(mean.names):
         mapping = joint_map[bone]
         if mapping.tip is not None:
-            offset = joint_clip.offset_m[joint_clip.names.index(mapping.tip)]
+            tip = joint_clip.names.index(mapping.tip)
+            start = joint_clip.parents[tip] if mapping.start is None else joint_clip.names.index(mapping.start)
+            offset = rest_m[tip] - rest_m[start]
             bone_m[b] = rotations.rotate(rotations.inverse(np.array(mapping.joint_from_bone)), offset)
     length = np.sqrt(np.sum(bone_m**2, axis=1))
     lacking = length < 1e-6
@@ -180,7 +206,7 @@ def _check_map(joint_clip: JointClip, joint_map: JointMap) -> None:
     if absent:
         raise BadInput(f"The joint map lacks {', '.join(absent)}.", "Map every bone of the 24, and root.")
     for bone, mapping in joint_map.items():
-        for joint in (mapping.joint, mapping.tip):
+        for joint in (mapping.joint, mapping.tip, mapping.start):
             if joint is not None and joint not in joint_clip.names:
                 have = ", ".join(joint_clip.names)
                 raise BadInput(f"{joint_clip.name}: there is no joint {joint} for {bone}.", f"Its joints are {have}.")

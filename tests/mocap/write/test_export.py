@@ -1,12 +1,14 @@
 """Exported files: other programs and this package read the same motion from them."""
 
 import csv
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
@@ -18,6 +20,7 @@ from harness.mocap.clip_file import read_clip
 from harness.mocap.read.bvh import read_bvh
 from harness.mocap.write.bvh import euler_zyx_deg
 from harness.mocap.write.export import FORMATS, export
+from harness.mocap.write.mot import ROOT_COLUMNS, euler_zxy_rad
 from harness.mocap.write.tum import POINTS
 from harness.score.pair import Pair, compute_poses
 from harness.score.positions import root_position_mm
@@ -53,15 +56,15 @@ class Written:
         return 3.0 + self.frame_index / RATE_HZ
 
 
+def arbitrary_motion(rng: np.random.Generator) -> Floats:
+    """Configurations (F, 55), including upside-down poses and gimbal lock."""
+    turns = np.cumsum(0.3 * rng.normal(size=(FRAMES, 3)), axis=0)
+    return pack(rng.normal(size=(FRAMES, 3)), rotations.exp(turns), rng.uniform(-2.0, 2.0, (FRAMES, 48)))
+
+
 @pytest.fixture
 def cell(rng: np.random.Generator) -> Written:
-    """Arbitrary motion, including upside-down poses and gimbal lock."""
-
-    def motion() -> Floats:
-        turns = np.cumsum(0.3 * rng.normal(size=(FRAMES, 3)), axis=0)
-        return pack(rng.normal(size=(FRAMES, 3)), rotations.exp(turns), rng.uniform(-2.0, 2.0, (FRAMES, 48)))
-
-    return Written(motion(), motion())
+    return Written(arbitrary_motion(rng), arbitrary_motion(rng))
 
 
 def joints_m(qpos: Floats, skeleton: Skeleton) -> Floats:
@@ -147,10 +150,10 @@ def test_euler_angles_rebuild_every_rotation(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(back[0] @ back[1] @ back[2], matrices, atol=2e-7)
 
 
-def test_trc_has_the_joint_centres_y_up_and_mot_the_angles(cell: Written, tmp_path: Path) -> None:
+def test_trc_has_the_joint_centres_y_up(cell: Written, tmp_path: Path) -> None:
     files = export([cell], "trc", tmp_path)
-    assert [f.suffix for f in files] == [".trc", ".mot", ".trc", ".mot"]
-    lines = files[2].read_text().split("\n")
+    assert [f.name.split(".", 2)[-1] for f in files] == ["40-ik-pos+ori.truth.trc", "40-ik-pos+ori.estimate.trc"]
+    lines = files[1].read_text().split("\n")
     assert lines[2].split("\t") == ["40", "40", "50", "25", "mm", "40", "1", "50"]
     assert [name for name in lines[3].split("\t") if name] == ["Frame#", "Time", *NAMES]
     assert len(lines[4].split("\t")) == len(lines[6].split("\t")) == 2 + 3 * 25
@@ -159,17 +162,66 @@ def test_trc_has_the_joint_centres_y_up_and_mot_the_angles(cell: Written, tmp_pa
     np.testing.assert_array_equal(table[:, 0], np.arange(1, FRAMES + 1))
     np.testing.assert_allclose(table[:, 1], cell.time_s, atol=1e-6)
     place = table[:, 2:].reshape(FRAMES, 25, 3)
-    expected = 1e3 * joints_m(cell.estimate_qpos, BELIEVED)
-    np.testing.assert_allclose(place[..., 0], expected[..., 0], atol=1e-3)
-    np.testing.assert_allclose(place[..., 1], expected[..., 2], atol=1e-3)
-    np.testing.assert_allclose(place[..., 2], -expected[..., 1], atol=1e-3)
+    np.testing.assert_allclose(place, 1e3 * in_opensim(joints_m(cell.estimate_qpos, BELIEVED)), atol=1e-3)
 
-    head, _, body = files[3].read_text().partition("endheader\n")
-    assert {"nRows=50", "nColumns=49", "inDegrees=yes"} <= set(head.split("\n"))
+
+def in_opensim(position: Floats) -> Floats:
+    """Positions (..., 3) as x forward, y up, z right."""
+    out: Floats = np.stack([position[..., 0], position[..., 2], -position[..., 1]], axis=-1)
+    return out
+
+
+def storage_table(file: Path) -> tuple[set[str], list[str], list[list[str]]]:
+    """Lines of the header, names of the columns and words of the rows of a file for OpenSim."""
+    head, _, body = file.read_text().partition("endheader\n")
     names, *rows = body.strip().split("\n")
-    assert names.split("\t")[:2] == ["time", "lowerback_rx"]
-    angles = np.array([[float(x) for x in row.split("\t")] for row in rows])[:, 1:]
-    np.testing.assert_allclose(np.deg2rad(angles), unpack(cell.estimate_qpos)[2], atol=1e-7)
+    return set(head.split("\n")), names.split("\t"), [row.split("\t") for row in rows]
+
+
+def test_mot_has_the_root_and_the_angles(cell: Written, tmp_path: Path) -> None:
+    truth, estimate = export([cell], "mot", tmp_path)
+    assert (truth.suffix, estimate.suffix) == (".mot", ".mot")
+    head, names, rows = storage_table(estimate)
+    assert {"version=1", "nRows=50", "nColumns=55", "inDegrees=yes"} <= head
+    assert names[:8] == ["time", *ROOT_COLUMNS, "lowerback_rx"]
+    table = np.array(rows, dtype=float)
+    root_m, quaternion, angles_rad = unpack(cell.estimate_qpos)
+    np.testing.assert_allclose(table[:, 0], cell.time_s, atol=1e-6)
+    np.testing.assert_allclose(table[:, 4:7], in_opensim(root_m), atol=1e-6)
+    np.testing.assert_allclose(np.deg2rad(table[:, 7:]), angles_rad, atol=1e-7)
+    assert np.abs(np.diff(table[:, [1, 3]], axis=0)).max() <= 180.0
+    for row, q in zip(table, rotations.to_matrix(quaternion), strict=True):
+        turn = Rotation.from_euler("ZXY", row[1:4], degrees=True).as_matrix()
+        forward, left, up = (in_opensim(q[:, k]) for k in range(3))
+        np.testing.assert_allclose(turn, np.stack([forward, up, -left], axis=1), atol=1e-7)
+
+
+def test_zxy_angles_rebuild_rotations_at_gimbal_lock(rng: np.random.Generator) -> None:
+    locked = Rotation.from_euler(
+        "ZXY", [[z, x, y] for z, y in rng.normal(size=(50, 2)) for x in (np.pi / 2, -np.pi / 2)]
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        back = Rotation.from_euler("ZXY", euler_zxy_rad(locked.as_matrix()))
+    np.testing.assert_allclose(back.as_matrix(), locked.as_matrix(), atol=1e-7)
+
+
+def test_sto_has_orientations_of_segments_named_for_opensense(cell: Written, tmp_path: Path) -> None:
+    truth, estimate = export([cell], "sto", tmp_path)
+    assert (truth.suffix, estimate.suffix) == (".sto", ".sto")
+    head, names, rows = storage_table(truth)
+    assert {"DataRate=40.000000", "DataType=Quaternion", "version=3", "OpenSimVersion=4.1"} <= head
+    assert names[0] == "time"
+    assert {"pelvis_imu", "torso_imu", "femur_r_imu", "calcn_l_imu", "radius_l_imu"} <= set(names)
+    np.testing.assert_allclose([float(row[0]) for row in rows], cell.time_s, atol=1e-6)
+    pose = compute_poses(SKELETON, cell.truth_qpos)
+    for bone, column in (("rfemur", "femur_r_imu"), ("lwrist", "radius_l_imu"), ("thorax", "torso_imu")):
+        found = np.array([[float(x) for x in row[names.index(column)].split(",")] for row in rows])
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-8)
+        assert np.sum(found[1:] * found[:-1], axis=1).min() >= 0.0
+        turn = pose.world_from_bone[:, SKELETON.index(bone)]
+        forward, left, up = (in_opensim(turn[..., k]) for k in range(3))
+        np.testing.assert_allclose(rotations.to_matrix(found), np.stack([forward, up, -left], axis=-1), atol=1e-7)
 
 
 def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path: Path) -> None:
@@ -247,12 +299,12 @@ def test_a_file_is_written_over_only_when_told(cell: Written, tmp_path: Path, fm
     folder = tmp_path / "deep" / "out"
     files = export([cell], fmt, folder)
     assert sorted(folder.iterdir()) == sorted(files)
-    files[-1].write_text("edited by hand")
+    files[-1].write_bytes(b"edited by hand")
     with pytest.raises(BadInput, match="--force"):
         export([cell], fmt, folder)
-    assert files[-1].read_text() == "edited by hand"
+    assert files[-1].read_bytes() == b"edited by hand"
     assert export([cell], fmt, folder, force=True) == files
-    assert files[-1].read_text() != "edited by hand"
+    assert files[-1].read_bytes() != b"edited by hand"
 
 
 def test_names_of_files_are_safe_and_unlike(cell: Written, tmp_path: Path) -> None:

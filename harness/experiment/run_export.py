@@ -1,0 +1,48 @@
+"""Export of the motion of a run, with the bodies and stations of its cells."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from harness.body.anatomy import body_geoms
+from harness.body.mounts import locate_mount
+from harness.core.fields import build
+from harness.errors import BadInput
+from harness.experiment.clip_evaluation import mount_of
+from harness.experiment.scenario import Station
+from harness.mocap.write.body_model import BodyModel, StationPlace
+from harness.mocap.write.export import export
+from harness.mocap.write.posed_motion import PosedMotion
+from harness.results.cell import Cell
+from harness.results.selection import select_cells
+
+
+def export_run(
+    run: Path,
+    fmt: str,
+    folder: Path,
+    *,
+    clips: Sequence[str] = (),
+    methods: Sequence[str] = (),
+    force: bool = False,
+) -> list[Path]:
+    """Write the true and the estimated motion of a run's cells to files; returns the files.
+
+    `clips` and `methods` choose the cells (see `results.selection.select_cells`), `fmt` is one of
+    `mocap.write.export.FORMATS`. Raises the errors of both.
+    """
+    return export(select_cells(run, clips=clips, methods=methods), fmt, folder, force=force, model=body_model)
+
+
+def body_model(cell: Cell, motion: PosedMotion) -> BodyModel:
+    """The body of a cell, and its stations at their nominal mounts on that body; BadInput if the cell names none."""
+    try:
+        stations = {name: build(Station, table, name) for name, table in cell.defined_by["stations"].items()}
+    except (KeyError, AttributeError, TypeError, ValueError) as error:
+        found = f"The cell {cell.key} does not say where its stations sit ({error})."
+        raise BadInput(found, "Run the scenario again with this version.") from error
+    mounts = [mount_of(name, station) for name, station in stations.items()]
+    places = [(mount, locate_mount(motion.skeleton, mount)) for mount in mounts]
+    return BodyModel(
+        body_geoms(motion.skeleton),
+        [StationPlace(mount.station, mount.bone, position_m, turn) for mount, (position_m, turn) in places],
+    )
