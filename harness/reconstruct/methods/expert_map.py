@@ -48,6 +48,7 @@ from harness.reconstruct.solver.ground_frame import (
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.loss_scale import LossScale
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.self_calibration import SelfCalibration, posterior
@@ -162,6 +163,7 @@ class ExpertMapSession(HistorySession):
         self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
         self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
+        self._loss_scale = LossScale(loss.position_scale_m)
         self._prior: Subspace | None = None
         """Prior of the pose that was solved last; None when inverse kinematics answered."""
         self._angle_sigma_rad: Floats = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
@@ -169,6 +171,7 @@ class ExpertMapSession(HistorySession):
 
     def step(self, frame: TrackerFrame) -> Estimate:
         self.residuals.set_sigma(self._scales.position_sigma_m, self._scales.orientation_sigma_rad)
+        self.residuals.set_position_scale(self._loss_scale.position_m)
         estimate = super().step(frame)
         return Estimate(estimate.qpos, estimate.status, estimate.origin, self._angle_sigma_rad)
 
@@ -226,6 +229,7 @@ class ExpertMapSession(HistorySession):
         self._angle_sigma_rad = np.sqrt(found.variance[HINGES])
         if not cold:
             self._scales.update(found)
+            self._loss_scale.update(residuals.targets, residuals.state)
 
     def _next_ground(self) -> Floats:
         """Ground frame (3,) after the last two, at the same speed."""

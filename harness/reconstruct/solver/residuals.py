@@ -81,13 +81,14 @@ class Residuals:
         """(S, 3) modelled station positions in the world [m]."""
 
         self._qpos = np.zeros(body.model.nq)
+        self._twice_scale_squared = 2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf)
         self._measurement = MeasurementModel(
             world_from_tracker=rotations.to_matrix(calibration.world_from_tracker),
             origin_m=np.array(calibration.tracker_origin_m),
             bone_from_reading=_left_multiplication(calibration.world_from_tracker)
             @ _right_multiplication(rotations.inverse(calibration.bone_from_station)),
             precision=np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count),
-            twice_scale_squared=2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf),
+            twice_scale_squared=self._twice_scale_squared.copy(),
             by_quality=loss.quality,
             suspect_weight=loss.suspect_weight,
         )
@@ -128,14 +129,24 @@ class Residuals:
         count = len(self.bones)
         self._measurement.precision[:count], self._measurement.precision[count:] = position_m**-2, orientation_rad**-2
 
+    def set_position_scale(self, scale_m: float) -> None:
+        """Set the Lorentzian's scale of positions [m], from the next frame on. Plain squares become a Lorentzian."""
+        self._measurement.twice_scale_squared[: len(self.bones)] = 2.0 * scale_m**2
+
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
         self.measured = self.measured & ~rows
         self.confidence[rows] = self.targets.precision[rows] = 0.0
 
     def widen(self, factor: float) -> None:
-        """Multiply the Lorentzian's scales by `factor` until the next frame is read, to solve from a distant start."""
-        np.multiply(self._measurement.twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
+        """Multiply the loss's own scales by `factor` until the next frame is read, to solve from a distant start.
+
+        A factor of 1 restores the scales that are set.
+        """
+        if factor == 1.0:
+            self.targets.twice_scale_squared[:] = self._measurement.twice_scale_squared
+        else:
+            np.multiply(self._twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
 
     def evaluate(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""

@@ -286,6 +286,17 @@ def test_the_readings_are_weighed_by_the_scales(walk: Scene, fitted: FittedExper
     np.testing.assert_allclose(session.residuals.targets.precision, np.repeat([0.002**-2.0, 0.003**-2.0], 6))
 
 
+def test_the_scale_of_the_loss_follows_the_residuals(walk: Scene, fitted: FittedExpertMap) -> None:
+    session, found_m = begin(fitted, walk), []
+    for frame in walk.frames[:40]:
+        scale_m = session._loss_scale.position_m
+        session.step(frame)
+        found_m.append(float(np.sqrt(session.residuals.targets.twice_scale_squared[0] / 2.0)))
+        assert found_m[-1] == pytest.approx(scale_m)
+    assert found_m[0] == pytest.approx(Loss().position_scale_m)
+    assert found_m[-1] < 0.5 * found_m[0]
+
+
 def sigma_of(estimate: Estimate) -> Floats:
     assert estimate.angle_sigma_rad is not None
     return estimate.angle_sigma_rad
