@@ -56,13 +56,12 @@ def posterior(
     count, size = len(tree.station_body), len(z)
     rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
     total, of_positions = np.empty((size, size)), np.empty((size, size))
-    unused = np.empty(size)
     normal_rows(tree, state, rows, descent)
-    to_subspace(tree, prior, z, rows, descent, total, unused)
+    to_subspace(tree, prior, z, rows, total)
     kept = state.weight[count:].copy()
     state.weight[count:] = 0.0
     normal_rows(tree, state, rows, descent)
-    to_subspace(tree, prior, z, rows, descent, of_positions, unused)
+    to_subspace(tree, prior, z, rows, of_positions)
     state.weight[count:] = kept
     for i in range(size):
         total[i, i] += _MIN_DIAGONAL
