@@ -10,13 +10,11 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 
-_LANES = 8
-
 
 @compiled
 def new_rows(count: int) -> Floats:
     """(N, N or up to 7 more) zeros: rows of a matrix (N, N), padded."""
-    return np.zeros((count, (count + _LANES - 1) // _LANES * _LANES))
+    return np.zeros((count, (count + 7) & -8))
 
 
 @compiled
@@ -39,7 +37,7 @@ def factorise(rows: Floats) -> bool:
         by_second = 1.0 / second[k - 1]
         for i in range(k - 1):
             row, a, b = rows[i], first[i] * by_first, second[i] * by_second
-            for j in range((i | (_LANES - 1)) + 1):
+            for j in range((i | 7) + 1):
                 row[j] -= a * first[j] + b * second[j]
         k -= 2
     return bool(k < 0 or rows[0, 0] > 0.0)

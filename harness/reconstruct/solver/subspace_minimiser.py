@@ -219,6 +219,37 @@ def to_subspace(tree: KinematicTree, subspace: Subspace, z: Floats, rows: Floats
 
 
 @compiled
+def trace_of_product(tree: KinematicTree, z: Floats, rows: Floats, covariance: Floats) -> float:
+    """Trace of a covariance of z (3 + P, 3 + P) times normal equations of the tangent, given as rows (V, D).
+
+    These are brought to z as in `to_subspace`, without any prior.
+    """
+    jacobian, total, twice = _root_motion(z), 0.0, 0.0
+    across = np.zeros((len(covariance), 6))  # the covariance with the tangent's root
+    for i in range(len(covariance)):
+        for k in range(7):
+            for m in range(6):
+                across[i, m] += covariance[i, k] * jacobian[k, m]
+    for m in range(6):
+        for n in range(m + 1):
+            of_root = 0.0
+            for k in range(7):
+                of_root += jacobian[k, m] * across[k, n]
+            if n < m:
+                twice += rows[m, n] * of_root
+            else:
+                total += rows[m, n] * of_root
+    for r in range(6, len(rows)):
+        depth = tree.depth[r]
+        for m in range(6):
+            twice += rows[r, m] * across[r + 1, m]
+        for d in range(6, depth):
+            twice += rows[r, d] * covariance[r + 1, tree.ancestors[r, d] + 1]
+        total += rows[r, depth] * covariance[r + 1, r + 1]
+    return total + 2.0 * twice
+
+
+@compiled
 def descent_in_subspace(subspace: Subspace, z: Floats, descent: Floats, out: Floats) -> None:
     """Fill in the descent (3 + P,) of z, from that of the tangent (V,); the subspace's cost is added."""
     jacobian = _root_motion(z)

@@ -109,9 +109,11 @@ def test_what_is_left_out_varies_least(walk: Scene) -> None:
     assert held <= 1.01 * np.sum(np.linalg.eigvalsh(scatter)[:12]) + 12 * 1e-9
 
 
-def test_inverse(rng: np.random.Generator) -> None:
-    half = rng.normal(size=(60, 52)) * np.geomspace(1.0, 1e-4, 52)
-    np.testing.assert_allclose(invert_positive_definite(half.T @ half) @ (half.T @ half), np.eye(52), atol=1e-6)
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 52, 55])
+def test_inverse(count: int, rng: np.random.Generator) -> None:
+    half = rng.normal(size=(60, count)) * np.geomspace(1.0, 1e-4, count)
+    product = half.T @ half
+    np.testing.assert_allclose(invert_positive_definite(product) @ product, np.eye(count), atol=1e-6)
 
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
