@@ -16,7 +16,7 @@ from harness.core.compiled import compiled
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
 from harness.reconstruct.solver.normal_equations import StationTargets, normal_rows
 from harness.reconstruct.solver.subspace import invert_positive_definite
-from harness.reconstruct.solver.subspace_minimiser import Subspace, to_subspace
+from harness.reconstruct.solver.subspace_minimiser import Subspace, to_subspace, trace_of_product
 
 _MIN_DIAGONAL = 1e-6
 """Added to the diagonal of the normal equations, for a ground frame that no reading determines."""
@@ -55,27 +55,25 @@ def posterior(
     """
     count, size = len(tree.station_body), len(z)
     rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
-    total, of_positions = np.empty((size, size)), np.empty((size, size))
-    unused = np.empty(size)
+    total = np.empty((size, size))
     normal_rows(tree, state, rows, descent)
-    to_subspace(tree, prior, z, rows, descent, total, unused)
-    kept = state.weight[count:].copy()
-    state.weight[count:] = 0.0
-    normal_rows(tree, state, rows, descent)
-    to_subspace(tree, prior, z, rows, descent, of_positions, unused)
-    state.weight[count:] = kept
+    to_subspace(tree, prior, z, rows, total)
     for i in range(size):
         total[i, i] += _MIN_DIAGONAL
     covariance = invert_positive_definite(total)
-    by_positions, by_prior, by_nothing = 0.0, 0.0, 0.0
+    kept = state.weight[count:].copy()
+    state.weight[count:] = 0.0
+    normal_rows(tree, state, rows, descent)
+    state.weight[count:] = kept
+    by_positions, by_nothing = trace_of_product(tree, z, rows, covariance), 0.0
+    by_column = np.zeros(size - 3)
+    for i in range(size - 3):
+        of_prior, of_posture = prior.curvature[i], covariance[3 + i, 3:]
+        for j in range(size - 3):
+            by_column[j] += of_prior[j] * of_posture[j]
     for i in range(size):
-        for j in range(i + 1):
-            share = covariance[i, j] if i == j else 2.0 * covariance[i, j]
-            by_positions += share * of_positions[i, j]
-            if j >= 3:
-                by_prior += share * prior.curvature[i - 3, j - 3]
         by_nothing += _MIN_DIAGONAL * covariance[i, i]
-    by_positions -= by_prior
+    by_prior = by_column.sum()
     by_orientations = size - by_positions - by_prior - by_nothing
     squares, numbers = np.zeros(2), np.zeros(2)
     for row in range(2 * count):

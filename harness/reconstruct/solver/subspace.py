@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Singles
 from harness.core.compiled import compiled, specialise
+from harness.reconstruct.solver.dense_factor import new_rows
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
@@ -29,8 +30,8 @@ class SubspaceSolver:
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self._arrays = residuals.tree, residuals.targets, residuals.state
         self._end = (limits.low_rad, limits.high_rad), (stopping.step, stopping.decrease, stopping.most_steps)
-        posture = np.zeros(POSTURE_SIZE)
-        example = fit_subspace(np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, posture, 0.0)
+        nothing, none = np.zeros(POSTURE_SIZE), np.zeros((0, POSTURE_SIZE))
+        example = Subspace(nothing, none, np.eye(POSTURE_SIZE), nothing, nothing)
         start = np.zeros(3 + POSTURE_SIZE)
         self._minimise = specialise(minimise_in_subspace, *self._arrays, example, *self._end, start)
 
@@ -108,27 +109,53 @@ def _constrained_curvature(inverse: Floats, normals: Floats, alpha: float) -> Fl
 def invert_positive_definite(matrix: Floats) -> Floats:
     """The inverse of a positive definite matrix (N, N), by Gauss-Jordan elimination of its lower triangle.
 
-    `out` starts as the matrix and ends as minus the inverse. Step k exchanges the roles of unknown and right-hand side
-    k; both forms are symmetric, so the lower triangle suffices.
+    `rows` start as the matrix and end as minus the inverse. A step exchanges the roles of unknowns and right-hand sides
+    k and k + 1; both forms are symmetric, so the lower triangle suffices. For rows in pairs see `dense_factor`.
     """
-    out, pivot, count = matrix.copy(), np.empty(len(matrix)), len(matrix)
-    for k in range(count):
-        pivot[: k + 1], pivot[k + 1 :] = out[k, : k + 1], out[k + 1 :, k]
-        scale = 1.0 / pivot[k]
-        for i in range(count):
-            if i != k:
-                row, share = out[i], pivot[i] * scale
-                for j in range(i + 1):
-                    row[j] -= share * pivot[j]
-                if i > k:
-                    row[k] = share
-                else:
-                    out[k, i] = share
-        out[k, k] = -scale
+    count = len(matrix)
+    rows, pivots, solved = new_rows(count), new_rows(count)[:2], new_rows(count)[:2]
     for i in range(count):
         for j in range(i + 1):
-            out[i, j] = out[j, i] = -out[i, j]
+            rows[i, j] = matrix[i, j]
+    if count % 2 == 1:
+        _exchange_one(rows, count - 1)
+    for k in range(0, count - 1, 2):
+        (p, q), (u, v) = (pivots[0], pivots[1]), (solved[0], solved[1])
+        for j in range(k + 1):
+            p[j], q[j] = rows[k, j], rows[k + 1, j]
+        p[k + 1], q[k + 1] = rows[k + 1, k], rows[k + 1, k + 1]
+        for i in range(k + 2, count):
+            p[i], q[i] = rows[i, k], rows[i, k + 1]
+        scale = 1.0 / (p[k] * q[k + 1] - p[k + 1] * p[k + 1])
+        first, mixed, second = scale * q[k + 1], -scale * p[k + 1], scale * p[k]
+        for j in range(count):
+            u[j], v[j] = first * p[j] + mixed * q[j], mixed * p[j] + second * q[j]
+        for i in range(count):
+            row, a, b = rows[i], u[i], v[i]
+            for j in range((i | 7) + 1):
+                row[j] -= a * p[j] + b * q[j]
+        for j in range(k):
+            rows[k, j], rows[k + 1, j] = u[j], v[j]
+        for i in range(k + 2, count):
+            rows[i, k], rows[i, k + 1] = u[i], v[i]
+        rows[k, k], rows[k + 1, k], rows[k + 1, k + 1] = -first, -mixed, -second
+    out = np.empty((count, count))
+    for i in range(count):
+        for j in range(i + 1):
+            out[i, j] = out[j, i] = -rows[i, j]
     return out
+
+
+@compiled
+def _exchange_one(rows: Floats, k: int) -> None:
+    """The step of `invert_positive_definite` for the last of an odd number of rows alone."""
+    pivot, scale = rows[k].copy(), 1.0 / rows[k, k]
+    for i in range(k):
+        for j in range(i + 1):
+            rows[i, j] -= pivot[i] * scale * pivot[j]
+    for j in range(k):
+        rows[k, j] = scale * pivot[j]
+    rows[k, k] = -scale
 
 
 @compiled

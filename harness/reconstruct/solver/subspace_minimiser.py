@@ -9,9 +9,10 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.reconstruct.solver.dense_factor import factorise, new_rows, solve_factorised
 from harness.reconstruct.solver.ground_frame import qpos_from_posture
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
-from harness.reconstruct.solver.levenberg_marquardt import DAMPING_DECREASE, DAMPING_INCREASE
+from harness.reconstruct.solver.levenberg_marquardt import DAMPING_INCREASE
 from harness.reconstruct.solver.matrix_algebra import dot
 from harness.reconstruct.solver.normal_equations import StationTargets, evaluate, normal_rows
 
@@ -34,8 +35,11 @@ class Subspace(NamedTuple):
     """(P,) the spring's part of the diagonal of A."""
 
 
-_INITIAL_DAMPING = 1e-3
-"""Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it."""
+_INITIAL_DAMPING, _DAMPING_DECREASE = 1e-4, 10.0
+"""Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it. Readings are so much stiffer
+than the prior that more damping would hold the directions which the prior alone decides."""
+_MAX_CHORD_STEP = 5e-3
+"""After a step with no larger component [m, rad] the factorised matrix is kept for the next step."""
 _MAX_EXTRAPOLATED_STEP = 2e-3
 """After a step with no larger component [m, rad] the next decrease is predicted: decreases shrink geometrically."""
 _MIN_DIAGONAL = 1e-6
@@ -76,16 +80,23 @@ def _minimise(
 ) -> tuple[Floats, float, int, bool]:
     """`minimise_in_subspace` before the limits."""
     rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
-    normal, z_descent = np.empty((len(z), len(z))), np.empty(len(z))
+    factor, step = new_rows(len(z)), np.empty(len(z))
     z[3:] = project_posture(subspace, z[3:])
     qpos = qpos_from_posture(z[3:], z[:3])
     cost = evaluate(tree, targets, state, qpos) + subspace_cost(subspace, z[3:])
-    damping, last_decrease = _INITIAL_DAMPING, np.nan  # no comparison with NaN is true
+    damping, longest, last_decrease = _INITIAL_DAMPING, np.inf, np.nan  # no comparison with NaN is true
     for steps in range(1, stop[2] + 1):
         normal_rows(tree, state, rows, descent)
-        to_subspace(tree, subspace, z, rows, descent, normal, z_descent)
+        refactorise = longest > _MAX_CHORD_STEP
         while True:  # raise the damping until a step lowers the cost or is too short to matter
-            step = solve_damped(subspace, normal, z_descent, damping)
+            if refactorise:
+                to_subspace(tree, subspace, z, rows, factor)
+                damp(subspace, factor, damping)
+                if not factorise(factor):
+                    return qpos, cost, -1, False
+            descent_in_subspace(subspace, z, descent, step)
+            solve_factorised(factor, step)
+            step[3:] = project_direction(subspace, step[3:])
             longest = np.abs(step).max()
             if not np.isfinite(longest):
                 return qpos, cost, -1, False
@@ -94,13 +105,15 @@ def _minimise(
             next_cost = evaluate(tree, targets, state, next_qpos) + subspace_cost(subspace, next_z[3:])
             if next_cost <= cost or longest < stop[0]:
                 break
-            damping *= DAMPING_INCREASE
+            if refactorise:
+                damping *= DAMPING_INCREASE
+            refactorise = True
         decrease = cost - next_cost
         predicted = decrease * decrease / last_decrease if longest < _MAX_EXTRAPOLATED_STEP else np.inf
         converged = longest < stop[0] or decrease < stop[1] or predicted < stop[1]
         last_decrease = decrease
         if next_cost <= cost:
-            z, qpos, cost, damping = next_z, next_qpos, next_cost, damping / DAMPING_DECREASE
+            z, qpos, cost, damping = next_z, next_qpos, next_cost, damping / _DAMPING_DECREASE
         if converged:
             return qpos, cost, steps, True
     return qpos, cost, stop[2], False
@@ -109,7 +122,17 @@ def _minimise(
 @compiled
 def project_posture(subspace: Subspace, posture: Floats) -> Floats:
     """The posture (P,) of the subspace that is nearest to a posture (P,)."""
-    out: Floats = posture - np.dot(np.dot(subspace.normals, posture - subspace.mean), subspace.normals)
+    return subspace.mean + project_direction(subspace, posture - subspace.mean)
+
+
+@compiled
+def project_direction(subspace: Subspace, direction: Floats) -> Floats:
+    """The part (P,) of a direction (P,) that lies within the subspace."""
+    out = direction.copy()
+    for normal in subspace.normals:
+        share = dot(normal, direction)
+        for i in range(len(out)):
+            out[i] -= share * normal[i]
     return out
 
 
@@ -126,87 +149,123 @@ def _root_jacobian(z: Floats) -> Floats:
 
     The root's orientation is about_z(yaw) exp(tilt): yaw rotates it about exp(-tilt) z, and tilt by its right Jacobian.
     """
-    x, y, up = z[4], z[5], z[6]
-    squared = x * x + y * y + up * up
+    tilt = z[4:7]
+    squared = dot(tilt, tilt)
     angle = np.sqrt(squared)
     half, sine, rest = 0.5, 1.0, 1.0 / 6.0  # limits at angle 0
     if angle > 1e-4:
         half = (1.0 - np.cos(angle)) / squared
         sine, rest = np.sin(angle) / angle, (angle - np.sin(angle)) / (squared * angle)
-    cross = np.array([[0.0, -up, y], [up, 0.0, -x], [-y, x, 0.0]])
-    cross_squared = np.dot(cross, cross)
     out = np.empty((4, 3))
-    out[0] = half * cross_squared[2] + sine * cross[2]
+    for i in range(3):
+        for j in range(3):  # the square of the tilt's cross product, and its last row
+            out[1 + i, j] = rest * (tilt[i] * tilt[j] - (squared if i == j else 0.0))
+        out[0, i] = half * (tilt[2] * tilt[i] - (squared if i == 2 else 0.0))
+        out[1 + i, i] += 1.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[1 + j, i] += half * tilt[k]
+        out[1 + i, j] -= half * tilt[k]
+    out[0, 0] -= sine * tilt[1]
+    out[0, 1] += sine * tilt[0]
     out[0, 2] += 1.0
-    out[1:] = np.eye(3) + half * cross + rest * cross_squared
     return out
 
 
 @compiled
-def to_subspace(
-    tree: KinematicTree,
-    subspace: Subspace,
-    z: Floats,
-    rows: Floats,
-    descent: Floats,
-    normal: Floats,
-    z_descent: Floats,
-) -> None:
-    """Fill in the normal equations (3 + P, 3 + P), lower triangle, and the descent of z, from those of the tangent.
-
-    Those are rows (V, D) and descent (V,) of `normal_rows`. The subspace's cost is added. Tangent: translation 0 to 2,
-    root rotation 3 to 5, hinges from 6. Of z: x, y 0 and 1, yaw 2, height 3, tilt 4 to 6, hinges from 7. Hinges are the
-    same in both, so only the seven leading rows and the columns of the root are transformed, by the Jacobian of the
-    root's motion (7, 6). The root's directions are the first six ancestors of every hinge.
-    """
-    jacobian, root, rotation = np.zeros((7, 6)), np.empty((6, 6)), _root_jacobian(z)
-    curvature = subspace.curvature
-    jacobian[0, 0] = jacobian[1, 1] = jacobian[3, 2] = 1.0
-    jacobian[2, 3:], jacobian[4:, 3:] = rotation[0], rotation[1:]
-    for k in range(6):
-        for m in range(k + 1):
-            root[k, m] = root[m, k] = rows[k, m]
-    normal[:7, :7] = np.dot(np.dot(jacobian, root), jacobian.T)
-    normal[3:7, 3:7] += curvature[:4, :4]
-    for r in range(6, len(rows)):
-        row, tangent, prior = normal[r + 1], rows[r], curvature[r - 2]
-        row[0], row[1], row[3] = tangent[0], tangent[1], tangent[2] + prior[0]
-        row[2] = rotation[0, 0] * tangent[3] + rotation[0, 1] * tangent[4] + rotation[0, 2] * tangent[5]
-        for k in range(1, 4):
-            row[3 + k] = (
-                rotation[k, 0] * tangent[3] + rotation[k, 1] * tangent[4] + rotation[k, 2] * tangent[5] + prior[k]
-            )
-        for c in range(6, r + 1):
-            row[c + 1] = prior[c - 2]
-        for d in range(6, tree.depth[r] + 1):
-            row[tree.ancestors[r, d] + 1] += tangent[d]
-    z_descent[:7] = np.dot(jacobian, descent[:6])
-    z_descent[7:] = descent[6:]
-    z_descent[3:] += subspace.linear - np.dot(curvature, z[3:] - subspace.mean)
+def _root_motion(z: Floats) -> Floats:
+    """(7, 6) Jacobian of the root's motion in the tangent: x, y, yaw, height, tilt -> translation, rotation."""
+    out, rotation = np.zeros((7, 6)), _root_jacobian(z)
+    out[0, 0] = out[1, 1] = out[3, 2] = 1.0
+    for m in range(3):
+        out[2, 3 + m] = rotation[0, m]
+        for k in range(3):
+            out[4 + k, 3 + m] = rotation[1 + k, m]
+    return out
 
 
 @compiled
-def solve_damped(subspace: Subspace, normal: Floats, descent: Floats, damping: float) -> Floats:
-    """The damped step (3 + P,) within the subspace; NaN when the matrix is not positive definite."""
-    factor, step = normal.copy(), descent.copy()
-    count = len(step)
-    for k in range(count):
+def to_subspace(tree: KinematicTree, subspace: Subspace, z: Floats, rows: Floats, normal: Floats) -> None:
+    """Fill in the normal equations (3 + P, 3 + P or wider), lower triangle, from those of the tangent.
+
+    Those are the rows (V, D) of `normal_rows`. The subspace's curvature is added. Tangent: translation 0 to 2,
+    root rotation 3 to 5, hinges from 6. Of z: x, y 0 and 1, yaw 2, height 3, tilt 4 to 6, hinges from 7. Hinges are the
+    same in both, so only the seven leading rows and the columns of the root are transformed, by the Jacobian of the
+    root's motion. The root's directions are the first six ancestors of every hinge.
+    """
+    jacobian, curvature = _root_motion(z), subspace.curvature
+    half = np.zeros((7, 6))
+    for k in range(7):
+        for m in range(6):
+            for n in range(6):
+                half[k, m] += jacobian[k, n] * (rows[m, n] if n <= m else rows[n, m])
+    for k in range(7):
+        for n in range(k + 1):
+            total = curvature[k - 3, n - 3] if n >= 3 else 0.0
+            for m in range(6):
+                total += half[k, m] * jacobian[n, m]
+            normal[k, n] = total
+    for r in range(6, len(rows)):
+        row, tangent, prior = normal[r + 1], rows[r], curvature[r - 2]
+        row[0], row[1], row[3] = tangent[0], tangent[1], tangent[2] + prior[0]
+        x, y, up = tangent[3], tangent[4], tangent[5]
+        row[2] = jacobian[2, 3] * x + jacobian[2, 4] * y + jacobian[2, 5] * up
+        for k in range(4, 7):
+            row[k] = jacobian[k, 3] * x + jacobian[k, 4] * y + jacobian[k, 5] * up + prior[k - 3]
+        for c in range(7, r + 2):
+            row[c] = prior[c - 3]
+        for d in range(6, tree.depth[r] + 1):
+            row[tree.ancestors[r, d] + 1] += tangent[d]
+
+
+@compiled
+def trace_of_product(tree: KinematicTree, z: Floats, rows: Floats, covariance: Floats) -> float:
+    """Trace of a covariance of z (3 + P, 3 + P) times normal equations of the tangent, given as rows (V, D).
+
+    These are brought to z as in `to_subspace`, without any prior.
+    """
+    jacobian, total, twice = _root_motion(z), 0.0, 0.0
+    across = np.zeros((len(covariance), 6))  # the covariance with the tangent's root
+    for i in range(len(covariance)):
+        for k in range(7):
+            for m in range(6):
+                across[i, m] += covariance[i, k] * jacobian[k, m]
+    for m in range(6):
+        for n in range(m + 1):
+            of_root = 0.0
+            for k in range(7):
+                of_root += jacobian[k, m] * across[k, n]
+            if n < m:
+                twice += rows[m, n] * of_root
+            else:
+                total += rows[m, n] * of_root
+    for r in range(6, len(rows)):
+        depth = tree.depth[r]
+        for m in range(6):
+            twice += rows[r, m] * across[r + 1, m]
+        for d in range(6, depth):
+            twice += rows[r, d] * covariance[r + 1, tree.ancestors[r, d] + 1]
+        total += rows[r, depth] * covariance[r + 1, r + 1]
+    return total + 2.0 * twice
+
+
+@compiled
+def descent_in_subspace(subspace: Subspace, z: Floats, descent: Floats, out: Floats) -> None:
+    """Fill in the descent (3 + P,) of z, from that of the tangent (V,); the subspace's cost is added."""
+    jacobian = _root_motion(z)
+    pull = np.dot(subspace.curvature, z[3:] - subspace.mean)
+    for k in range(7):
+        out[k] = dot(jacobian[k], descent[:6])
+    for i in range(7, len(z)):
+        out[i] = descent[i - 1]
+    for i in range(len(pull)):
+        out[3 + i] += subspace.linear[i] - pull[i]
+
+
+@compiled
+def damp(subspace: Subspace, normal: Floats, damping: float) -> None:
+    """Raise the diagonal of normal equations by a share of itself; that of the subspace's spring is not damped."""
+    for k in range(len(normal)):
         if k >= 3:
-            factor[k, k] -= subspace.spring[k - 3] * (damping / (1.0 + damping))  # the spring is not damped
-        factor[k, k] = factor[k, k] * (1.0 + damping) + _MIN_DIAGONAL
-    for k in range(count - 1, -1, -1):  # L^T D L from the last row, as `levenberg_marquardt`, but of a dense matrix
-        pivot = factor[k]
-        if not pivot[k] > 0.0:
-            step[:] = np.nan
-            return step
-        for i in range(k):
-            share, row = pivot[i] / pivot[k], factor[i]
-            for j in range(i + 1):
-                row[j] -= share * pivot[j]
-            step[i] -= share * step[k]
-    for k in range(count):
-        for i in range(k):
-            step[k] -= factor[k, i] * step[i]
-        step[k] /= factor[k, k]
-    step[3:] -= np.dot(np.dot(subspace.normals, step[3:]), subspace.normals)
-    return step
+            normal[k, k] -= subspace.spring[k - 3] * (damping / (1.0 + damping))
+        normal[k, k] = normal[k, k] * (1.0 + damping) + _MIN_DIAGONAL

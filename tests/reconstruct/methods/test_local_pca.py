@@ -8,6 +8,7 @@ import pytest
 from harness.core.arrays import Floats, Singles
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.methods.local_pca import LocalPca
+from harness.reconstruct.solver.dense_factor import factorise, new_rows, solve_factorised
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
@@ -15,8 +16,10 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import (
     Subspace,
+    damp,
+    descent_in_subspace,
+    project_direction,
     project_posture,
-    solve_damped,
     subspace_cost,
     to_subspace,
 )
@@ -65,7 +68,9 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     expected = jacobian.T @ hessian @ jacobian
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)
-    to_subspace(residuals.tree, space, z, *normal_rows_of(residuals), normal, found)
+    rows, tangent_descent = normal_rows_of(residuals)
+    to_subspace(residuals.tree, space, z, rows, normal)
+    descent_in_subspace(space, z, tangent_descent, found)
     np.testing.assert_allclose(np.tril(normal), np.tril(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
     np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
 
@@ -79,9 +84,21 @@ def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene,
     normal[3:, 3:] += space.curvature
     within = np.linalg.svd(basis)[0][:, :43]
     step = within @ np.linalg.solve(within.T @ normal @ within, within.T @ gradient)
-    np.testing.assert_allclose(
-        solve_damped(space, np.tril(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max()
-    )
+    factor, found = new_rows(55), gradient.copy()
+    factor[:, :55] = np.tril(normal)
+    damp(space, factor, 0.0)
+    assert factorise(factor)
+    solve_factorised(factor, found)
+    found[3:] = project_direction(space, found[3:])
+    np.testing.assert_allclose(found, step, atol=2e-3 * np.abs(step).max())
+
+
+def test_damping_raises_the_diagonal_but_not_the_spring(walk: Scene) -> None:
+    space = space_of(walk, 40)
+    normal = np.diag(np.concatenate([np.ones(3), 2.0 + space.spring]))
+    damp(space, normal, 0.5)
+    expected = np.concatenate([np.full(3, 1.5), 3.0 + space.spring])
+    np.testing.assert_allclose(np.diag(normal), expected, rtol=1e-6)
 
 
 def test_what_is_left_out_varies_least(walk: Scene) -> None:
@@ -92,9 +109,11 @@ def test_what_is_left_out_varies_least(walk: Scene) -> None:
     assert held <= 1.01 * np.sum(np.linalg.eigvalsh(scatter)[:12]) + 12 * 1e-9
 
 
-def test_inverse(rng: np.random.Generator) -> None:
-    half = rng.normal(size=(60, 52)) * np.geomspace(1.0, 1e-4, 52)
-    np.testing.assert_allclose(invert_positive_definite(half.T @ half) @ (half.T @ half), np.eye(52), atol=1e-6)
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 52, 55])
+def test_inverse(count: int, rng: np.random.Generator) -> None:
+    half = rng.normal(size=(60, count)) * np.geomspace(1.0, 1e-4, count)
+    product = half.T @ half
+    np.testing.assert_allclose(invert_positive_definite(product) @ product, np.eye(count), atol=1e-6)
 
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
