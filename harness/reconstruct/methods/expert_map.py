@@ -4,7 +4,7 @@ For every frame:
 
 1. Bring the readings of all stations to one instant (`temporal_alignment`).
 2. Put two Gaussians of the posture together from tabulated moments of the examples (`local_experts`): one given the
-   readings and the last poses, one given the last poses alone.
+   readings and the last poses, one given the last poses alone. Multiply them by terms of contact (`floor_contact`).
 3. Solve for the pose that maximises the product of both and of the likelihood of the readings, by Levenberg-Marquardt.
 4. Update the scales of the readings' noise and of the prior from the residuals (`self_calibration`).
 
@@ -35,8 +35,10 @@ from harness.reconstruct.features.moment_table import condition, local_gaussian
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
+from harness.reconstruct.features.toe_height import toe_height_m
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.fixed_lag import FixedLagSession
+from harness.reconstruct.solver.floor_contact import FloorContact
 from harness.reconstruct.solver.ground_frame import (
     HINGES,
     POSTURE_SIZE,
@@ -107,7 +109,8 @@ class ExpertMap:
         """Learn from a database, which may lie on disk."""
         windows = database.windows(POSES, with_successor=True)
         ik_prior = Ik().posture_prior(body, database)
-        return FittedExpertMap(self, body, windows, mean_posture(body, database), ik_prior)
+        floor_m = toe_height_m(body, database)
+        return FittedExpertMap(self, body, windows, mean_posture(body, database), ik_prior, floor_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +124,8 @@ class FittedExpertMap:
     """(55,) mean posture, the prior of frames without a history."""
     ik_prior: PosturePrior
     """Prior of `ik`."""
+    floor_m: float
+    """Height of a toe on the floor [m]."""
     _cache: CalibrationCache[tuple[ReducedRankRegression, dict[int, LocalExperts]]] = field(
         default_factory=CalibrationCache
     )
@@ -162,6 +167,7 @@ class ExpertMapSession(HistorySession):
         self._experts = experts[id(regression)]
         self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
         self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
+        self._contact = FloorContact(fitted.body, self.residuals, fitted.floor_m, fitted.windows.database.rate_hz)
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
         self._loss_scale = LossScale(loss.position_scale_m)
         self._prior: Subspace | None = None
@@ -219,6 +225,7 @@ class ExpertMapSession(HistorySession):
     def record(self, frame: TrackerFrame, cold: bool) -> None:
         super().record(frame, cold)
         self._query.record()
+        self._contact.record(self.qpos)
         if self._prior is None:
             self._angle_sigma_rad = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
             return
@@ -236,7 +243,7 @@ class ExpertMapSession(HistorySession):
         return _extrapolate_ground(self.past[0], self.past[1])
 
     def _predict(self, history: bool) -> Subspace:
-        """The product of the experts and, far from the examples, of the prior of `ik`."""
+        """The product of the experts, of contact with the floor and, far from the examples, of the prior of `ik`."""
         options, query = self._options, self._query
         if query.prepare(history):
             regression = query.regression
@@ -260,7 +267,8 @@ class ExpertMapSession(HistorySession):
             weight = options.history_weight / math.sqrt(widened)
         precision, linear = self._ik_terms(mean, 1.0 - 1.0 / widened)
         factors = widened * scales.prior, weight / scales.prior
-        return _product(mean, covariance, factors[0], other_mean, other, factors[1], precision, linear)
+        prior = _product(mean, covariance, factors[0], other_mean, other, factors[1], precision, linear)
+        return self._contact.constrain(prior, history)
 
     def _ik_terms(self, mean: Floats, weight: float) -> tuple[Floats, Floats]:
         """Precision (P,) of the prior of `ik` with a weight, and its pull (P,) away from `mean`."""

@@ -336,7 +336,7 @@ def mode_of(session: ExpertMapSession, history: bool = True) -> Floats:
 
 
 def by_definition(session: ExpertMapSession, widening: float, power: float) -> tuple[Floats, Floats]:
-    """Precision (52, 52) and mean (52,) of the product of all three priors, written out."""
+    """Precision (52, 52) and mean (52,) of the product of all three priors, written out, with the terms of contact."""
     query, experts, scales = session._query, session._experts, session._scales
     predictors = query.predictors(session.past)
     to_z = experts.feature_map(session.residuals.measured, True)
@@ -358,7 +358,10 @@ def by_definition(session: ExpertMapSession, widening: float, power: float) -> t
     third = np.diag(np.append(np.zeros(4), (1.0 - 1.0 / factor) * by_ik.precision[6:]))
     precision = first + second + third
     pulled = first @ mean + second @ other_mean + third @ np.append(np.zeros(4), by_ik.qpos[7:])
-    return precision, np.linalg.solve(precision, pulled)
+    zero = np.zeros(52)
+    product = Subspace(np.linalg.solve(precision, pulled), np.zeros((0, 52)), precision, zero, zero)
+    found = session._contact.constrain(product, True)
+    return found.curvature, found.mean
 
 
 @pytest.mark.parametrize(("widening", "power"), [(0.0, 0.0), (0.0, 0.5), (150.0, 0.5), (4000.0, 0.8)])
@@ -450,3 +453,20 @@ def test_a_jump_is_gated_by_its_option(walk: Scene, fitted: FittedExpertMap) -> 
         session.step(jump)
         left_out.append(not session.residuals.measured[0])
     assert left_out == [True, False]
+
+
+def test_the_prior_holds_a_toe_that_is_still_and_lifts_one_from_below_the_floor(
+    walk: Scene, fitted: FittedExpertMap
+) -> None:
+    """A floor far above the toes raises both, unless it is another floor."""
+    session = warm(walk, fitted)
+    with_contact = session._predict(history=True)
+    at_the_floor = warm(walk, replace(fitted, floor_m=fitted.floor_m + 0.05))._predict(history=True)
+    feet = [44, 45, 50, 51]
+    assert np.abs(at_the_floor.mean[feet] - with_contact.mean[feet]).max() > np.deg2rad(2.0)
+    session._contact.record(np.array(session.qpos) + 0.05 * np.isin(np.arange(55), np.array(feet) + 3))
+    moved = session._predict(history=True)
+    assert np.abs(moved.mean[feet] - with_contact.mean[feet]).max() > np.deg2rad(0.2)
+    cold = session._predict(history=False)
+    session._contact.record(session.qpos)
+    np.testing.assert_array_equal(session._predict(history=False).mean, cold.mean)
