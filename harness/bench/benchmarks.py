@@ -16,14 +16,14 @@ from harness.bench.wire import bench_wire
 from harness.errors import MissingExtra, UnknownName
 
 
-def _ik(seed: int, large: bool) -> list[BenchmarkRow]:
+def _ik(seed: int, large: bool, runs: int) -> list[BenchmarkRow]:
     _require_mink()
     from harness.bench.ik import bench_ik
 
     return bench_ik(seed)
 
 
-def _methods(seed: int, large: bool) -> list[BenchmarkRow]:
+def _methods(seed: int, large: bool, runs: int) -> list[BenchmarkRow]:
     _require_mink()
     from harness.bench.methods import bench_methods
 
@@ -35,27 +35,33 @@ def _require_mink() -> None:
         raise MissingExtra("The reference for inverse kinematics", "mink", "bench")
 
 
-BENCHMARKS: dict[str, Callable[[int, bool], list[BenchmarkRow]]] = {
-    "startup": lambda seed, large: bench_startup(),
-    "load": lambda seed, large: bench_load(seed),
-    "stream": lambda seed, large: bench_stream(seed),
-    "wire": lambda seed, large: bench_wire(seed, large=large),
+BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
+    "startup": lambda seed, large, runs: bench_startup(),
+    "load": lambda seed, large, runs: bench_load(seed),
+    "stream": lambda seed, large, runs: bench_stream(seed),
+    "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "ik": _ik,
-    "index": lambda seed, large: bench_index(seed),
+    "index": lambda seed, large, runs: bench_index(seed),
     "methods": _methods,
-    "outliers": lambda seed, large: bench_rejected_readings(seed),
-    "leak": lambda seed, large: bench_leak_check(seed),
-    "gate": lambda seed, large: bench_regression_gate(seed),
-    "sweep": lambda seed, large: bench_sweep(seed),
+    "outliers": lambda seed, large, runs: bench_rejected_readings(seed),
+    "leak": lambda seed, large, runs: bench_leak_check(seed),
+    "gate": lambda seed, large, runs: bench_regression_gate(seed),
+    "sweep": lambda seed, large, runs: bench_sweep(seed),
 }
 
 
 def run_benchmarks(
-    names: Sequence[str], *, seed: int, large: bool = False, progress: Callable[[str, int, int], None]
+    names: Sequence[str],
+    *,
+    seed: int,
+    large: bool = False,
+    runs: int = 1,
+    progress: Callable[[str, int, int], None],
 ) -> tuple[list[BenchmarkRow], list[str]]:
     """Run the named benchmarks, or all; returns their rows, and the reasons why some of all could not run.
 
     With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
+    `wire` runs each line `runs` times.
     UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed.
     """
     for name in names:
@@ -67,7 +73,7 @@ def run_benchmarks(
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
-            rows += BENCHMARKS[name](seed, large)
+            rows += BENCHMARKS[name](seed, large, runs)
         except MissingExtra as missing:
             if names:
                 raise

@@ -21,6 +21,7 @@ def add_bench(verbs: Verbs) -> None:
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
+    verb.add_argument("--runs", type=positive_int, metavar="N", help="wire: number of runs of each line (default 1)")
     verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default expert_map)")
     verb.add_argument("--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5)")
     text = "accuracy: clips computed at the same time (default 1)"
@@ -37,6 +38,8 @@ def run_bench(args: argparse.Namespace) -> Outcome:
         return _bench_accuracy(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
         raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
+    if args.runs and args.what and "wire" not in args.what:
+        raise BadInput("--runs is for wire alone.", "Name it: harness bench wire --runs 10.")
     return _bench_speed(args)
 
 
@@ -46,7 +49,8 @@ def _bench_speed(args: argparse.Namespace) -> Outcome:
 
     with ProgressBar("benchmarks") as progress:
         seed = args.seed if args.seed is not None else 1
-        rows, left_out = run_benchmarks(tuple(args.what), seed=seed, large=args.large, progress=progress)
+        names, runs = tuple(args.what), args.runs or 1
+        rows, left_out = run_benchmarks(names, seed=seed, large=args.large, runs=runs, progress=progress)
     content = {"rows": [row.as_dict() for row in rows], "left_out": left_out}
     return print_result(
         args, content, format_rows(rows), *left_out, outcome=Outcome.INCOMPLETE if left_out else Outcome.PASS
@@ -60,8 +64,10 @@ def _bench_accuracy(args: argparse.Namespace) -> Outcome:
     from harness.bench.accuracy.text import format_report, report_content
     from harness.experiment.executors import process_executor
 
-    if args.what != [ACCURACY] or args.large or args.seed is not None:
-        raise BadInput("accuracy runs alone, without --large and --seed.", "Give --seeds N for the first N seeds.")
+    if args.what != [ACCURACY] or args.large or args.runs or args.seed is not None:
+        raise BadInput(
+            "accuracy runs alone, without --large, --runs and --seed.", "Give --seeds N for the first N seeds."
+        )
     if args.quick and (args.save or args.seeds):
         raise BadInput("--quick has one seed and few clips.", "Leave out --save and --seeds, or leave out --quick.")
     jobs, seeds, out = args.jobs or 1, SEEDS[: args.seeds], args.out or Path("results") / ACCURACY

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.bench.wire import _last_clock_reset, _losses_and_latency, _pose_times
+from harness.bench.wire import LineRun, _last_clock_reset, _losses_and_latency, _pose_times, line_rows
+from harness.bench.wire_cases import CASES
 
 
 def test_records_count_from_the_last_time_that_the_clock_was_zeroed() -> None:
@@ -30,3 +31,17 @@ def test_poses_are_found_by_station_and_stamp(tmp_path: Path) -> None:
     head, torso = _pose_times(table, 2)
     assert head == {0.25: 1.5, 0.75: 2.5}
     assert torso[0.5] == 1.5
+
+
+def test_rows_of_a_line_have_the_median_over_its_runs_of_what_exceeds_the_timer() -> None:
+    """Each run is compared with the timer of the same run; losses are summed."""
+    latency_ms, timer_ms, lost = (9.0, 4.0, 30.0), (1.0, 2.0, 10.0), (0, 2, 1)
+    runs = [
+        LineRun(100, n, 0.5, 1.0, p99, 40.0, timer) for p99, timer, n in zip(latency_ms, timer_ms, lost, strict=True)
+    ]
+    losses, _, above = line_rows(CASES[0], 15.0, runs)
+    assert losses.value == 3.0
+    assert "of 300 in 3 x 15 s" in losses.reference
+    assert above.value == 8.0  # of 8, 2 and 20
+    assert "median of 3 runs; 2.00 to 20.00 ms" in above.reference
+    assert above.target == "<= 5"
