@@ -105,7 +105,7 @@ def _constrain(
             stays = 1.0 / ((1.0 + moved) * step_m) ** 2
         else:
             pull[:] = 0.0
-        depth = max(floor_m - at[2], 0.0)
+        depth = floor_m - at[2]
         sinks = 1.0 / ((1.0 + (depth / depth_scale_m) ** 2) * depth_sigma_m) ** 2 if depth > 0.0 else 0.0
         body = tree.station_body[foot]
         for dof in range(tree.first_dof[body], tree.first_dof[body + 1]):
