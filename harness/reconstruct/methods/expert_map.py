@@ -32,7 +32,7 @@ from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
-from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.features.toe_height import toe_height_m
@@ -66,6 +66,9 @@ _RIDGE = 1e-4
 """Ridge of the expert of readings and history, as a share of the features' variance."""
 _HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
 """Ridge and width of the expert of the history, and a further standard deviation of every hinge under it."""
+_SPREAD_SHARE = 0.06
+"""Share of a hinge's spread over the examples that joins the stated standard deviations. Performers differ by it in
+hinges that no station shows, also where neighbouring examples agree."""
 FEATURES = 32
 """Number of features of readings and history."""
 
@@ -110,7 +113,9 @@ class ExpertMap:
         windows = database.windows(POSES, with_successor=True)
         ik_prior = Ik().posture_prior(body, database)
         floor_m = toe_height_m(body, database)
-        return FittedExpertMap(self, body, windows, mean_posture(body, database), ik_prior, floor_m)
+        mean_qpos = mean_posture(body, database)
+        least_sigma_rad = _SPREAD_SHARE * spread_rad(body, database, mean_qpos)
+        return FittedExpertMap(self, body, windows, mean_qpos, ik_prior, floor_m, least_sigma_rad)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +131,8 @@ class FittedExpertMap:
     """Prior of `ik`."""
     floor_m: float
     """Height of a toe on the floor [m]."""
+    least_sigma_rad: Floats
+    """(48,) part of the stated standard deviation of each hinge that does not depend on the frame [rad]."""
     _cache: CalibrationCache[tuple[ReducedRankRegression, dict[int, LocalExperts]]] = field(
         default_factory=CalibrationCache
     )
@@ -163,6 +170,7 @@ class ExpertMapSession(HistorySession):
             fitted.body, calibration, solver_options, posture_prior, POSES, fitted.windows.database.rate_hz
         )
         self._options, self._ik_prior, self._made = options, fitted.ik_prior, experts
+        self._least_sigma_rad = fitted.least_sigma_rad
         self._query = PredictorQuery(regression, self.residuals)
         self._experts = experts[id(regression)]
         self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
@@ -233,7 +241,7 @@ class ExpertMapSession(HistorySession):
         residuals.evaluate(self.qpos)
         z = ground_and_posture(self.qpos)
         found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
-        self._angle_sigma_rad = np.sqrt(found.variance[HINGES])
+        self._angle_sigma_rad = np.hypot(np.sqrt(found.variance[HINGES]), self._least_sigma_rad)
         if not cold:
             self._scales.update(found)
             self._loss_scale.update(residuals.targets, residuals.state)

@@ -302,6 +302,17 @@ def sigma_of(estimate: Estimate) -> Floats:
     return estimate.angle_sigma_rad
 
 
+def test_deviations_include_a_share_of_the_spread_of_the_examples(walk: Scene, fitted: FittedExpertMap) -> None:
+    """The squares of the posterior's and of the share are added; the share differs from hinge to hinge."""
+    least_rad, frames = fitted.least_sigma_rad, walk.frames[:12]
+    assert least_rad.shape == (48,)
+    assert np.ptp(least_rad) > np.deg2rad(0.5)
+    stated = sigma_of(follow(begin(fitted, walk), frames)[-1])
+    posterior_alone = replace(fitted, least_sigma_rad=np.zeros(48))
+    alone = sigma_of(follow(begin(posterior_alone, walk), frames)[-1])
+    np.testing.assert_allclose(stated**2 - alone**2, least_rad**2, atol=1e-12)
+
+
 def test_deviations_grow_where_stations_fall_silent(walk: Scene, fitted: FittedExpertMap) -> None:
     session = begin(fitted, walk)
     told = sigma_of(follow(session, walk.frames[:30])[-1])
