@@ -20,4 +20,6 @@ def run_baseline(args: argparse.Namespace) -> Outcome:
     from harness.compare.baseline import write_baseline
 
     folder = write_baseline(args.run, args.name, force=args.force)
-    return print_result(args, {"baseline": str(folder)}, f"baseline: {folder}")
+    return print_result(
+        args, {"baseline": str(folder)}, f"baseline: {folder}", following=["compare", args.name, args.run]
+    )

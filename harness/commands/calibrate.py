@@ -101,8 +101,13 @@ def _draw_sheet(args: argparse.Namespace) -> Outcome:
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
     lines = [f"{number}  {pose.name}: {pose.instruction}" for number, pose in enumerate(POSES, 1)]
+    following = ["calibrate", "--live", "--port", "PORT", "--scenario", "demo", "--out", "me.toml"]
     return print_result(
-        args, {"poses": poses, "pictures": [str(path) for path in paths]}, *lines, f"drawn in {args.sheet}"
+        args,
+        {"poses": poses, "pictures": [str(path) for path in paths]},
+        *lines,
+        f"drawn in {args.sheet}",
+        following=following,
     )
 
 
@@ -133,8 +138,11 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     require_writable(args.out, force=args.force)
     found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
     write_calibration(args.out, found.file, force=args.force)
+    following: list[object] = ["replay", args.recording, "--methods", "ik,expert_map", "--calibration", args.out]
+    if args.live:
+        following = ["live", "--port", args.port, "--scenario", args.scenario, "--calibration", args.out]
     content = {"file": str(args.out), **found.file.diagnostics}
-    return print_result(args, content, *found.lines, "", f"{args.out}: written")
+    return print_result(args, content, *found.lines, "", f"{args.out}: written", following=following)
 
 
 def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":

@@ -220,17 +220,35 @@ def show_progress(line: str) -> None:
 
 
 def print_result(
-    args: argparse.Namespace, content: Mapping[str, Any], *lines: str, outcome: Outcome = Outcome.PASS
+    args: argparse.Namespace,
+    content: Mapping[str, Any],
+    *lines: str,
+    outcome: Outcome = Outcome.PASS,
+    following: Sequence[object] = (),
 ) -> Outcome:
     """Print the lines, or with --json the content and the outcome's word; returns the outcome.
+
+    `following` are the words of the command that a user would give next, without the program's name. It is printed to
+    stderr, and with --json as "next".
 
     It is the last thing that a verb does: signals that come later change nothing.
     """
     refuse_interrupts()
-    print_data((json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines)) + "\n")
+    command = shlex.join(["harness", *map(str, following)]) if following else None
+    if args.json:
+        following_command = {"next": command} if command else {}
+        print_data(json.dumps({**content, **following_command, "outcome": outcome.word}) + "\n")
+        return outcome
+    if print_data("\n".join(lines) + "\n") and command:
+        print_status(f"next: {command}")
     return outcome
+
+
+def this_words() -> list[str]:
+    """The words of the command line as typed, without the program's name."""
+    return sys.argv[1:]
 
 
 def this_command() -> str:
     """The command line as it was typed."""
-    return shlex.join(["harness", *sys.argv[1:]])
+    return shlex.join(["harness", *this_words()])

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, print_result, this_words
 from harness.errors import BadInput, Outcome
 
 _SIDE_HELP = "the folder of a run, sweep or baseline, or the name of a baseline"
@@ -47,4 +47,5 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     page = write_comparison_page(comparison, args.html) if args.html else None
     content = {**to_json_types(asdict(comparison)), "page": page and str(page)}
     lines = [text(comparison), *([f"page: {page}"] if page else [])]
-    return print_result(args, content, *lines, outcome=comparison.outcome)
+    following = () if page else (*this_words(), "--html", "comparison.html")
+    return print_result(args, content, *lines, outcome=comparison.outcome, following=following)

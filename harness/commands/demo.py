@@ -1,11 +1,12 @@
 """The verb `demo`: run the main job on synthetic motion."""
 
 from harness.commands.common import Verbs, add_verb
-from harness.commands.run import run_scenario
+from harness.commands.run import add_all_flag, run_scenario
 
 
 def add_demo(verbs: Verbs) -> None:
     text = "run the main job on synthetic motion and write its report: nothing to download, a minute"
     verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
+    add_all_flag(verb)
     verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True, jobs=2)
     verb.set_defaults(isolate=False, time_limit=None, memory_limit=None)

@@ -22,4 +22,6 @@ def run_doctor(args: argparse.Namespace) -> Outcome:
     checks = check_installation(args.mocap)
     lines = [f"{'ok  ' if check.ok else 'FAIL'}  {check.name}: {check.detail}" for check in checks]
     outcome = Outcome.PASS if all(check.ok for check in checks) else Outcome.REGRESSED
-    return print_result(args, {"checks": [check.as_dict() for check in checks]}, *lines, outcome=outcome)
+    return print_result(
+        args, {"checks": [check.as_dict() for check in checks]}, *lines, outcome=outcome, following=["demo"]
+    )

@@ -1,6 +1,7 @@
 """The verb `emulate`: play a scenario as an IS-900."""
 
 import argparse
+import shlex
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -103,6 +104,9 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         )
         print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {names}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
+        stations = ["--stations", ",".join(samples.stations)] if args.stations else []
+        words = ["harness", "live", "--port", str(args.pty or port.name), "--scenario", args.scenario, *stations]
+        print_status(f"next, in another terminal: {shlex.join(words)}")
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
         counts = play_samples(samples, config, port, udp[0] if udp else LOOPBACK)

@@ -23,4 +23,4 @@ def run_list(args: argparse.Namespace) -> Outcome:
     for title, entries in content.items():
         width = max(len(name) for name in entries)
         lines += [f"{title}:", *(f"  {name:<{width}}  {text}" for name, text in entries.items())]
-    return print_result(args, content, *lines)
+    return print_result(args, content, *lines, following=["demo"])

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, mocap_words, print_result
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -32,7 +32,12 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .mvnx, .npz and .c3d files."
         )
-    return print_result(args, {"clips": [entry.as_dict() for entry in entries]}, *(entry.line() for entry in entries))
+    return print_result(
+        args,
+        {"clips": [entry.as_dict() for entry in entries]},
+        *(entry.line() for entry in entries),
+        following=["run", "boxing", *mocap_words(args.mocap)],
+    )
 
 
 def run_mocap_fetch(args: argparse.Namespace) -> Outcome:
@@ -42,5 +47,5 @@ def run_mocap_fetch(args: argparse.Namespace) -> Outcome:
     where = {"base_url": args.url} if args.url else {}
     with ProgressBar("files") as progress:
         files = fetch_cmu(subjects, args.out, progress=progress, **where)
-    text = f"{len(files)} files in {args.out}; use them with --mocap {args.out}"
-    return print_result(args, {"files": [str(f) for f in files]}, text)
+    text, following = f"{len(files)} files in {args.out}", ["mocap", "list", "--mocap", args.out]
+    return print_result(args, {"files": [str(f) for f in files]}, text, following=following)

@@ -13,6 +13,7 @@ from harness.commands.common import (
     print_result,
     progress_note,
     this_command,
+    this_words,
 )
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -62,5 +63,6 @@ def run_paper(args: argparse.Namespace) -> Outcome:
         )
     page = write_paper_page(out)
     content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
+    following = [] if outcome is Outcome.PASS else [*this_words()]
     lines = (text_tables(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
-    return print_result(args, content, *lines, outcome=outcome)
+    return print_result(args, content, *lines, outcome=outcome, following=following)

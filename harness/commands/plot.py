@@ -50,6 +50,7 @@ def run_plot(args: argparse.Namespace) -> Outcome:
         args.run, args.kind, selection, fmt=args.format, width_mm=args.width, out=args.out, force=args.force
     )
     content = {**vars(figure), "path": str(figure.path)}
+    following = ["table", args.run, "--format", "latex"] if figure.kind != "placement" else ()
     size = f"{figure.width_mm:.0f} x {figure.height_mm:.0f} mm"
     caption = textwrap.fill(f"caption: {figure.caption}", _CAPTION_WIDTH)
-    return print_result(args, content, f"figure: {figure.path} ({size})", caption)
+    return print_result(args, content, f"figure: {figure.path} ({size})", caption, following=following)

@@ -88,7 +88,9 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
     if args.frames and not args.json:  # the frames are the data
         print(*lines, sep="\n", file=sys.stderr)
         return Outcome.PASS
-    return print_result(args, content, *lines)
+    scenario = [] if "scenario" in recording.note else ["--scenario", "demo"]
+    following = ["replay", args.file, *scenario, "--methods", "ik,expert_map"]
+    return print_result(args, content, *lines, following=following)
 
 
 def _format_counts(stream: "RecordingStream") -> str:

@@ -36,7 +36,9 @@ def run_report(args: argparse.Namespace) -> Outcome:
 
     with ProgressBar("movies") as bar:
         page = write_run_page(args.run, movie=args.movie, progress=bar)
-    return print_result(args, {"report": str(page)}, f"report: {page}")
+    return print_result(
+        args, {"report": str(page)}, f"report: {page}", following=["plot", args.run, "--kind", "ranking"]
+    )
 
 
 def _report_sweep(args: argparse.Namespace) -> Outcome:
@@ -63,7 +65,7 @@ def _report_findings(args: argparse.Namespace) -> Outcome:
             "--movie is for runs, --readme for papers: leave it out.",
         )
     page = write_placement_page(args.run)
-    return print_result(args, {"report": str(page)}, f"report: {page}")
+    return print_result(args, {"report": str(page)}, f"report: {page}", following=["plot", args.run])
 
 
 def _report_paper(args: argparse.Namespace) -> Outcome:

@@ -19,7 +19,14 @@ def add_run(verbs: Verbs) -> None:
     verb.add_argument("--methods", metavar="A,B", help=text)
     add_isolation_flags(verb)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
+    add_all_flag(verb)
     verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
+
+
+def add_all_flag(verb: argparse.ArgumentParser) -> None:
+    """Add `--all`, for the whole table of a run."""
+    text = "print a row for each behaviour and method; without it, at most 12 rows"
+    verb.add_argument("--all", action="store_true", help=text)
 
 
 def run_scenario(args: argparse.Namespace) -> Outcome:
@@ -63,5 +70,10 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     summary = read_summary(out)
     content = {**summary, "out": str(out), "report": page and str(page)}
     return print_result(
-        args, content, run_table(summary), f"report: {page}" if page else f"results: {out}", outcome=outcome
+        args,
+        content,
+        run_table(summary, short=not args.all),
+        f"report: {page}" if page else f"results: {out}",
+        outcome=outcome,
+        following=["plot", out, "--kind", "ranking"] if outcome is Outcome.PASS else ["status", out],
     )

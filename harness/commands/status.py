@@ -36,8 +36,11 @@ def run_status(args: argparse.Namespace) -> Outcome:
         "failures": found.failures,
         "command": found.command,
     }
+    following = ["report", args.folder] if not found.remaining else shlex.split(found.command)[1:]
+    if found.running:
+        following = ["status", args.folder]
     outcome = Outcome.PASS if found.finished == found.planned else Outcome.INCOMPLETE
-    return print_result(args, content, *_status_lines(found), outcome=outcome)
+    return print_result(args, content, *_status_lines(found), outcome=outcome, following=following)
 
 
 def _status_lines(found: "RunStatus") -> list[str]:

@@ -66,8 +66,9 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
         print(summary["failures"][args.cell], file=sys.stderr)
     page = write_sweep_page(out)
     files = (f"table: {out / 'summary.csv'}", f"report: {page}")
+    following = [] if outcome is Outcome.PASS else ["status", out]
     content = {**summary, "out": str(out), "report": str(page)}
-    return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome)
+    return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome, following=following)
 
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:

@@ -42,4 +42,4 @@ def run_table_verb(args: argparse.Namespace) -> Outcome:
     )
     content = {**asdict(written.table), "file": args.out and str(args.out)}
     line = written.text.removesuffix("\n") if args.out is None else f"table: {args.out}"
-    return print_result(args, content, line)
+    return print_result(args, content, line, following=["plot", args.run, "--kind", "ranking"])

@@ -112,7 +112,11 @@ def test_a_baseline_is_saved_and_compared_by_its_name(here: Path, capsys: pytest
     assert main(["baseline", "save", "yesterday", "worse"]) == 2
     assert "--force" in capsys.readouterr().err
     assert main(["baseline", "save", "yesterday", "worse", "--force", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"baseline": "results/baselines/yesterday", "outcome": "pass"}
+    assert json.loads(capsys.readouterr().out) == {
+        "baseline": "results/baselines/yesterday",
+        "next": "harness compare yesterday worse",
+        "outcome": "pass",
+    }
     assert main(["compare", "yesterday", "worse", "--metrics", ANGLE]) == 0
     assert main(["baseline", "save", "../yesterday", "main"]) == 2
     assert main(["baseline", "save", "holes", "holes"]) == 2

@@ -32,13 +32,18 @@ def describe_ranking(
         return f"{lowest}: {error} mean joint-angle error on {where}. No other method was measured."
     if ranking.best:
         return f"{lowest} is best: {error} mean joint-angle error on {where}. {_lead(ranking, format_error, clips)}"
-    parts = [f"{lowest} has the lowest mean joint-angle error, {error} on {where}."]
+    first = f"{lowest} has the lowest mean joint-angle error, {error} on {where}"
+    undecided = ranking.others("cannot tell")
+    why = ranking.results[undecided[0]].why if undecided else ""
+    if len(undecided) == len(ranking.results):
+        others = "the other method" if len(undecided) == 1 else f"any of the other {len(undecided)}"
+        return f"{first}, but cannot be called better than {others} ({why})."
+    parts = [f"{first}."]
     if better := ranking.others("better"):
         parts.append(f"It is better than {list_first(better, _MOST_NAMED)}.")
     if same := ranking.others("same"):
         parts.append(f"The same within the margin: {list_first(same, _MOST_NAMED)}.")
-    if undecided := ranking.others("cannot tell"):
-        why = ranking.results[undecided[0]].why
+    if undecided:
         parts.append(f"Cannot tell whether it is better than {list_first(undecided, _MOST_NAMED)}: {why}.")
     return " ".join(parts)
 

@@ -4,49 +4,42 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.core.estimate import name_with_lag
-from harness.core.number_format import format_fixed, format_mean_sd, format_share
+from harness.core.number_format import count_noun, format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
 from harness.report.run.data import lag_of
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
-from harness.results.reported_metrics import MAX_FALLBACK_SHARE, TABLE_COLUMNS
+from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, TABLE_COLUMNS
 from harness.results.sigma_table import sigma_lines
 
+MOST_ROWS = 12
+"""Rows of the short table of a run: about what a terminal shows without scrolling."""
+_SHORT_COLUMNS = (PRIMARY_METRIC, SECONDARY_METRIC, "jitter_m_s3", "step_p50_ms")
+"""Metrics of the short table, which fits into 100 characters."""
 _RECORDS = ("records_sent", "records_dropped")
 
 
-def run_table(summary: Mapping[str, Any]) -> str:
-    """The text of a run: what its cells share, a row for each method and behaviour, and what failed.
+def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
+    """The text of a run: what its cells share, the rows, the ranking, and what failed.
 
-    A row has the mean and the standard deviation over sequences, and how many frames were matched.
+    There is a row for each method, behaviour and condition. With `short` a run of more than 12 such rows gets a row for
+    each method and condition instead, over all behaviours, lowest error first, and at most 12 of them. A row has the
+    mean and the standard deviation over sequences, and how many frames were matched.
     """
     cells = summary["cells"]
     finished = f"cells finished {summary['cells_finished']} of {summary['cells_planned']}"
     failed = [f"FAILED {cell}: {last_line(text)}" for cell, text in summary["failures"].items()]
     if not cells:
         return "\n".join(["nothing was measured", finished, *failed])
-    varying = _varying_columns(cells)
-    rows, sigma = [], []
-    for row in sorted(summary["behaviours"], key=lambda row: str(row["behaviour"])):
-        settings = [_format_cell(row[name]) for name in varying]
-        matched = f"{row['frames_matched']}/{row['frames_expected']}"
-        statistics = [(row["metrics"][name], decimals) for _, name, decimals in TABLE_COLUMNS]
-        figures = [format_mean_sd(s["mean"], s["sd"], decimals) for s, decimals in statistics]
-        share = _format_fallback(row["metrics"]["fallback_share"]["mean"])
-        method = name_with_lag(row["method"], lag_of(row))
-        sigma.append(([row["behaviour"], method, *settings], row.get("sigma_scores", {})))
-        rows.append([row["behaviour"], method, *settings, str(row["sequences"]), matched, share, *figures])
-    head = ["behaviour", "method", *varying, "clips", "matched", "fallback [%]"]
-    head += [title for title, *_ in TABLE_COLUMNS]
+    pooled = short and len(summary["behaviours"]) > MOST_ROWS
     return "\n".join(
         [
             _setup_lines(cells),
             *_link_loss(cells),
             "",
-            *Table(head, rows, text_columns=2 + len(varying)).lines(),
-            *sigma_lines(["behaviour", "method", *varying], sigma),
+            *(_pooled_rows(summary) if pooled else _behaviour_rows(summary)),
             "",
             *_fallback_lines(summary["methods"]),
             *calibration_errors.text(summary),
@@ -58,6 +51,57 @@ def run_table(summary: Mapping[str, Any]) -> str:
             *failed,
         ]
     )
+
+
+def _behaviour_rows(summary: Mapping[str, Any]) -> list[str]:
+    """The table of every method, behaviour and condition, and that of the standard deviations."""
+    rows = sorted(summary["behaviours"], key=lambda row: str(row["behaviour"]))
+    varying = _varying_columns(summary["cells"])
+    firsts = [[row["behaviour"], *_first_cells(row, varying)] for row in rows]
+    head = ["behaviour", "method", *varying]
+    scores = [(first, row.get("sigma_scores", {})) for first, row in zip(firsts, rows, strict=True)]
+    return [*_table_lines(head, firsts, rows), *sigma_lines(head, scores)]
+
+
+def _pooled_rows(summary: Mapping[str, Any]) -> list[str]:
+    """The table of the methods and conditions with the lowest errors over all behaviours, and how many are left out."""
+    measured = [row for row in summary["methods"] if row["metrics"][PRIMARY_METRIC]["mean"] is not None]
+    unmeasured = [row for row in summary["methods"] if row["metrics"][PRIMARY_METRIC]["mean"] is None]
+    rows = [*sorted(measured, key=lambda row: float(row["metrics"][PRIMARY_METRIC]["mean"])), *unmeasured]
+    shown = rows[:MOST_ROWS]
+    varying = [
+        name for name in _varying_columns(summary["cells"]) if len({_format_cell(row[name]) for row in shown}) > 1
+    ]
+    firsts = [_first_cells(row, varying) for row in shown]
+    lines = _table_lines(["method", *varying], firsts, shown, short=True)
+    more = f"{count_noun(len(rows) - len(shown), 'more row')}, and the" if len(rows) > len(shown) else "The"
+    return [*lines, f"{more} rows of single behaviours: --all, or the report."]
+
+
+def _first_cells(row: Mapping[str, Any], varying: Sequence[str]) -> list[str]:
+    return [name_with_lag(row["method"], lag_of(row)), *(_format_cell(row[name]) for name in varying)]
+
+
+def _table_lines(
+    head: Sequence[str], firsts: Sequence[Sequence[str]], rows: Sequence[Mapping[str, Any]], *, short: bool = False
+) -> list[str]:
+    """A table of rows of a summary; `firsts` are the cells below `head`.
+
+    A short one has fewer columns, and a standard deviation for the first metric only.
+    """
+    columns = [column for column in TABLE_COLUMNS if not short or column[1] in _SHORT_COLUMNS]
+    fallback = not short or any(row["metrics"]["fallback_share"]["mean"] for row in rows)
+    cells = []
+    for first, row in zip(firsts, rows, strict=True):
+        share = [_format_fallback(row["metrics"]["fallback_share"]["mean"])] if fallback else []
+        figures: list[str] = []
+        for _, name, decimals in columns:
+            metric = row["metrics"][name]
+            figures.append(format_mean_sd(metric["mean"], None if short and figures else metric["sd"], decimals))
+        matched = f"{row['frames_matched']}/{row['frames_expected']}"
+        cells.append([*first, str(row["sequences"]), matched, *share, *figures])
+    titles = ["clips", "matched", *(["fallback [%]"] if fallback else []), *(title for title, *_ in columns)]
+    return Table([*head, *titles], cells, text_columns=len(head)).lines()
 
 
 def _setup_lines(cells: Sequence[Mapping[str, Any]]) -> str:

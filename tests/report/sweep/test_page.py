@@ -170,9 +170,9 @@ def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
     assert sentence(read_sweep(few)).endswith(
-        "Cannot tell whether it is better than local_pca, ik: too few clips: 5, of at least 6."
+        "but cannot be called better than any of the other 2 (too few clips: 5, of at least 6)."
     )
-    assert sentence(read_sweep(alike)).endswith("the interval contains zero and exceeds the margin.")
+    assert sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
     for out in (few, alike):
         assert "<td><strong>" not in write_sweep_page(out).read_text(encoding="utf-8")
 
