@@ -36,7 +36,7 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_imports_nothing_heavy() -> None:
     code = "import sys, harness.cli as c; c.build_parser(); print(sorted({m.split('.')[0] for m in sys.modules}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    for heavy in ("numpy", "scipy", "mujoco", "matplotlib", "pyvista", "plotly"):
+    for heavy in ("numpy", "scipy", "mujoco", "matplotlib", "pyvista"):
         assert f"'{heavy}'" not in loaded
 
 

@@ -21,7 +21,7 @@ from harness.errors import BadFile
 from harness.results.digests import read_result_json
 from harness.score.metrics import VERSIONS
 
-PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "plotly", "ezc3d", "mink")
+PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")
 """Packages whose versions are listed; "absent" if not installed."""
 
 

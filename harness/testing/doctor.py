@@ -35,7 +35,6 @@ from harness.testing.device_checks import check_emulated_device, describe_serial
 from harness.testing.results_checks import check_results
 
 OPTIONAL_PACKAGES = {
-    "plotly": "the interactive view of the report (extra viz)",
     "imageio_ffmpeg": "movies (extra viz)",
     "ezc3d": "C3D files (extra c3d)",
     "pythonosc": "live poses by VMC protocol (extra live)",

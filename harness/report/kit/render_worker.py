@@ -13,8 +13,7 @@ from harness.core.arrays import Floats
 from harness.core.files import atomic_path
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
-from harness.report.kit.skeleton_player import heading_rad
-from harness.score.pair import PoseSequence, compute_poses
+from harness.score.pair import PoseSequence, compute_poses, heading_rad
 
 STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
 """Width and height in pixels; a movie's must be even."""

@@ -152,8 +152,11 @@ def _colour_key() -> Markup:
 def _view_3d(content: RunContent) -> Markup:
     if not content.player:
         return Markup()
-    text = "The worst two seconds of every method. Drag to rotate the view; the camera follows the true root."
-    return join(tag("p", text, " ", _colour_key()), content.player)
+    text = (
+        "Every clip with up to three methods. Drag to turn, wheel or pinch to zoom, drag with the right button or two "
+        "fingers to pan; space plays, the arrow keys step."
+    )
+    return join(tag("p", text), content.player)
 
 
 def _every_metric(run: RunData) -> Markup:

@@ -8,16 +8,16 @@ import numpy as np
 
 from harness.core.arrays import Ints
 from harness.core.files import write_text
-from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.chart import clear_plots
-from harness.report.kit.markup import Markup
+from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.motion_player import motion_player
 from harness.report.kit.render_process import ProgressCallback, RenderJob, RenderProcess
-from harness.report.kit.skeleton_player import PlayerSegment, skeleton_player
 from harness.report.kit.text import to_file_name
 from harness.report.run import charts, parameter_effects, uncertainty
-from harness.report.run.data import WORST_METRICS, RunData, pose_pair, read_run
+from harness.report.run.data import WORST_METRICS, RunData, read_run
 from harness.report.run.headline import build_headline
 from harness.report.run.page import FilmStrip, RunContent, run_page
+from harness.report.run.player_data import run_motion
 from harness.report.run.worst_window import WorstWindow, find_worst_window, group_overlapping, select_worst
 from harness.results.cell import Cell
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -57,15 +57,13 @@ def write_run_page(
         distribution = charts.error_distribution(run) if measured else None
         stated = run.series_with_sigma[:1]
         sigma = uncertainty.error_against_sigma(run, stated[0]) if stated else None
-        player, no_player = _player(run, windows, headline.lowest, reader)
+        player = _player(run, windows, reader)
         reason = rendering.finish() if rendered else "rendering was turned off"
     missing = []
     if windows and not strips:
         missing.append("Rendered pictures of the worst two seconds: no method has the lowest error")
     if strips and reason:
         missing.append(f"Rendered pictures of the worst two seconds: {reason}")
-    if no_player:
-        missing.append(f"Interactive view: {no_player}")
     movies, no_movies = _movies(run, reader, progress) if movie else ([], "")
     if no_movies:
         missing.append(f"Movies: {no_movies}")
@@ -126,22 +124,13 @@ def _job(output: Path, cell: Cell, rows: Ints, fps: float = 0.0, title: str = ""
     return RenderJob(output, cell.bone_m, cell.estimate_bone_m, *qpos, fps, title)
 
 
-def _player(
-    run: RunData, windows: Mapping[tuple[str, str], WorstWindow], first: str | None, reader: Callable[[str], Cell]
-) -> tuple[Markup, str]:
-    """The interactive view of every method's worst seconds, those of `first` before others; or nothing and why."""
-    segments = []
-    for name in sorted(run.series, key=lambda name: name != first):
-        groups = group_overlapping(window for (series, _), window in windows.items() if series == name)
-        segments += [_segment(run, name, group, reader(group[0].key)) for group in groups]
-    return skeleton_player(standard_skeleton(), segments) if segments else (Markup(), "")
-
-
-def _segment(run: RunData, series: str, windows: Sequence[WorstWindow], cell: Cell) -> PlayerSegment:
-    rows = _scored_rows(run, windows[0])
-    metrics = ", ".join(window.metric for window in windows)
-    title = f"{series} on {cell.clip}, {windows[0].start_s:.1f}–{windows[0].end_s:.1f} s: {metrics}"
-    return PlayerSegment(title, cell.time_s[rows].tolist(), *pose_pair(cell, rows))
+def _player(run: RunData, windows: Mapping[tuple[str, str], WorstWindow], reader: Callable[[str], Cell]) -> Markup:
+    """The interactive view of all clips and methods; nothing without an estimate."""
+    motion, note = run_motion(run, windows, reader)
+    if not motion.clips:
+        return Markup()
+    player = motion_player(motion, "Truth, estimates and stations in 3-D; drag to turn")
+    return join(tag("p", note) if note else None, player)
 
 
 def _movies(run: RunData, reader: Callable[[str], Cell], progress: ProgressCallback) -> tuple[list[Path], str]:

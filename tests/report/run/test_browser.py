@@ -1,6 +1,5 @@
 """The page in a browser: headless Chromium opens it, nothing leaves it, and the 3-D view follows the slider."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,17 +10,6 @@ from harness.report.run.writer import write_run_page
 from tests.report.fabricate import Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>"
-PAUSE_ON_THE_WAY = """() => new Promise((done) => {
-  const [frame, play] = ["frame", "play"].map((id) => document.getElementById(id));
-  const look = () => {
-    if (Number(frame.value) <= 5) return requestAnimationFrame(look);
-    const before = play.innerText;
-    play.click();
-    done([before, play.innerText]);
-  };
-  look();
-})"""
-"""Inside the page: between a look from outside and a click from outside a slow machine plays to the end."""
 
 
 @pytest.fixture(scope="module")
@@ -70,24 +58,15 @@ def test_the_page_is_whole_and_quiet(page: Any, seen: dict[str, list[str]]) -> N
 
 
 @pytest.mark.long
-def test_the_slider_moves_the_figures(page: Any, seen: dict[str, list[str]]) -> None:
-    assert not page.evaluate("'Plotly' in window"), "the library is unpacked before it is needed"
-    page.locator("#stage").scroll_into_view_if_needed()
-    page.wait_for_selector("#stage[data-ready]", timeout=60_000)
-    figures = "() => JSON.stringify(document.getElementById('stage').data.map((trace) => [...trace.x]))"
-    assert "frame 1 of 80" in page.inner_text("#where")
-    before = page.evaluate(figures)
-    page.locator("#frame").fill("50")
-    assert "frame 51 of 80" in page.inner_text("#where")
-    page.wait_for_function(f"(before) => ({figures})() !== before", arg=before)
-    _, truth, estimate = zip(json.loads(before), json.loads(page.evaluate(figures)), strict=True)
-    assert truth[0] != truth[1], "the truth stands still"
-    assert estimate[0] != estimate[1], "the estimate stands still"
-    assert truth[1] != estimate[1]
-    page.locator("#frame").press("ArrowRight")
-    assert "frame 52 of 80" in page.inner_text("#where")
-    page.locator("#shot").select_option(index=1)
-    assert "frame 1 of 80" in page.inner_text("#where")
-    page.locator("#play").click()
-    assert page.evaluate(PAUSE_ON_THE_WAY) == ["Pause", "Play"]
+def test_the_view_in_3d_shows_every_clip_and_method(page: Any, seen: dict[str, list[str]]) -> None:
+    assert not page.evaluate("'ready' in player.dataset"), "the view is unpacked before it is needed"
+    page.locator(".stage").scroll_into_view_if_needed()
+    page.wait_for_selector("#player[data-ready]", timeout=60_000)
+    assert page.locator("select[name=method0] option").all_inner_texts() == ["ik", "mean_pose"]
+    assert page.locator("select[name=clip] option").all_inner_texts() == [HOSTILE]
+    assert len(page.locator("select[name=moment] option").all_inner_texts()) > 2
+    page.locator(".motion-player input[type=range]").fill("50")
+    assert "frame 51 of 201" in page.inner_text(".motion-player")
+    page.wait_for_selector("#player[data-drawn='50']")
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
     assert seen == {"requests": [], "errors": []}

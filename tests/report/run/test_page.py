@@ -12,7 +12,7 @@ import pytest
 
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile
-from harness.report.kit import render_process, skeleton_player
+from harness.report.kit import render_process
 from harness.report.kit.style import COLOURS
 from harness.report.run.data import WORST_METRICS, read_run
 from harness.report.run.headline import build_headline
@@ -271,16 +271,13 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("package", "module"), [("pyvista", render_process), ("plotly", skeleton_player)])
-def test_a_missing_extra_costs_its_part_alone(
-    package: str, module: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "find_spec", lambda name: None if name == package else object())
+def test_a_missing_extra_costs_the_pictures_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(render_process, "find_spec", lambda name: None)
     plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=3.0)
-    page = write_run_page(fabricate(tmp_path / "run", plan), rendered=package == "pyvista")
+    page = write_run_page(fabricate(tmp_path / "run", plan))
     said = text_of(page)
-    assert f"needs {package}; install it with: pip install &#x27;tracker-harness[viz]&#x27;" in said
-    assert ('id="stage"' in page.read_text(encoding="utf-8")) == (package != "plotly")
+    assert "needs pyvista; install it with: pip install &#x27;tracker-harness[viz]&#x27;" in said
+    assert 'id="player"' in page.read_text(encoding="utf-8")
     assert "Error distribution" in said
 
 
@@ -345,7 +342,7 @@ def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state
     fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0))
     code = (
         "import sys; from pathlib import Path; from harness.report.run.writer import write_run_page;"
-        "assert not {'pyvista', 'vtk', 'matplotlib', 'plotly'} & set(sys.modules);"
+        "assert not {'pyvista', 'vtk', 'matplotlib'} & set(sys.modules);"
         "import matplotlib; before = matplotlib.rcParams.copy(); write_run_page(Path(sys.argv[1]), rendered=False);"
         "assert matplotlib.rcParams.copy() == before; assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'pyvista' not in sys.modules"

@@ -1,0 +1,444 @@
+// Plays the motions of a run or a clip in 3-D: truth, up to three methods next to each other or in one view, stations.
+// The data is unpacked when the view is first scrolled to, so that the page opens quickly.
+const MotionPlayer = (() => {
+  "use strict";
+  const TRUTH = "#5b87ad", METHODS = ["#e8850c", "#0f9d76", "#c05f9c"], LOST = "#8d98a5";
+  const STATION = { 0: "#20a4a8", 1: "#e0b000", 2: "#d43c3c" }, AXES = ["#d84a3a", "#3f9b45", "#3b6fd4"];
+  const STATES = ["", " · held", " · lost", " · no estimate"], NO_ESTIMATE = 3;
+  const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2], WORST_MM = 100, LINK = "view?";
+  const RAMP = ["#2c7bb6", "#7fc7c9", "#f2e394", "#f3913c", "#c2182b"].map(rgb);
+
+  function rgb(hex) {
+    return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+  }
+
+  function errorColour(mm) {
+    const at = Math.min(1, mm / WORST_MM) * (RAMP.length - 1), k = Math.min(RAMP.length - 2, Math.floor(at));
+    return RAMP[k].map((c, i) => c + (at - k) * (RAMP[k + 1][i] - c));
+  }
+
+  // An element with attributes, properties (`onclick`, `value`, ...) and children.
+  function make(name, attributes = {}, ...children) {
+    const element = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) {
+      if (key in element && key !== "list") element[key] = value;
+      else element.setAttribute(key, value);
+    }
+    element.append(...children);
+    return element;
+  }
+
+  function options(list, entries) {
+    list.replaceChildren(...entries.map(([value, text]) => make("option", { value, textContent: text })));
+  }
+
+  class Player {
+    constructor(root, load) {
+      this.root = root;
+      this.load = load;
+      this.camera = new MotionCamera();
+      this.frame = 0;
+      this.shown = [];
+      this.playing = false;
+      this.visible = false;
+      this.#build();
+      new IntersectionObserver((seen) => {
+        this.visible = seen.some((entry) => entry.isIntersecting);
+        if (this.visible && !this.started) this.#start();
+        this.redraw();
+      }, { rootMargin: "100px" }).observe(this.stage);
+      if (location.hash.startsWith(`#${LINK}`)) root.scrollIntoView();
+    }
+
+    #build() {
+      const box = (name, text) => {
+        const input = make("input", { type: "checkbox", name, onchange: () => this.redraw() });
+        this[name] = input;
+        return make("label", {}, input, text);
+      };
+      const button = (name, text, onclick, title = "") => (this[name] = make("button", { type: "button", textContent: text, onclick, title, name }));
+      const list = (name, text, onchange) => {
+        this[name] = make("select", { name, onchange, "aria-label": text });
+        return make("label", { className: `choose ${name}` }, `${text} `, this[name]);
+      };
+      this.canvas = make("canvas", {});
+      this.labels = make("div", { className: "labels" });
+      this.stage = make("div", { className: "stage", tabIndex: 0, role: "img", "aria-label": this.root.dataset.label,
+        "aria-keyshortcuts": "Space ArrowLeft ArrowRight Plus Minus" }, this.canvas, this.labels);
+      this.slider = make("input", { type: "range", min: 0, max: 0, value: 0, step: 1, "aria-label": "frame",
+        oninput: () => { this.stop(); this.seek(Number(this.slider.value)); } });
+      this.where = make("output", { textContent: "loads when scrolled to" });
+      this.said = make("output", { className: "said" });
+      this.key = make("div", { className: "key" });
+      const methods = [0, 1, 2].map((n) => list(`method${n}`, ["Method", "and", "and"][n], () => this.#choose()));
+      const speed = list("speed", "Speed", () => { if (this.playing) this.play(); });
+      options(this.speed, SPEEDS.map((s) => [s, `${s}×`]));
+      this.speed.value = 1;
+      const layout = list("layout", "View", () => this.redraw());
+      options(this.layout, [["side", "side by side"], ["over", "overlaid"]]);
+      this.root.replaceChildren(
+        make("div", { className: "controls chooser" }, list("clip", "Clip", () => this.#open(Number(this.clip.value))), ...methods, layout,
+          list("moment", "Go to", () => this.#goTo())),
+        this.stage,
+        make("div", { className: "controls" }, button("run", "Play", () => this.toggle(), "space"),
+          button("back", "◀", () => this.step(-1), "one frame back (left arrow)"),
+          button("next", "▶", () => this.step(1), "one frame on (right arrow)"), this.slider, this.where),
+        make("div", { className: "controls" }, speed, box("truth", "truth"), box("stations", "stations"), box("errors", "colour by error"),
+          box("follow", "follow"), button("reset", "Reset view", () => this.resetCamera(), "R"),
+          button("link", "Copy link to this moment", () => this.copyLink()), this.said),
+        this.key,
+      );
+      for (const name of ["truth", "stations", "follow"]) this[name].checked = true;
+    }
+
+    async #start() {
+      this.started = true;
+      this.where.textContent = "loading";
+      try {
+        if (typeof DecompressionStream !== "function") throw new Error("this browser cannot unpack the data");
+        this.renderer = new MotionRenderer.Renderer(this.canvas);
+        this.data = await this.load();
+        options(this.clip, this.data.clips.map((clip, n) => [n, clip.title]));
+        const moments = this.data.moments || [];
+        options(this.moment, [["", "worst seconds"], ...moments.map((m, n) => [n, m.title])]);
+        this.moment.parentElement.hidden = !moments.length;
+        this.clip.parentElement.hidden = this.data.clips.length < 2;
+        this.#listen();
+        if (!(await this.#restore())) await this.#open(0);
+        this.root.dataset.ready = "yes";
+      } catch (error) {
+        this.where.textContent = `the view failed: ${error.message}`;
+        this.root.dataset.failed = error.message;
+      }
+    }
+
+    #listen() {
+      const { stage } = this, held = new Map();
+      let scrolled = -1e9;
+      new ResizeObserver(() => this.redraw()).observe(stage);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
+      addEventListener("hashchange", () => this.#restore());
+      addEventListener("scroll", () => { scrolled = performance.now(); }, { passive: true });
+      stage.addEventListener("contextmenu", (event) => event.preventDefault());
+      stage.addEventListener("dblclick", () => this.resetCamera());
+      // A page that is being scrolled over the view goes on scrolling.
+      stage.addEventListener("wheel", (event) => {
+        if (performance.now() - scrolled < 250 && !event.ctrlKey) return;
+        event.preventDefault();
+        this.camera.zoom(Math.exp(Math.max(-0.5, Math.min(0.5, event.deltaY * (event.deltaMode ? 0.05 : 0.0015) * (event.ctrlKey ? 4 : 1)))));
+        this.redraw();
+      }, { passive: false });
+      stage.addEventListener("pointerdown", (event) => {
+        stage.setPointerCapture(event.pointerId);
+        held.set(event.pointerId, [event.clientX, event.clientY]);
+      });
+      for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) stage.addEventListener(name, (event) => held.delete(event.pointerId));
+      stage.addEventListener("pointermove", (event) => {
+        const before = held.get(event.pointerId), at = [event.clientX, event.clientY];
+        if (!before) return;
+        const [dx, dy] = [at[0] - before[0], at[1] - before[1]], high = stage.clientHeight;
+        const other = [...held].find(([id]) => id !== event.pointerId);
+        held.set(event.pointerId, at);
+        if (other) {
+          const apart = (p) => Math.hypot(p[0] - other[1][0], p[1] - other[1][1]) || 1;
+          this.camera.zoom(apart(before) / apart(at));
+          this.camera.pan(-0.5 * dx / high, 0.5 * dy / high);
+        } else if (event.buttons & 2 || event.buttons & 4 || event.shiftKey) this.camera.pan(-dx / high, dy / high);
+        else this.camera.turn(-5 * dx / high, 4 * dy / high);
+        this.redraw();
+      });
+      stage.addEventListener("keydown", (event) => {
+        if (event.ctrlKey || event.metaKey || event.altKey) return;
+        const turns = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+        const acts = {
+          " ": () => this.toggle(), ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), Home: () => this.seek(0),
+          End: () => this.seek(1e9), "+": () => this.camera.zoom(0.9), "=": () => this.camera.zoom(0.9), "-": () => this.camera.zoom(1 / 0.9),
+          r: () => this.resetCamera(), ArrowUp: () => this.camera.turn(0, 0.1), ArrowDown: () => this.camera.turn(0, -0.1),
+        };
+        const act = event.shiftKey && turns[event.key] ? () => this.camera.turn(...turns[event.key]) : acts[event.key];
+        if (!act) return;
+        event.preventDefault();
+        act();
+        this.redraw();
+      });
+    }
+
+    // Open a clip with the methods of these names; the ones that are chosen already, without names.
+    async #open(n, names = null, time = null) {
+      this.stop();
+      this.now = this.data.clips[n];
+      this.clip.value = n;
+      const estimates = this.now.tracks.filter((track) => track.role === "estimate").map((track) => track.name);
+      const before = names || [0, 1, 2].map((k) => this[`method${k}`].value);
+      [0, 1, 2].forEach((k) => {
+        const list = this[`method${k}`];
+        options(list, [...(k ? [["", "–"]] : []), ...estimates.map((name) => [name, name])]);
+        list.value = estimates.includes(before[k]) ? before[k] : k ? "" : estimates[0] || "";
+        list.parentElement.hidden = estimates.length <= k;
+      });
+      const reference = this.now.tracks.find((track) => track.role === "truth");
+      for (const name of ["truth", "errors"]) this[name].parentElement.hidden = !(reference && estimates.length);
+      this.stations.parentElement.hidden = !this.now.stations;
+      const progress = (share) => { this.where.textContent = `loading ${Math.round(100 * share)} %`; };
+      const clip = this.now;
+      this.time = (await this.data.array(clip.time, 1e-4)).values;
+      this.reference = reference ? await this.#track(reference, progress) : null;
+      if (clip.stations) {
+        const [poses, states] = [await this.data.array(clip.stations.poses, 1), await this.data.array(clip.stations.states, 1)];
+        this.worn = { names: clip.stations.names, poses: poses.values, states: states.values };
+      } else this.worn = null;
+      if (!names) this.camera.reset(clip.heading);
+      this.slider.max = this.time.length - 1;
+      this.frame = 0;
+      await this.#choose();
+      this.seek(time === null ? 0 : this.#frameAt(time));
+    }
+
+    async #track(track, progress) {
+      const [joints, states] = await Promise.all([this.data.joints(track.joints, progress), this.data.array(track.states, 1)]);
+      return { name: track.name, joints: joints.values, columns: joints.columns, states: states.values };
+    }
+
+    // Load the chosen methods, each once.
+    async #choose() {
+      const names = [...new Set([0, 1, 2].map((k) => this[`method${k}`].value).filter(Boolean))];
+      const tracks = names.map((name) => this.now.tracks.find((track) => track.name === name));
+      this.shown = await Promise.all(tracks.map((track) => this.#track(track, () => {})));
+      this.layout.parentElement.hidden = this.shown.length < 2;
+      this.seek(this.frame);
+    }
+
+    async #goTo() {
+      const moment = this.data.moments[Number(this.moment.value)];
+      if (!moment || this.moment.value === "") return;
+      const kept = [0, 1, 2].map((k) => this[`method${k}`].value).filter((name) => name && name !== moment.method);
+      await this.#open(moment.clip, [moment.method, ...kept], moment.time_s);
+      this.play(moment.end_s);
+    }
+
+    // ---- time
+
+    #frameAt(time) {
+      let low = 0, high = this.time.length - 1;
+      while (low < high) {
+        const middle = (low + high + 1) >> 1;
+        if (this.time[middle] <= time + 1e-6) low = middle;
+        else high = middle - 1;
+      }
+      return low;
+    }
+
+    seek(frame) {
+      this.frame = Math.max(0, Math.min(this.time.length - 1, frame));
+      this.slider.value = this.frame;
+      this.where.textContent = `frame ${this.frame + 1} of ${this.time.length} · ${this.time[this.frame].toFixed(3)} s`;
+      this.redraw();
+    }
+
+    step(frames) {
+      this.stop();
+      this.seek(this.frame + frames);
+    }
+
+    toggle() {
+      if (this.playing) this.stop();
+      else this.play();
+    }
+
+    stop() {
+      this.playing = false;
+      this.run.textContent = "Play";
+    }
+
+    // Play in real time, times the speed, to `end` seconds; frames that would be drawn too late are skipped.
+    play(end = null) {
+      if (this.frame >= this.time.length - 1) this.seek(0);
+      const speed = Number(this.speed.value), began = performance.now(), from = this.time[this.frame];
+      const until = end === null ? this.time[this.time.length - 1] : end, token = {};
+      this.playing = token;
+      this.run.textContent = "Pause";
+      const tick = () => {
+        if (this.playing !== token) return;
+        const time = from + (speed * (performance.now() - began)) / 1000;
+        const frame = this.#frameAt(Math.min(time, until));
+        if (frame !== this.frame) this.seek(frame);
+        if (time >= until) this.stop();
+        else requestAnimationFrame(tick);
+      };
+      requestAnimationFrame(tick);
+    }
+
+    // ---- the moment as a link
+
+    state() {
+      const fields = new URLSearchParams({ clip: this.now.name });
+      for (const track of this.shown) fields.append("method", track.name);
+      fields.set("t", this.time[this.frame].toFixed(4));
+      fields.set("camera", this.camera.text());
+      fields.set("layout", this.layout.value);
+      fields.set("show", ["truth", "stations", "errors", "follow"].filter((name) => this[name].checked).join(","));
+      return fields.toString();
+    }
+
+    async copyLink() {
+      history.replaceState(null, "", `#${LINK}${this.state()}`);
+      try {
+        await navigator.clipboard.writeText(location.href);
+        this.said.textContent = "copied";
+      } catch {
+        this.said.textContent = "the link is in the address bar";
+      }
+      setTimeout(() => { this.said.textContent = ""; }, 4000);
+    }
+
+    // Open the moment of the address, if it names one; false if it does not.
+    async #restore() {
+      if (!location.hash.startsWith(`#${LINK}`)) return false;
+      const fields = new URLSearchParams(location.hash.slice(1 + LINK.length));
+      const n = this.data.clips.findIndex((clip) => clip.name === fields.get("clip"));
+      if (n < 0) return false;
+      if (["side", "over"].includes(fields.get("layout"))) this.layout.value = fields.get("layout");
+      if (fields.has("show")) {
+        const shown = fields.get("show").split(",");
+        for (const name of ["truth", "stations", "errors", "follow"]) this[name].checked = shown.includes(name);
+      }
+      this.camera.reset(this.data.clips[n].heading);
+      this.camera.restore(fields.get("camera"));
+      const time = Number(fields.get("t"));
+      await this.#open(n, fields.getAll("method"), Number.isFinite(time) ? time : 0);
+      return true;
+    }
+
+    // ---- drawing
+
+    resetCamera() {
+      this.camera.reset(this.now ? this.now.heading : 0);
+      this.redraw();
+    }
+
+    redraw() {
+      if (this.pending || !this.visible || !this.time) return;
+      this.pending = requestAnimationFrame(() => {
+        this.pending = 0;
+        this.#draw();
+      });
+    }
+
+    #look() {
+      const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
+      return dark ? { paper: rgb("#1d2127"), ground: rgb("#262b33"), line: rgb("#4a535f"), shade: [0, 0, 0, 0.38] }
+        : { paper: rgb("#f5f7f9"), ground: rgb("#e9edf1"), line: rgb("#b4bec9"), shade: [0.1, 0.13, 0.18, 0.2] };
+    }
+
+    #draw() {
+      const ratio = Math.min(2, devicePixelRatio || 1), wide = this.stage.clientWidth, high = this.stage.clientHeight;
+      if (!wide || !high) return;
+      const { canvas, renderer } = this;
+      if (canvas.width !== Math.round(wide * ratio) || canvas.height !== Math.round(high * ratio)) {
+        canvas.width = Math.round(wide * ratio);
+        canvas.height = Math.round(high * ratio);
+      }
+      const look = this.#look(), root = this.reference || this.shown[0];
+      if (root) {
+        const row = this.follow.checked ? this.frame * root.columns : 0;
+        this.camera.target = [root.joints[row], root.joints[row + 1], 0.9 * this.data.height_m / 1.75];
+      }
+      renderer.begin(look);
+      const views = this.shown.length > 1 && this.layout.value === "side" ? this.shown.map((track) => [track]) : [this.shown];
+      const stacked = wide < 520 && views.length > 1, across = stacked ? 1 : views.length, down = stacked ? views.length : 1;
+      views.forEach((tracks, n) => {
+        const w = canvas.width / across, h = canvas.height / down;
+        const box = [stacked ? 0 : n * w, stacked ? canvas.height - (n + 1) * h : 0, w, h].map(Math.round);
+        renderer.draw(box, this.camera, look, this.#bodies(tracks));
+      });
+      this.#label(views, across, down);
+      this.root.dataset.drawn = this.frame;
+    }
+
+    #bodies(tracks) {
+      const bodies = [], ghost = this.reference && tracks.length > 0;
+      if (this.reference && (!ghost || this.truth.checked)) {
+        bodies.push({ capsules: this.#body(this.reference, rgb(TRUTH)), opacity: ghost ? 0.34 : 1, girth: 1 });
+      }
+      for (const track of tracks) {
+        if (track.states[this.frame] === NO_ESTIMATE) continue;
+        const lost = track.states[this.frame] === 2, colour = rgb(lost ? LOST : METHODS[this.shown.indexOf(track)]);
+        bodies.push({ capsules: this.#body(track, colour, this.errors.checked && this.reference), opacity: 1, girth: ghost && this.truth.checked ? 0.6 : 1 });
+      }
+      if (this.worn && this.stations.checked) bodies.push({ capsules: this.#stations(), opacity: 1, girth: 1 });
+      return bodies;
+    }
+
+    #point(track, joint) {
+      const at = this.frame * track.columns + 3 * joint;
+      return [track.joints[at], track.joints[at + 1], track.joints[at + 2]];
+    }
+
+    errorMm(track, joint) {
+      const [p, q] = [this.#point(track, joint), this.#point(this.reference, joint)];
+      return 1000 * Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+    }
+
+    #body(track, colour, byError = false) {
+      const capsules = new MotionRenderer.Capsules();
+      const paint = (joint) => (byError ? errorColour(this.errorMm(track, joint)) : colour);
+      this.data.bones.forEach(([from, to], n) => {
+        const [start, end] = this.data.radii_mm[n];
+        capsules.add(this.#point(track, from), start / 1000, paint(from), this.#point(track, to), end / 1000, paint(to));
+      });
+      return capsules;
+    }
+
+    // Each station as a disc and its three axes (x red, y green, z blue), where position and orientation are known.
+    #stations() {
+      const capsules = new MotionRenderer.Capsules(), { poses, states, names } = this.worn;
+      names.forEach((_, n) => {
+        const at = 7 * (this.frame * names.length + n), p = [0, 1, 2].map((i) => poses[at + i] / 1000);
+        const colour = rgb(STATION[states[this.frame * names.length + n]]);
+        const [w, x, y, z] = [3, 4, 5, 6].map((i) => poses[at + i] / 1000);
+        const axes = [[1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+          [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+          [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]];
+        const along = (axis, d) => p.map((c, i) => c + d * axis[i]);
+        capsules.add(along(axes[0], -0.022), 0.019, colour, along(axes[0], 0.022), 0.019, colour);
+        axes.forEach((axis, i) => capsules.add(p, 0.0055, rgb(AXES[i]), along(axis, 0.11), 0.0055, rgb(AXES[i])));
+      });
+      return capsules;
+    }
+
+    #label(views, across, down) {
+      const joints = this.data.bones.map(([, to]) => to);
+      const text = (track) => {
+        const state = track.states[this.frame], name = make("b", { textContent: track.name });
+        name.style.color = METHODS[this.shown.indexOf(track)];
+        const mean = this.reference && state !== NO_ESTIMATE ? joints.reduce((sum, j) => sum + this.errorMm(track, j), 0) / joints.length : null;
+        return make("span", {}, name, `${mean === null ? "" : ` ${mean.toFixed(0)} mm`}${STATES[state] || ""}`);
+      };
+      this.labels.style.gridTemplate = `repeat(${down}, 1fr) / repeat(${across}, 1fr)`;
+      this.labels.replaceChildren(...views.map((tracks) => make("div", {}, ...tracks.map(text))));
+      const chip = (colour, name) => {
+        const dot = make("i", {});
+        dot.style.background = colour;
+        return make("span", {}, dot, name);
+      };
+      const key = [];
+      if (this.reference) key.push(chip(TRUTH, this.reference.name));
+      if (this.errors.checked && this.reference && this.shown.length) {
+        const bar = make("i", { className: "ramp" });
+        bar.style.background = `linear-gradient(90deg, ${RAMP.map((c) => `rgb(${c.map((v) => Math.round(255 * v))})`)})`;
+        key.push(make("span", {}, "error 0 ", bar, ` ${WORST_MM} mm and more`));
+      } else key.push(...this.shown.map((track, n) => chip(METHODS[n], track.name)));
+      if (this.worn && this.stations.checked) {
+        key.push(chip(STATION[0], "station"), chip(STATION[1], "position or orientation held"), chip(STATION[2], "lost"));
+      }
+      this.key.replaceChildren(...key);
+    }
+  }
+
+  // Put a player into an element; `load` gives its data when the element is first seen.
+  function mount(root, load) {
+    root.player = new Player(root, load);
+    return root.player;
+  }
+  return { mount };
+})();
