@@ -7,7 +7,8 @@ from typing import Any
 class ProgressBar:
     """A progress bar on stderr if stderr is a terminal, else nothing; a context manager.
 
-    A call with the name of the last step, the number of finished steps and the number of planned ones updates it.
+    A call with the name of the last step, the number of finished steps and the number of planned ones updates it. It
+    shows the time that is left at the pace so far.
     """
 
     def __init__(self, unit: str) -> None:

@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import closing, suppress
+from contextlib import closing, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Any
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.errors import BadInput, HarnessError, Outcome
+from harness.experiment.cell_watcher import CellCount
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
@@ -28,7 +29,7 @@ from harness.experiment.cells import (
     open_scenario_motion,
     run_task,
 )
-from harness.experiment.executors import TaskExecutor, process_executor
+from harness.experiment.executors import TaskExecutor, process_executor, run_in_process
 from harness.experiment.interruption import graceful_stop
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
@@ -227,6 +228,7 @@ def _run_tasks(
     sources, failed = _source_hash(tasks), index.failures()
     index.reset(names if index.facts().get("sources") != sources else [name for name in names if name in failed])
     index.note(sources=sources, started_s=time.time(), made=0)
+    count = CellCount(out, lambda last, ended: progress(last, ended, len(names)))
     stop, outcomes, made = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, CellOutcome](), 0
 
     def record(cell: CellOutcome) -> None:
@@ -237,7 +239,7 @@ def _run_tasks(
         made += cell.seconds > 0.0
         index.note(made=made, seen_s=time.time())
         outcomes[cell.cell] = replace(cell, row=None)  # the row is in the index
-        progress(cell.cell, len(outcomes), len(names))
+        count.add(cell.cell, cell.key)
 
     def attempt(tasks: Sequence[ClipTask]) -> list[ClipTask]:
         """Run tasks; those whose worker died."""
@@ -264,7 +266,8 @@ def _run_tasks(
         return broken
 
     try:
-        with graceful_stop(stop):
+        in_workers = executor is not run_in_process  # which reports every cell as it ends
+        with graceful_stop(stop), count.watching() if in_workers else nullcontext():
             broken = attempt(tasks)
             # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
             for task in attempt([single for whole in broken for single in split_task(whole)]):

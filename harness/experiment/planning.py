@@ -66,8 +66,8 @@ def plan_tasks(
         tasks += [replace(task, chosen=chosen) for chosen in parts]
     pieces = -(-workers // max(len(tasks), 1))
     return [
-        replace(task, scenario=replace(task.scenario, methods=tuple(methods)))
-        for task in tasks
+        replace(task, scenario=replace(task.scenario, methods=_rotate(methods, place, workers)))
+        for place, task in enumerate(tasks)
         for methods in _split_evenly(task.scenario.methods, pieces)
     ]
 
@@ -94,6 +94,12 @@ def _clip_tasks(
         ClipTask(scenario, part, b, library, command, label=label, isolation=isolation)
         for part, b in zip(parts, behaviours, strict=True)
     ]
+
+
+def _rotate(methods: Sequence[str], place: int, workers: int) -> tuple[str, ...]:
+    """The methods, from another one on for each worker: in a first run each then compiles other functions."""
+    start = place % workers * len(methods) // workers
+    return (*methods[start:], *methods[:start])
 
 
 def _split_evenly(items: Sequence[T], pieces: int) -> list[Sequence[T]]:

@@ -3,14 +3,18 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numba.core import config, event
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled, module_stamp, specialise
 
+_config: Any = config  # numba has no types
 _PACKAGE = {
     "__init__.py": "",
     "numbers_.py": "STEP = 1.0\n",
@@ -83,6 +87,20 @@ def test_without_a_writable_folder_every_process_compiles(package: Path) -> None
     assert not list(package.rglob("*.nbi"))
 
 
+def test_two_processes_at_the_same_time_compile_a_function_once(package: Path) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(run_package, [package, package]))
+    assert sorted(results) == [(14.0, 0), (14.0, 1)]
+    assert not list(package.rglob("*.lock"))
+
+
+def test_a_function_whose_compilation_fails_is_unlocked(package: Path) -> None:
+    edit(package / "inner.py", "return x + STEP", "return x + undefined")
+    with pytest.raises(subprocess.CalledProcessError):
+        run_package(package)
+    assert not list(package.rglob("*.lock"))
+
+
 _FACTOR = 2.0
 
 
@@ -90,6 +108,22 @@ _FACTOR = 2.0
 def scale(values: Floats) -> Floats:
     out: Floats = _FACTOR * values
     return out
+
+
+def test_only_these_functions_are_compiled_at_the_lower_level() -> None:
+    levels = []
+
+    class Listener(event.Listener):
+        def on_start(self, event: Any) -> None:
+            levels.append(int(_config.OPT))
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    before = _config.OPT
+    with event.install_listener("numba:compile", Listener()):
+        compiled(scale.py_func)(np.arange(3, dtype=np.int32))  # type: ignore[attr-defined]  # a type that is on no disk
+    assert (levels[0], _config.OPT) == (1, before)
 
 
 def test_the_stamp_follows_the_constants(monkeypatch: pytest.MonkeyPatch) -> None:

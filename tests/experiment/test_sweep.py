@@ -99,6 +99,13 @@ def test_tasks_are_all_cells_once_and_enough_for_all_workers(workers: int) -> No
         assert len(tasks) >= min(workers, len(names))
 
 
+def test_workers_begin_with_different_methods() -> None:
+    """So that in a first run each compiles other functions."""
+    first, second = (task.scenario.methods[0] for task in plan_tasks([load_scenario("demo")], None, "", 2)[:2])
+    assert first != second
+    assert plan_tasks([load_scenario("demo")], None, "", 1)[1].scenario.methods[0] == first
+
+
 def test_a_sweep_goes_on_where_it_was(made_up: Path) -> None:
     out = made_up / "out"
     sweep(sweep_file(made_up), out)
