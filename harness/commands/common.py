@@ -3,6 +3,7 @@
 import argparse
 import json
 import shlex
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -214,8 +215,9 @@ def print_status(line: str) -> None:
 
 
 def show_progress(line: str) -> None:
-    """Replace the last line of stderr, if stderr is a terminal."""
+    """Replace the last line of stderr, if stderr is a terminal; what is too long for a line is cut."""
     if sys.stderr.isatty():
+        line = line[: shutil.get_terminal_size().columns - 1]
         print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
