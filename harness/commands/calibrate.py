@@ -21,6 +21,7 @@ from harness.commands.common import (
     print_result,
     print_status,
 )
+from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
@@ -121,9 +122,9 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
             raise BadInput(f"--miss {args.miss:g}.", "Give 0 to 45 deg.")
         given["miss_rad"] = math.radians(args.miss)
     noise_preset(args.noise or "default")  # refuses an unknown preset before the calibration starts
-    found = measure_calibration_accuracy(
-        args.simulate, **{key: value for key, value in given.items() if value is not None}, folder=args.mocap
-    )
+    options = {key: value for key, value in given.items() if value is not None}
+    with ProgressBar("performers") as bar:
+        found = measure_calibration_accuracy(args.simulate, **options, folder=args.mocap, progress=bar)
     outcome = Outcome.PASS if not found.refused else Outcome.INCOMPLETE
     return print_result(args, found.as_dict(), *found.lines(), outcome=outcome)
 

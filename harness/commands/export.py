@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
+from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
 _FORMATS = ("bvh", "trc", "mot", "sto", "csv", "tum", "glb")
@@ -27,7 +28,10 @@ def run_export(args: argparse.Namespace) -> Outcome:
 
     folder = args.out or args.run / "export" / args.format
     clips, methods = _entries("clip", args.clip), _entries("method", args.method)
-    files = export_run(args.run, args.format, folder, clips=clips, methods=methods, force=args.force)
+    with ProgressBar("cells") as bar:
+        files = export_run(
+            args.run, args.format, folder, clips=clips, methods=methods, force=args.force, progress=bar.count
+        )
     return print_result(args, {"files": [str(f) for f in files]}, f"{len(files)} files in {folder}")
 
 

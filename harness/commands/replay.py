@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.commands.ending import print_data
+from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
@@ -123,8 +124,8 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
         methods = tuple(
             name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)
         )
-    with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        scores = score_recording.score_methods(stream, playback, methods)
+    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
+        scores = score_recording.score_methods(stream, playback, methods, bar)
     played = f"{playback.scenario.name}, {playback.clip_evaluation.part}"
     content = {"scenario": playback.scenario.name, "clip": str(playback.clip_evaluation.part), **stream.counts}
     content |= {"lost": stream.recording.damage, "methods": [score.as_dict() for score in scores]}

@@ -1,7 +1,11 @@
 """Progress of long work on a terminal."""
 
 import sys
+from collections.abc import Callable
 from typing import Any
+
+ProgressCallback = Callable[[str, int, int], None]
+"""Called with the name of the last step, or of the present one, the number of finished steps and of planned ones."""
 
 
 class ProgressBar:
@@ -22,9 +26,13 @@ class ProgressBar:
         if self.bar is None:
             from tqdm import tqdm
 
-            self.bar = tqdm(total=planned, unit=f" {self.unit}", disable=None, leave=False, file=sys.stderr)
+            self.bar = tqdm(total=planned or None, unit=f" {self.unit}", disable=None, leave=False, file=sys.stderr)
         self.bar.set_postfix_str(last, refresh=False)
         self.bar.update(done - self.bar.n)
+
+    def count(self, last: str) -> None:
+        """Count one more step of a number that is not known."""
+        self(last, 1 + (self.bar.n if self.bar is not None else 0), 0)
 
     def __exit__(self, *_: object) -> None:
         if self.bar is not None:

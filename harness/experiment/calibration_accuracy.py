@@ -19,6 +19,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_fixed
+from harness.core.progress import ProgressCallback
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
@@ -181,6 +182,7 @@ def measure_calibration_accuracy(
     own_directions: bool = True,
     beside_m: float = MOUNT_OFFSET_SD_M,
     stations: Sequence[str] = STATIONS,
+    progress: ProgressCallback = lambda name, done, planned: None,
 ) -> CalibrationAccuracy:
     """Measure calibration errors of `count` performers, each with a prior on bone lengths from other people.
 
@@ -199,6 +201,7 @@ def measure_calibration_accuracy(
         except UnusableHold as error:
             refused[session.name] = str(error)
         seconds.append(time.process_time() - began_s)
+        progress(name, number, len(people))
     return CalibrationAccuracy(miss_rad, noise, people[0][2].source, tuple(done), refused, tuple(seconds))
 
 

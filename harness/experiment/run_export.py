@@ -1,6 +1,6 @@
 """Export of the motion of a run, with the bodies and stations of its cells."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from harness.body.anatomy import body_geoms
@@ -24,13 +24,16 @@ def export_run(
     clips: Sequence[str] = (),
     methods: Sequence[str] = (),
     force: bool = False,
+    progress: Callable[[str], None] = lambda stem: None,
 ) -> list[Path]:
     """Write the true and the estimated motion of a run's cells to files; returns the files.
 
     `clips` and `methods` choose the cells (see `results.selection.select_cells`), `fmt` is one of
     `mocap.write.export.FORMATS`. Raises the errors of both.
     """
-    return export(select_cells(run, clips=clips, methods=methods), fmt, folder, force=force, model=body_model)
+    return export(
+        select_cells(run, clips=clips, methods=methods), fmt, folder, force=force, model=body_model, progress=progress
+    )
 
 
 def body_model(cell: Cell, motion: PosedMotion) -> BodyModel:

@@ -17,6 +17,7 @@ from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Estimate, name_with_lag, session_lag
 from harness.core.fields import check_entries
 from harness.core.number_format import format_fixed
+from harness.core.progress import ProgressCallback
 from harness.core.text_table import Table
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.isolation import DEFAULT_ISOLATION
@@ -191,14 +192,19 @@ def _collect_output(estimates: Sequence[Estimate], step_ms: Sequence[float]) -> 
     )
 
 
-def score_methods(stream: RecordingStream, playback: Playback, methods: Sequence[str]) -> list[RecordingScore]:
+def score_methods(
+    stream: RecordingStream,
+    playback: Playback,
+    methods: Sequence[str],
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
-    sessions = {
-        name: playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name).begin(
-            playback.calibration
-        )
-        for name in methods
-    }
+    sessions, planned = dict[str, Session](), len(methods) + 1
+    for done, name in enumerate(methods):
+        progress(f"learning {name}", done, planned)
+        fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
+        sessions[name] = fitted.begin(playback.calibration)
+    progress("playing the recording", len(methods), planned)
     frames, zero_s, made = _run_methods(stream, sessions)
     loops = _split_into_loops(frames, zero_s, playback.samples)
     return [_score_method(name, made[name], loops, playback) for name in methods]

@@ -39,6 +39,7 @@ def export(
     *,
     force: bool = False,
     model: Callable[[_AnyCell, PosedMotion], BodyModel] = stick_figure,
+    progress: Callable[[str], None] = lambda stem: None,
 ) -> list[Path]:
     """Write every cell in one of FORMATS; returns the files.
 
@@ -64,6 +65,7 @@ def export(
             for ending, content in contents.items():
                 path = folder / f"{stem}{ending}"
                 ready[path] = _write_unfinished(path, content, force)
+            progress(stem)
         for path, unfinished in ready.items():
             move_into_place(unfinished, path)
     except OSError as error:
