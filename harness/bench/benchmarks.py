@@ -16,6 +16,12 @@ from harness.bench.wire import bench_wire
 from harness.errors import MissingExtra, UnknownName
 
 
+def _index(seed: int, large: bool, runs: int) -> list[BenchmarkRow]:
+    if find_spec("faiss") is None:
+        raise MissingExtra("The reference for the search of neighbours", "faiss-cpu", "bench")
+    return bench_index(seed)
+
+
 def _ik(seed: int, large: bool, runs: int) -> list[BenchmarkRow]:
     _require_mink()
     from harness.bench.ik import bench_ik
@@ -41,7 +47,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "stream": lambda seed, large, runs: bench_stream(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "ik": _ik,
-    "index": lambda seed, large, runs: bench_index(seed),
+    "index": _index,
     "methods": _methods,
     "outliers": lambda seed, large, runs: bench_rejected_readings(seed),
     "leak": lambda seed, large, runs: bench_leak_check(seed),

@@ -2,8 +2,8 @@
 
     python -m harness.bench.peak_memory METHOD FOLDER SEED
 
-prints the peak in bytes. With METHOD "nothing" the process is a baseline without a learning method: it loads all
-libraries (linear algebra with its work space, faiss), makes the frames, and follows them with plain inverse kinematics.
+prints the peak in bytes. With METHOD "nothing" the process is a baseline without a learning method: it loads the
+linear algebra with its work space, makes the frames, and follows them with plain inverse kinematics.
 """
 
 import subprocess
@@ -48,13 +48,10 @@ def run_method(name: str, folder: Path, seed: int) -> int:
 
 def _load_libraries() -> None:
     """Load the libraries that every method uses, with their work space."""
-    import faiss
-
     matrix = np.eye(160)
     for typed in (matrix, matrix.astype(np.float32)):
         solve(typed @ typed, typed, assume_a="pos")
     np.linalg.eigh(matrix)
-    faiss.IndexFlatL2(8).add(np.zeros((1, 8), np.float32))
 
 
 def _run_sessions(fitted: Reconstructor, clips: list[benchmark_clips.BenchmarkClip]) -> None:

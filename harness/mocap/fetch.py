@@ -1,4 +1,4 @@
-"""Download of skeletons and motions of CMU's library, with pooch, one file after another.
+"""Download of skeletons and motions of CMU's library, one file after another.
 
 The site (http://mocap.cs.cmu.edu) keeps a subject's files in subjects/13/: 13.asf, 13_01.amc and so on. The trials are
 read from its search page, or from the listing of that folder. A file is put in place only if it parses and, if it is
@@ -11,9 +11,12 @@ import hashlib
 import re
 import tempfile
 from collections.abc import Callable, Iterable
+from http.client import HTTPException
 from importlib.resources import files
 from pathlib import Path
+from urllib.error import HTTPError, URLError
 from urllib.parse import urlsplit
+from urllib.request import urlopen
 
 from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
@@ -42,6 +45,7 @@ def fetch_cmu(
     Files that are in place already are kept. Raises BadInput for a subject or a site that cannot be reached, and
     BadFile for a file that does not parse or has another SHA-256 than listed; files finished before that stay.
     """
+    _check_site(base_url)
     top = Path(folder)
     names: list[str] = []
     for subject in subjects:
@@ -73,6 +77,13 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
 
 
+def _check_site(base_url: str) -> None:
+    """Raise BadInput unless the address is one of the web."""
+    parts = urlsplit(base_url)
+    if parts.scheme not in ("http", "https") or not parts.netloc:
+        raise BadInput(f"{base_url!r} is not the address of a site.", "It starts with http:// or https://.")
+
+
 def _list_subject_files(subject: str, base_url: str) -> list[str]:
     """Names of a subject's files, the skeleton first, from the search page of the site or the listing of its folder."""
     pages = (f"{base_url}/search.php?subjectnumber={subject}", f"{base_url}/subjects/{subject}/")
@@ -93,20 +104,26 @@ class _NotFound(Exception):
 
 
 def _download(url: str, path: Path) -> Path:
-    """Download a page or file to `path`; _NotFound if the site has none, BadInput if the site cannot be reached."""
-    import pooch
-
-    pooch.get_logger().setLevel("WARNING")
+    """Download a page or file to `path`; _NotFound if the site has none, BadInput if the site cannot deliver it."""
     try:
-        pooch.retrieve(url, None, fname=path.name, path=path.parent, downloader=pooch.HTTPDownloader(timeout=TIMEOUT_S))
-    except OSError as error:
-        if getattr(error, "response", None) is not None:
+        with urlopen(url, timeout=TIMEOUT_S) as response:  # noqa: S310 - `_check_site` allows http and https only
+            content = response.read()
+    except HTTPError as error:
+        error.close()
+        if error.code < 500:
             raise _NotFound(url) from error
-        site = urlsplit(url).netloc
-        raise BadInput(
-            f"{site} cannot be reached ({type(error).__name__}).", "Check the network, or name a mirror (--url)."
-        ) from error
+        raise _unreachable(url, f"HTTP {error.code}") from error
+    except (OSError, HTTPException, ValueError) as error:
+        cause = error.reason if isinstance(error, URLError) and isinstance(error.reason, Exception) else error
+        raise _unreachable(url, type(cause).__name__) from error
+    path.write_bytes(content)
     return path
+
+
+def _unreachable(url: str, reason: str) -> BadInput:
+    return BadInput(
+        f"{urlsplit(url).netloc} cannot be reached ({reason}).", "Check the network, or name a mirror (--url)."
+    )
 
 
 def _fetch_file(name: str, top: Path, base_url: str) -> Path:

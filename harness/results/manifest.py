@@ -23,6 +23,8 @@ from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")
 """Packages whose versions are listed; "absent" if not installed."""
+_DISTRIBUTIONS = {"mujoco": "mujoco-core"}
+"""Names under which packages are installed, where they differ."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ def _processor() -> str:
 
 def _version(package: str) -> str:
     try:
-        return metadata.version(package)
+        return metadata.version(_DISTRIBUTIONS.get(package, package))
     except metadata.PackageNotFoundError:
         return "absent"
 

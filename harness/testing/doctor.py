@@ -40,6 +40,7 @@ OPTIONAL_PACKAGES = {
     "pythonosc": "live poses by VMC protocol (extra live)",
     "pylsl": "live poses by the Lab Streaming Layer (extra lsl)",
     "mink": "the solver that `harness bench ik` compares with (extra bench)",
+    "faiss": "the index that `harness bench index` compares with (extra bench)",
 }
 _STREAM_TOLERANCE_M = 1e-5
 """Centimetres in float32 resolve 1e-7 m at arm's length and 1e-6 m across a hall."""

@@ -23,12 +23,17 @@ class Site:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.asked: list[str] = []
+        self.answer = b""
+        """Bytes that are sent instead of the page or file, unless empty."""
         site = self
 
         class Handler(SimpleHTTPRequestHandler):
             def do_GET(self) -> None:
                 site.asked.append(self.path)
-                super().do_GET()
+                if site.answer:
+                    self.wfile.write(site.answer)
+                else:
+                    super().do_GET()
 
             def log_message(self, format: str, *args: object) -> None:
                 pass
@@ -169,6 +174,32 @@ def test_no_network_is_one_clear_line(tmp_path: Path) -> None:
         fetch_cmu(["13"], tmp_path / "out", base_url="http://127.0.0.1:1")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("url", ["file:///etc", "ftp://127.0.0.1", "mocap.cs.cmu.edu", "http://"])
+def test_only_a_site_of_the_web_is_asked(tmp_path: Path, url: str) -> None:
+    with pytest.raises(BadInput, match="is not the address of a site"):
+        fetch_cmu(["13"], tmp_path / "out", base_url=url)
+
+
+@pytest.mark.parametrize(
+    ("url", "reason"), [("http://127.0.0.1:no", "InvalidURL"), ("http://127.0.0.1:1/ä", "Unicode")]
+)
+def test_an_address_that_cannot_be_asked_is_one_clear_line(tmp_path: Path, url: str, reason: str) -> None:
+    with pytest.raises(BadInput, match=f"cannot be reached .{reason}"):
+        fetch_cmu(["13"], tmp_path / "out", base_url=url)
+
+
+def test_a_site_with_a_fault_is_not_a_file_that_is_gone(site: Site, tmp_path: Path) -> None:
+    site.answer = b"HTTP/1.0 503 Busy\r\n\r\n"
+    with pytest.raises(BadInput, match=r"cannot be reached .HTTP 503"):
+        fetch_cmu(["91"], tmp_path / "out", base_url=site.url)
+
+
+def test_a_page_that_breaks_off_is_not_kept(site: Site, tmp_path: Path) -> None:
+    site.answer = b"HTTP/1.0 200 OK\r\nContent-Length: 99\r\n\r\n91_01.amc"
+    with pytest.raises(BadInput, match=r"cannot be reached .IncompleteRead"):
+        fetch_cmu(["91"], tmp_path / "out", base_url=site.url)
 
 
 def test_the_shipped_list_is_that_of_the_library(mocap: Path) -> None:

@@ -1,6 +1,6 @@
 """Approximate search for large sets: an inverted file over the leading principal axes, in 16 bits.
 
-Vectors are assigned to cells around centroids, which faiss computes; a query scans only the cells nearest to it. The
+Vectors are assigned to cells around centroids of k-means; a query scans only the cells nearest to it. The
 cost of a query is the memory that it reads, and human poses hardly vary along most axes. So vectors are rotated onto
 their principal axes, truncated to the leading ones, and stored as 16-bit multiples of one small step: a third of the
 memory. Unlike a neighbour graph, an inverted file does not depend on the order in which frames were added
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.reconstruct.index.clustering import single_threaded_faiss
+from harness.reconstruct.index.clustering import VECTORS_PER_CELL, draw_sample, find_centroids, nearest_centroids
 from harness.reconstruct.index.principal_axes import PrincipalAxes, chunks
 from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
@@ -33,8 +33,6 @@ VARIANCE_SHARE = 0.9995
 """Share of the variance that the axes hold."""
 _MIN_CANDIDATES_PER_NEIGHBOUR = 3.0
 """Vectors to scan for each wanted neighbour, at least."""
-_VECTORS_PER_CELL, _CLUSTERING_ROUNDS = 39, 6
-"""For k-means: training vectors for each centroid, and iterations."""
 _MAX_CODE, _MAX_QUERY = 32_000, 1e9
 """Largest code, in steps; largest number of a query in steps, whose square must not overflow."""
 _ROW_BITS = 32
@@ -53,23 +51,17 @@ class InvertedFile(StatelessIndex):
         rng = generator(0, "inverted file", count)
         self._principal = PrincipalAxes(vectors, rng, VARIANCE_SHARE)
         width, cells = self._principal.width, cells_for(count)
-        sample = np.sort(rng.choice(count, min(count, _VECTORS_PER_CELL * cells), replace=False))
+        sample = draw_sample(count, cells, rng)
         projected = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
             projected[rows] = self._principal.project(vectors.gather(sample[rows]))
-        with single_threaded_faiss() as faiss:
-            flat = faiss.IndexFlatL2(width)
-            clustering = faiss.Clustering(width, cells)
-            clustering.seed, clustering.niter = 1, _CLUSTERING_ROUNDS
-            clustering.min_points_per_centroid, clustering.max_points_per_centroid = 1, _VECTORS_PER_CELL
-            clustering.train(projected, flat)
-            cell_of = np.empty(count, np.int32)
-            farthest = 0.0
-            for start in range(0, count, CHUNK):
-                projected = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
-                cell_of[start : start + CHUNK] = flat.search(projected, 1)[1][:, 0]
-                farthest = max(farthest, float(np.abs(projected).max()))
-            centroids = flat.reconstruct_n(0, cells)
+        centroids = find_centroids(projected, cells)
+        cell_of = np.empty(count, np.int32)
+        farthest = 0.0
+        for start in range(0, count, CHUNK):
+            projected = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
+            cell_of[start : start + CHUNK] = nearest_centroids(projected, centroids)
+            farthest = max(farthest, float(np.abs(projected).max()))
         self._probes = min(probes_for(wanted, count), cells)
         self._rows: Places = np.argsort(cell_of, kind="stable").astype(np.int32)
         """(N,) rows of the vectors, cell after cell."""
@@ -125,7 +117,7 @@ class InvertedFile(StatelessIndex):
 
 def cells_for(count: int) -> int:
     """Number of cells for `count` vectors."""
-    return max(1, min(round(2.0 * math.sqrt(count)), count // _VECTORS_PER_CELL))
+    return max(1, min(round(2.0 * math.sqrt(count)), count // VECTORS_PER_CELL))
 
 
 def probes_for(wanted: int, count: int) -> int:
