@@ -16,7 +16,6 @@ PACKAGE_OF = {
     "dask": "distributed",  # which is installed with it
     "faiss": "faiss-cpu",
     "imageio_ffmpeg": "imageio-ffmpeg",
-    "mujoco": "mujoco-core",
     "PIL": "pillow",
     "pymotion": "upc-pymotion",
     "pythonosc": "python-osc",

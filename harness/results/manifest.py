@@ -23,8 +23,6 @@ from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")
 """Packages whose versions are listed; "absent" if not installed."""
-_DISTRIBUTIONS = {"mujoco": "mujoco-core"}
-"""Names under which packages are installed, where they differ."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +133,7 @@ def _processor() -> str:
 
 def _version(package: str) -> str:
     try:
-        return metadata.version(_DISTRIBUTIONS.get(package, package))
+        return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "absent"
 
