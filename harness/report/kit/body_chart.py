@@ -85,8 +85,9 @@ def _draw_body(
 
     for outline in _outlines():
         axes.add_patch(Polygon(outline, facecolor=GRID, edgecolor="none"))
-    for n, (bone, value) in enumerate(values.items()):
-        style = {"facecolor": colours.cmap(float(colours.norm([value])[0])), "edgecolor": PAPER, "linewidth": 0.8}
+    faces = np.asarray(colours.to_rgba(np.array(list(values.values()))))
+    for n, bone in enumerate(values):
+        style = {"facecolor": faces[n], "edgecolor": PAPER, "linewidth": 0.8}
         axes.add_patch(Circle(_place(bone, group.at_far_end), _DISC_M, gid=f"joint-{body}-{n}", **style))
     for across, side in ((-0.6, "right"), (0.6, "left")):
         axes.text(across, 0.7, side, ha="left" if across < 0.0 else "right", color=FAINT, fontsize=8.5)

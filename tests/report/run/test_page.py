@@ -50,7 +50,7 @@ def verdict_of(page: str) -> tuple[str, str]:
 
 def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     page = (run_folder / "report.html").read_text(encoding="utf-8")
-    heading, rest = verdict_of(page)
+    heading, _ = verdict_of(page)
     assert page.index("<h1>") < page.index("<table")
     assert heading.startswith("best_match+ik has the lowest mean joint-angle error, ")
     assert "on 2 sequences of built-in motion" in heading
