@@ -9,6 +9,7 @@ from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.core.number_format import format_change_percent
 from harness.report.comparison.wording import groups_vary, percent_of_a
 from harness.report.kit.chart import draw_chart
+from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
 
 if TYPE_CHECKING:
@@ -71,10 +72,7 @@ def _draw(figure: "Figure", lines: Sequence[Difference], names: Sequence[str]) -
         label = f"{format_change_percent(percent_of_a(line, line.difference))} {line.verdict}"
         axes.annotate(label, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
-    axes.set_yticks(range(len(lines)), names)
-    axes.set_ylim(len(lines) - 0.45, -0.55)
-    axes.tick_params(axis="y", length=0)
-    axes.grid(False, axis="y")
+    label_rows(axes, names)
     axes.set_xlabel("B − A [% of A's mean]")
     _scale(axes, lines)
 

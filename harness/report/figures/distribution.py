@@ -13,7 +13,7 @@ from harness.report.kit.chart import add_legend
 from harness.report.kit.distribution_chart import draw_distribution
 from harness.report.kit.metric_labels import metric_label, quantity
 from harness.report.kit.print_figure import PrintFigure
-from harness.report.kit.style import mark_scale, print_line_style
+from harness.report.kit.style import print_line_style
 from harness.report.run.data import WORST_METRICS
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def distribution_figure(run: ConditionSet, selection: FigureSelection) -> PrintF
 
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
-        size = {"markersize": 4.2 * mark_scale()}
-        draw_distribution(axes, measured, metric_label(metric), lambda n: {**print_line_style(n), **size})
+        styles = {name: print_line_style(n) for n, name in enumerate(measured)}
+        draw_distribution(axes, measured, metric_label(metric), styles)
         axes.set_ylabel("frames below the error [%]")
         add_legend(figure, axes)
 

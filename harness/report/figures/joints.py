@@ -1,37 +1,27 @@
 """The figure `joints`: error at each bone of the method with the lowest error, as bars, next to a control."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.compare.paired_statistics import mean_interval
 from harness.core.arrays import Floats
-from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import ConditionSet
 from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import Highlights, choose_condition, choose_highlights, read_series
+from harness.report.figures.traces import choose_condition, rank_highlights, read_series
+from harness.report.kit.highlights import Highlights
 from harness.report.kit.print_figure import MM_PER_IN, WIDTHS_MM, PrintFigure
+from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, INK, PAPER, mark_scale
-from harness.report.run.data import Trace
-from harness.score.pair import hinged_bones, joint_names
+from harness.report.run.joint_errors import BONE_ROWS, means_by_clip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BONE_ROWS = {
-    **{"head": "head", "upperneck": "upper neck", "lowerneck": "lower neck", "thorax": "thorax"},
-    **{"upperback": "upper back", "lowerback": "lower back"},
-    **{
-        f"{side[0]}{bone}": f"{side} {bone}"
-        for bone in ("clavicle", "humerus", "radius", "wrist", "hand", "femur", "tibia", "foot")
-        for side in ("left", "right")
-    },
-}
-"""Bones with hinges from the top, left and right next to each other, and their labels."""
 _PANELS = ("rotation error [deg]", "position error of the far end [mm]")
 _ROW_MM, _FRAME_MM = 3.2, 18.0
 """Height of a row, and of axis and legend [mm]."""
@@ -40,10 +30,10 @@ _ROW_MM, _FRAME_MM = 3.2, 18.0
 def joints_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
     """Mean error at each bone in one condition, or on one of its clips; a wide figure shows positions too."""
     condition = choose_condition(run, selection)
-    highlights = choose_highlights(condition, selection)
+    highlights = rank_highlights(condition, selection)
     shown = [name for name in (highlights.leader, highlights.control) if name]
     traces = read_series(run.folder, condition, lambda name, row: name in shown and selection.clip in ("", row["clip"]))
-    means = {name: found for name, of in traces.items() if len((found := _means_by_clip(of))[0])}
+    means = {name: found for name, of in traces.items() if len((found := means_by_clip(of))[0])}
     if highlights.leader not in means:
         raise BadInput(f"{highlights.leader} was not measured on {selection.clip}.", "Choose another clip with --clip.")
     count = len(means[highlights.leader][0])
@@ -60,24 +50,6 @@ def joints_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
     )
 
 
-def _means_by_clip(traces: Sequence[Trace]) -> tuple[Floats, Floats]:
-    """Mean rotation error [deg] and position error [mm] over the scored frames of each clip, (clips, 22) in BONE_ROWS.
-
-    Cells of the same clip are averaged first. Clips without a scored frame are left out.
-    """
-    skeleton = standard_skeleton()
-    bones = [skeleton.names[bone] for bone in hinged_bones(skeleton)]
-    rotations = [bones.index(bone) for bone in BONE_ROWS]
-    positions = [joint_names(skeleton).index(bone) for bone in BONE_ROWS]
-    by_clip: dict[str, list[tuple[Floats, Floats]]] = {}
-    for trace in traces:
-        if len(trace.rotation_deg):
-            rows = (trace.rotation_deg.mean(axis=0)[rotations], trace.position_mm.mean(axis=0)[positions])
-            by_clip.setdefault(trace.clip, []).append(rows)
-    means = np.array([np.mean(cells, axis=0) for cells in by_clip.values()]).reshape(-1, 2, len(BONE_ROWS))
-    return means[:, 0], means[:, 1]
-
-
 def _draw(figure: "Figure", means: Mapping[str, tuple[Floats, Floats]], highlights: Highlights) -> None:
     panels = _PANELS if figure.get_figwidth() * MM_PER_IN > WIDTHS_MM[0] + 1.0 else _PANELS[:1]
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
@@ -92,8 +64,7 @@ def _draw(figure: "Figure", means: Mapping[str, tuple[Floats, Floats]], highligh
         axes.set_xlim(left=0.0)
         axes.grid(False, axis="y")
         axes.tick_params(axis="y", length=0)
-    grid[0].set_yticks(range(len(BONE_ROWS)), BONE_ROWS.values())
-    grid[0].set_ylim(len(BONE_ROWS) - 0.4, -0.6)
+    label_rows(grid[0], list(BONE_ROWS.values()))
     handles, names = grid[0].get_legend_handles_labels()
     order = sorted(range(len(names)), key=lambda n: not names[n].startswith(highlights.leader))
     figure.legend([handles[n] for n in order], [names[n] for n in order], loc="outside upper left", ncols=len(panels))

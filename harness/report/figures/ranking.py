@@ -1,13 +1,12 @@
 """The figure `ranking`: mean error of each method and its paired difference to the lowest, one panel a condition."""
 
-from harness.compare.paired_statistics import MIN_CLIPS
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, check_metric, describe_absent
 from harness.report.figures.selection import FigureSelection
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.print_figure import PrintFigure
-from harness.report.kit.ranking_chart import RankingPanel, draw_ranking
+from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, explain_marks
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -36,15 +35,7 @@ def _caption(run: ConditionSet, metric: str, shown: list[RunCondition], panels: 
     counts = list(dict.fromkeys(count_noun(len(panel.ranking.clips), "clip") for panel in panels))
     fewer = any(len(panel.ranking.clips) < len(each.clips) for each, panel in zip(shown, panels, strict=True))
     clips = " and ".join(counts) + (" that all methods were measured on" if fewer else "")
-    interval = " with its 95 % interval over clips" if any(len(panel.ranking.clips) > 1 for panel in panels) else ""
-    sentences = [f"Mean {quantity(metric)} on {clips}{interval}."]
-    if any(panel.ranking.results for panel in panels):
-        sentences += [
-            "Right: paired difference to the method with the lowest mean, with its 95 % interval.",
-            "Tied: no significant difference that exceeds the margin (sign-flip test over clips, Holm's correction).",
-        ]
-    if any(len(panel.ranking.clips) < MIN_CLIPS for panel in panels):
-        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference.")
+    sentences = [f"Mean {quantity(metric)} on {clips}.", explain_marks(panels)]
     unranked = len(run.conditions) - len(panels)
     sentences += [f"In {count_noun(unranked, 'condition')} the methods share no clip."] if unranked else []
     expected = (name for each in shown for name in each.series)

@@ -1,33 +1,16 @@
 """Errors over time of the cells of one condition, by series, and the series that a figure highlights."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, UnknownName
 from harness.report.figures.conditions import ConditionSet, RunCondition
 from harness.report.figures.selection import FigureSelection
+from harness.report.kit.highlights import CONTROL, Highlights, choose_highlights, find_series
 from harness.report.run.data import Row, RunData, Trace, last_varied, read_traces
 from harness.results.manifest import Manifest
 from harness.results.storage import read_summary
-
-_CONTROL = "ik"
-"""The control unless another one is chosen: the method that needs no examples."""
-
-
-@dataclass(frozen=True)
-class Highlights:
-    """The series in colour."""
-
-    leader: str
-    """The series with the lowest mean error."""
-    control: str | None
-    """The series that it is shown against; None if there is no other."""
-
-    def role(self, series: str) -> str:
-        """What a legend adds to the name of a series."""
-        return {self.leader: " (lowest mean)", self.control: " (control)"}.get(series, "")
 
 
 def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondition:
@@ -45,7 +28,7 @@ def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondit
     return next(each for each in chosen if each.varied == last and each.group.lag == chosen[0].group.lag)
 
 
-def choose_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:
+def rank_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:
     """The series with the lowest mean joint angle error, and the control.
 
     UnknownName for a control that the condition lacks, BadInput when the methods share no clip.
@@ -53,12 +36,10 @@ def choose_highlights(condition: RunCondition, selection: FigureSelection) -> Hi
     ranking: MethodRanking | None = condition.rank()
     if ranking is None:
         raise BadInput("The methods share no measured clip.", "Choose methods with --methods.")
-    others = [name for name in ranking.values if name != ranking.lowest]
-    wanted = selection.control or _CONTROL
-    found = [name for name in others if name == wanted or name.startswith(f"{wanted} (")]
-    if selection.control and not found:
+    leader, *others = ranking.values
+    if selection.control and not find_series(others, selection.control):
         raise UnknownName("control among the methods shown", selection.control, others)
-    return Highlights(ranking.lowest, next(iter(found or others), None))
+    return choose_highlights([leader, *others], selection.control or CONTROL)
 
 
 def read_series(

@@ -2,13 +2,14 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.report.kit.hover_chart import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 
 if TYPE_CHECKING:
@@ -38,10 +39,14 @@ def draw_chart(
     width_in: float = _WIDTH_IN,
     layout: Literal["constrained"] | None = "constrained",
     raster: bool = False,
+    hover: bool = False,
+    titles: Mapping[str, str] | None = None,
 ) -> Chart:
     """The chart that `draw` draws on an empty figure; `raster` adds a PNG to the SVG.
 
-    Without a layout the axes stay where `draw` puts them, which is faster.
+    Without a layout the axes stay where `draw` puts them, which is faster. With `hover` a page shows the values of
+    lines under the pointer and switches them off in the legend. `titles` are shown under the pointer too: gid of an
+    element -> text.
     """
     import matplotlib
     from matplotlib.figure import Figure
@@ -49,9 +54,11 @@ def draw_chart(
     with matplotlib.rc_context(SETTINGS):
         figure = Figure(figsize=(width_in, height_in), layout=layout)
         draw(figure)
+        names = mark_series(figure) if hover else []
         svg = to_svg(figure, name)
         figure.set_layout_engine("none")  # to_svg has computed the layout; the PNG uses the same
-        return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"")
+        lines = {"names": names, "plots": describe_plots(figure)} if hover else None
+        return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"", lines, titles or {})
 
 
 def clear_plots(folder: Path) -> Path:

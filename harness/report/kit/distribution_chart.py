@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.report.kit.scales import set_log_scale
+from harness.report.kit.style import mark_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,15 +19,26 @@ _MARKED = tuple(int(np.argmin(np.abs(_SHARES - share))) for share in (0.1, 0.3, 
 
 
 def draw_distribution(
-    axes: "Axes", series: Mapping[str, Floats], label: str, line_style: Callable[[int], Mapping[str, Any]]
+    axes: "Axes",
+    series: Mapping[str, Floats],
+    label: str,
+    styles: Mapping[str, Mapping[str, Any]],
+    role: Callable[[str], str] = lambda name: "",
 ) -> None:
-    """Draw the distribution of the finite values (N,) of each series; one without any only takes its style."""
-    for n, (name, values) in enumerate(series.items()):
+    """Draw the distribution of the finite values (N,) of each series in its style; one without any has no curve.
+
+    `role` is what the legend adds to a name.
+    """
+    for name, values in series.items():
         finite = values[np.isfinite(values)]
         if len(finite):
-            axes.plot(
-                np.quantile(finite, _SHARES), 100.0 * _SHARES, label=name, markevery=list(_MARKED), **line_style(n)
-            )
+            options = {
+                "label": name + role(name),
+                "markevery": list(_MARKED),
+                "markersize": 4.2 * mark_scale(),
+                **styles[name],
+            }
+            axes.plot(np.quantile(finite, _SHARES), 100.0 * _SHARES, **options)
     set_log_scale(axes, "x")
     axes.set_xlabel(label)
     axes.set_ylim(0.0, 100.0)

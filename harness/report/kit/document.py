@@ -1,10 +1,12 @@
 """The frame of every page: one HTML file that loads nothing from elsewhere, with a heading, facts and sections."""
 
 import base64
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from harness.report.kit.inline_svg import inline_svg
 from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.style import Chart
 
@@ -38,31 +40,41 @@ def document(
     )
     shown = [(title, name, content) for title, name, content in sections if content]
     links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in shown))
-    rows = [join(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
-    if missing:
-        texts = [tag("span", text, tag("br")) for text in missing]
-        rows.append(join(tag("dt", "Missing"), tag("dd", *texts, class_="missing")))
-    body = tag(
-        "body",
+    content = join(
         tag(
             "header",
             tag("p", kicker, class_="kicker"),
             tag("h1", heading),
             lead,
-            tag("dl", *rows, class_="facts"),
+            facts_list(facts, missing),
             tag("nav", links, aria_label="sections"),
         ),
         tag("main", *(tag("section", tag("h2", title), content, id_=name) for title, name, content in shown)),
     )
-    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
+    scripts = [_script("scroll_hint.js"), *([_script("hover_chart.js")] if "data-hover=" in content else [])]
+    return f"<!doctype html>\n{tag('html', head, tag('body', content, *scripts), lang='en')}\n"
+
+
+def facts_list(facts: Mapping[str, str], missing: Sequence[str] = ()) -> Markup:
+    """Facts with their titles, and what is missing on the page; nothing without any."""
+    rows = [join(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
+    if missing:
+        texts = [tag("span", text, tag("br")) for text in missing]
+        rows.append(join(tag("dt", "Missing"), tag("dd", *texts, class_="missing")))
+    return tag("dl", *rows, class_="facts") if rows else Markup()
+
+
+def _script(name: str) -> Markup:
+    return tag("script", Markup(Path(__file__).with_name(name).read_text(encoding="utf-8")))
 
 
 def chart_figure(chart: Chart, level: int = 0) -> Markup:
     """A chart under a heading of `level`; with level 0 the title stands in the caption."""
-    image = chart_image(chart)
     title = tag(f"h{level}", chart.title) if level else None
     caption: Any = chart.caption if level else join(tag("b", f"{chart.title}. "), chart.caption)
-    return join(title, tag("figure", scroll_box(image, chart.title), tag("figcaption", caption), class_="chart"))
+    content = scroll_box(chart_image(chart), chart.title), tag("figcaption", caption)
+    lines = json.dumps(chart.lines, separators=(",", ":")) if chart.lines else None
+    return join(title, tag("figure", *content, class_="chart", data_hover=lines))
 
 
 def chart_panel(chart: Chart) -> Markup:
@@ -72,7 +84,9 @@ def chart_panel(chart: Chart) -> Markup:
 
 
 def chart_image(chart: Chart) -> Markup:
-    """The chart as an image that follows the reader's light or dark screen."""
+    """The chart as a picture that follows the reader's light or dark screen; inline if it answers to the pointer."""
+    if chart.lines or chart.titles:
+        return inline_svg(chart.for_screen(), chart.alt, chart.titles)
     return tag("img", src=data_uri(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
 
 

@@ -59,6 +59,19 @@ def wrap_name(name: str, letters: int) -> str:
     return "\n".join(lines[:_MOST_LINES]) + ("…" if len(lines) > _MOST_LINES else "")
 
 
+def explain_marks(panels: Sequence[RankingPanel]) -> str:
+    """Sentences of a caption on intervals, differences and ties, as far as the panels have them."""
+    sentences = ["Lines: 95 % intervals over clips."] if any(len(panel.ranking.clips) > 1 for panel in panels) else []
+    if any(panel.ranking.results for panel in panels):
+        sentences += [
+            "Right: paired difference to the method with the lowest mean.",
+            "Tied: no significant difference that exceeds the margin (sign-flip test over clips, Holm's correction).",
+        ]
+    if any(len(panel.ranking.clips) < MIN_CLIPS for panel in panels):
+        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference.")
+    return " ".join(sentences)
+
+
 def draw_ranking(figure: "Figure", panels: Sequence[RankingPanel], quantity: str, unit: str) -> None:
     """Draw the panels below each other: means on the left, differences to the lowest mean on the right.
 

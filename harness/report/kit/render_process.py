@@ -44,6 +44,8 @@ class RenderJob:
     """Frame rate of the movie [1/s]; 0 makes a strip."""
     title: str = ""
     """Caption inside the movie."""
+    size: tuple[int, int] = (300, 384)
+    """Width and height of each picture of a strip [px]."""
 
 
 class RenderProcess:
@@ -110,6 +112,7 @@ class RenderProcess:
                 estimate_qpos=job.estimate_qpos,
                 fps=np.array(job.fps),
                 title=np.array(job.title),
+                size=np.array(job.size),
                 output=np.array(str(job.output.resolve())),
             )
         return start_renderer("harness.report.kit.render_worker", files)

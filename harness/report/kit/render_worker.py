@@ -15,8 +15,8 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
 from harness.score.pair import PoseSequence, compute_poses, heading_rad
 
-STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
-"""Width and height in pixels; a movie's must be even."""
+MOVIE_SIZE = (640, 640)
+"""Width and height of a movie [px]; they must be even."""
 
 
 def main(jobs: Sequence[str]) -> None:
@@ -29,19 +29,20 @@ def main(jobs: Sequence[str]) -> None:
                 compute_poses(true_skeleton, content["truth_qpos"]),
                 compute_poses(estimated_skeleton, content["estimate_qpos"]),
             )
+            width, height = (int(side) for side in content["size"])
             output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
         with atomic_path(output) as temporary:
             if fps:
                 write_movie(truth, estimate, fps, title, temporary)
             else:
-                write_strip(truth, estimate, temporary)
+                write_strip(truth, estimate, (width, height), temporary)
 
 
-def write_strip(truth: PoseSequence, estimate: PoseSequence, path: Path) -> None:
-    """Write all frames side by side into one PNG."""
+def write_strip(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int], path: Path) -> None:
+    """Write all frames side by side into one PNG, each of `size` [px]."""
     from matplotlib.image import imsave
 
-    pictures = list(_pictures(truth, estimate, STRIP_SIZE))
+    pictures = list(_pictures(truth, estimate, size))
     imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
 
 

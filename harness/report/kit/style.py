@@ -2,7 +2,8 @@
 
 import io
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,16 +13,16 @@ if TYPE_CHECKING:
 
 INK, FAINT, GRID, PAPER = "#23282f", "#6b7480", "#dfe3e8", "#fefefe"
 _DARK = {INK: "#e4e7eb", FAINT: "#9aa4b0", GRID: "#343b45", PAPER: "#14171b"}
-COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", FAINT)
-"""Okabe & Ito 2008, Color Universal Design, without yellow, which is hardly visible on white."""
+COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Okabe & Ito 2008, Color Universal Design, without yellow, which is hardly visible on white. Each is used once."""
 DASHES: tuple[Any, ...] = ("solid", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
-"""Line styles; the next one is used each time all colours have been used."""
-STYLES = len(COLOURS) * len(DASHES)
-"""Number of lines that can be told apart."""
+"""Dashes of lines, in the order of their use."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 """Markers of series, in the order of their use."""
 MUTED = "#98a1ab"
-"""Grey of lines in the background of highlighted ones."""
+"""Grey of series that have no colour: those behind highlighted ones, and those beyond the last colour."""
+STYLES = len(DASHES) * (1 + len(MARKERS))
+"""Number of grey lines that can be told apart."""
 SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 10.0,
@@ -88,6 +89,10 @@ class Chart:
     svg: str
     png: bytes = b""
     """The chart on white as PNG; empty unless `draw_chart` was called with `raster`."""
+    lines: Mapping[str, Any] | None = None
+    """Names and scales for `hover_chart.js`; None for a chart whose lines have no values under the pointer."""
+    titles: Mapping[str, str] = field(default_factory=dict)
+    """Gid of an element -> text under the pointer."""
 
     def write(self, folder: Path) -> None:
         """Write FOLDER/name.svg, and FOLDER/name.png if there is a PNG."""
@@ -103,7 +108,7 @@ class Chart:
             light += f"--c{n}:{colour};"
             dark += f"--c{n}:{on_dark};"
         text = re.sub(r"(font:[^;\"']*?px) [^;\"]*", r"\1 system-ui, sans-serif", text)
-        rules = f"svg{{{light}}}@media (prefers-color-scheme: dark){{svg{{{dark}}}}}"
+        rules = f"svg{{{light}}}@media screen and (prefers-color-scheme: dark){{svg{{{dark}}}}}"
         return text.replace("<defs>", f"<style>{rules}</style><defs>", 1)
 
 
@@ -157,20 +162,22 @@ def legend_scale() -> float:
     return float(size) / float(SETTINGS["font.size"])
 
 
-def line_style(n: int) -> dict[str, Any]:
-    """Colour and dashes of the n-th series."""
-    return {
-        "color": COLOURS[n % len(COLOURS)],
-        "linestyle": DASHES[n // len(COLOURS) % len(DASHES)],
-    }
+def series_colour(n: int) -> str:
+    """Colour of the n-th series: each colour is used once, and the series beyond the last one are grey."""
+    return COLOURS[n] if n < len(COLOURS) else MUTED
+
+
+def series_style(n: int) -> dict[str, Any]:
+    """Colour, dashes and marker of the n-th series: coloured lines are solid, and grey ones differ in their dashes."""
+    return {**print_line_style(n), **({"linestyle": DASHES[0]} if n < len(COLOURS) else {})}
 
 
 def print_line_style(n: int) -> dict[str, Any]:
-    """Colour, dashes and marker of the n-th series in print: neighbours differ in all three, also without colour."""
+    """Colour, dashes and marker of the n-th series in print: neighbours differ in all of them, also without colour."""
     return {
-        "color": COLOURS[n % len(COLOURS)],
+        "color": series_colour(n),
         "linestyle": DASHES[n % len(DASHES)],
-        "marker": MARKERS[(n + n // len(MARKERS)) % len(MARKERS)],
+        "marker": MARKERS[(n + n // len(DASHES)) % len(MARKERS)],
     }
 
 

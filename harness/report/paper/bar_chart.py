@@ -10,7 +10,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.number_format import format_number
 from harness.report.kit.chart import add_legend
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, series_colour
 from harness.report.paper.figure_table import SeriesValues, series_values
 from harness.results.findings import BarChart
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HATCHES = ("", "////", "....", "xxxx")
-"""Fill patterns; the next one is used each time all colours have been used."""
+"""Fill patterns of grey bars."""
 _LETTERS, _HORIZONTAL_LETTERS, _MOST_ROWS = 96, 34, 3
 """Letters under all vertical bars together; before a horizontal bar; most rows of text under a vertical bar."""
 _MOST_VERTICAL, _MOST_NUMBERED, _MOST_HORIZONTAL_NUMBERED = 45, 25, 64
@@ -116,9 +116,9 @@ def _bar_series(bars: BarChart, thick: float) -> list[_BarSeries]:
 
 
 def _bar_style(n: int) -> dict[str, Any]:
-    """Colour and hatches of the n-th series."""
-    hatch = _HATCHES[n // len(COLOURS) % len(_HATCHES)] or None
-    return {"color": COLOURS[n % len(COLOURS)], "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
+    """Colour of the n-th series; those beyond the last colour are grey and differ in their hatches."""
+    hatch = _HATCHES[max(n - len(COLOURS), 0) % len(_HATCHES)] or None
+    return {"color": series_colour(n), "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
 
 
 def _draw_whiskers(axes: "Axes", row: _BarSeries, horizontal: bool) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.report.kit.chart import add_legend, decimate, label_line_ends
-from harness.report.kit.style import line_style
+from harness.report.kit.style import series_style
 from harness.report.paper.figure_table import series_values
 from harness.results.findings import LineChart
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 10
 """Most lines that have their names at their ends; more lines have a legend."""
 _MOST_MARKERS = 25
-"""Most points of a line that are marked one by one."""
+"""About the most points of a line that are marked."""
 
 
 def draw_lines(figure: "Figure", lines: LineChart, colour_indices: Mapping[str, int]) -> None:
@@ -26,10 +26,10 @@ def draw_lines(figure: "Figure", lines: LineChart, colour_indices: Mapping[str, 
     axes = figure.subplots()
     ends = []
     for name in lines.series:
-        style = line_style(colour_indices[name])
+        style = series_style(colour_indices[name])
         x, values = decimate(np.array(lines.x, dtype=float), series_values(lines.series, name, len(lines.x)))
-        marker = "o" if len(x) <= _MOST_MARKERS else None
-        axes.plot(x, values, marker=marker, markersize=3.5, label=name, **style)
+        every = max(1, len(x) // _MOST_MARKERS)
+        axes.plot(x, values, markevery=every, markersize=3.5, label=name, **style)
         finite = values[np.isfinite(values)]
         if len(finite):
             ends.append((float(finite[-1]), name, style["color"]))

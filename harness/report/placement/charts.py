@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.report.kit.chart import draw_chart
+from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
 from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
@@ -30,7 +31,6 @@ from harness.results.placement_findings import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
@@ -80,7 +80,8 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
                 annotation_clip=False,
             )
         axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", fontsize=8.5, color=FAINT)
-        _label_rows(axes, [set_name(row.stations) for row in rows])
+        label_rows(axes, [set_name(row.stations) for row in rows])
+        axes.margins(x=0.06)
         axes.set_xlabel(f"difference to the first [{findings.unit}], paired over clips")
 
     more = f" Shown: the first {len(rows)} of {len(ranking.rows)}." if len(rows) < len(ranking.rows) else ""
@@ -110,7 +111,8 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
             if row.low is not None and row.high is not None:
                 axes.hlines(y, row.low, row.high, color=INK, linewidth=1.2)
         axes.axvline(0.0, color=INK, linewidth=0.8)
-        _label_rows(axes, [plain_name(row.candidate) for row in rows])
+        label_rows(axes, [plain_name(row.candidate) for row in rows])
+        axes.margins(x=0.06)
         axes.set_xlabel(f"error without it minus error with it [{findings.unit}]")
 
     values = ", ".join(f"{plain_name(row.candidate)} {format_signed(row.difference)}" for row in rows)
@@ -128,28 +130,23 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
 def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
     """The error after each step of a search, and what the step changed."""
     steps = [(step, findings.of(step.stations)) for step in search.steps]
-    measured = [(n, step, tried) for n, (step, tried) in enumerate(steps) if tried and tried.mean is not None]
+    measured = [(step, tried) for step, tried in steps if tried and tried.mean is not None]
 
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
-        axes.plot(
-            [mean_or_nan(tried) for *_, tried in measured],
-            [n for n, *_ in measured],
-            color=_BEST,
-            linewidth=1.2,
-            alpha=0.6,
-        )
-        for n, step, tried in measured:
+        means = [mean_or_nan(tried) for _, tried in measured]
+        axes.plot(means, range(len(measured)), color=_BEST, linewidth=1.2, alpha=0.6)
+        for n, (step, tried) in enumerate(measured):
             significant = step.low is not None and step.low > 0.0
             if tried.low is not None and tried.high is not None:
                 axes.hlines(n, tried.low, tried.high, color=FAINT, linewidth=1.0)
-            face = _BEST if significant or n == 0 else PAPER
+            face = _BEST if significant or not step.changed else PAPER
             axes.plot(mean_or_nan(tried), n, "o", color=face, markeredgecolor=_BEST, markersize=6.5, zorder=3)
-        _label_rows(axes, [_step_label(step.changed, step.tied) or "start" for _, step, _ in measured])
-        axes.set_yticks([n for n, *_ in measured])
+        label_rows(axes, [_step_label(step.changed, step.tied) or "start" for step, _ in measured])
+        axes.margins(x=0.06)
         axes.set_xlabel(f"{findings.metric} [{findings.unit}]")
 
-    values = "; ".join(f"{step.changed or 'start'}: {format_value(tried.mean)}" for _, step, tried in measured)
+    values = "; ".join(f"{step.changed or 'start'}: {format_value(tried.mean)}" for step, tried in measured)
     notes = f" Ended: {search.ended}." if search.ended else ""
     notes += f" {gain}." if (gain := search_gain_sentence(search, findings.unit)) else ""
     return draw_chart(
@@ -212,15 +209,6 @@ def _tau(pair: RankAgreement | None) -> float | None:
 
 def _tau_text(pair: RankAgreement) -> str:
     return format_value(pair.tau)
-
-
-def _label_rows(axes: "Axes", names: Sequence[str]) -> None:
-    """Label the rows, the first one at the top."""
-    axes.set_yticks(range(len(names)), names)
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.grid(False, axis="y")
-    axes.tick_params(axis="y", length=0)
-    axes.margins(x=0.06)
 
 
 def charts(findings: PlacementFindings) -> dict[str, list[Chart]]:

@@ -9,8 +9,11 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.chart import add_legend, decimate, draw_chart, insert_gaps
 from harness.report.kit.distribution_chart import draw_distribution
+from harness.report.kit.highlights import Highlights
+from harness.report.kit.hover_chart import BAND_OF
 from harness.report.kit.metric_labels import metric_label
-from harness.report.kit.scales import set_log_scale, set_root_scale
+from harness.report.kit.rows import label_rows
+from harness.report.kit.scales import set_root_scale
 from harness.report.kit.style import (
     COLOURS,
     FAINT,
@@ -19,9 +22,9 @@ from harness.report.kit.style import (
     PAPER,
     Chart,
     hide_frame,
-    line_style,
 )
 from harness.report.kit.text import to_file_name
+from harness.report.kit.time_chart import draw_over_time
 from harness.report.run.data import RunData, Trace
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.pair import hinged_bones, joint_names
@@ -39,49 +42,53 @@ SIGMA_BAND_NOTE = (
 """Sentence of a caption with such bands; 0.8 is the mean of an absolute normal error, sqrt(2 / pi)."""
 
 
-def error_over_time(run: RunData, behaviour: str) -> Chart:
+def error_over_time(run: RunData, behaviour: str, highlights: Highlights) -> Chart:
     """Error over time of every method on the behaviour's clip with the largest mean error, and station quality."""
     traces = [trace for trace in run.traces if trace.behaviour == behaviour]
     clips = tuple(dict.fromkeys(trace.clip for trace in traces))
     clip = max(clips, key=lambda name: _mean([t.errors[PRIMARY_METRIC][t.scored] for t in traces if t.clip == name]))
-    shown = [trace for trace in traces if trace.clip == clip]
+    on_clip = [trace for trace in traces if trace.clip == clip]
+    shown = {trace.series: trace for trace in reversed(on_clip) if trace.series in run.charted_series}
     which = clip + (f", the clip with the largest error of {len(clips)}" if len(clips) > 1 else "")
+    bands = [trace for name, trace in shown.items() if len(trace.sigma_deg) and highlights.role(name)]
 
     def draw(figure: "Figure") -> None:
-        error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
-        for trace in (trace for trace in shown if trace.series in run.charted_series):
-            values = np.where(trace.scored, trace.errors[PRIMARY_METRIC], np.nan)
-            time_s, values = decimate(*insert_gaps(trace.time_s, values))
-            error.plot(time_s, values, label=trace.series, **line_style(run.charted_series.index(trace.series)))
-        set_log_scale(error, "y")
-        for trace in (trace for trace in shown if trace.series in run.charted_series and len(trace.sigma_deg)):
-            _draw_sigma_band(error, trace, line_style(run.charted_series.index(trace.series))["color"])
-        error.set_ylabel(AXIS_LABELS[PRIMARY_METRIC])
-        start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
+        rows = len(on_clip[0].stations)
+        error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * rows + 0.25))
+        names = [name for name in run.charted_series if name in shown]
+        lines = {
+            name: (t.time_s, np.where(t.scored, t.errors[PRIMARY_METRIC], np.nan))
+            for name, t in ((name, shown[name]) for name in names)
+        }
+        draw_over_time(error, lines, highlights, AXIS_LABELS[PRIMARY_METRIC])
+        for trace in bands:
+            _draw_sigma_band(error, trace, highlights)
+        start = min((float(t.time_s[t.scored][0]) for t in on_clip if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
         add_legend(figure, error)
-        _draw_quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
+        _draw_quality(quality, max(on_clip, key=lambda trace: len(trace.time_s)))
 
     return draw_chart(
         f"error_{to_file_name(behaviour)}",
         behaviour.replace("_", " "),
-        f"{which}. Grey: warm-up, not scored. Below: quality of each station, from 1 (blue) to 0 (red, lost)."
-        f"{SIGMA_BAND_NOTE if any(len(trace.sigma_deg) for trace in shown) else ''}{omitted_series_note(run)}",
+        f"{which}. {highlights.description} Shaded at the start: warm-up, not scored. Below: quality of each station, "
+        f"from 1 (blue) to 0 (red, lost).{SIGMA_BAND_NOTE if bands else ''}{omitted_series_note(run)}",
         f"Joint angle error of methods over time on {clip}, and the quality of every station below it.",
         draw,
-        2.6 + 0.2 * len(shown[0].stations),
+        2.6 + 0.2 * len(on_clip[0].stations),
+        hover=True,
     )
 
 
-def error_per_joint(run: RunData, series: str) -> Chart:
-    """Box plots of each joint's errors for one method; medians of other methods as points in distinct colours."""
+def error_per_joint(run: RunData, highlights: Highlights) -> Chart:
+    """Box plots of each joint's errors for the leader; medians of the control as points."""
     skeleton = standard_skeleton()
     bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
     joints = list(joint_names(skeleton))
-    boxes = _pooled_errors(run, series)
-    others = [name for name in run.ranked if name != series and len(_pooled_errors(run, name)[0])]
-    shown = others[: len(COLOURS) - 1]
-    which = f"the {len(shown)} methods with the next lowest errors" if len(shown) < len(others) else "the other methods"
+    leader, control = highlights.leader, highlights.control
+    boxes = _pooled_errors(run, leader)
+    points = _pooled_errors(run, control) if control else None
+    has_points = points is not None and len(points[0]) > 0
 
     def draw(figure: "Figure") -> None:
         left, right = figure.subplots(1, 2)
@@ -89,31 +96,27 @@ def error_per_joint(run: RunData, series: str) -> Chart:
             (left, bones, 0, "rotation relative to the parent [deg]"),
             (right, joints, 1, "position of the far end [mm]"),
         ):
-            rows = np.arange(len(names))
-            draw_boxes(axes, boxes[part], COLOURS[0])
-            for colour, name in zip(COLOURS[1:], shown, strict=False):
-                median = np.median(_pooled_errors(run, name)[part], axis=0)
-                axes.plot(median, rows, "o", markersize=3.5, color=colour, label=name)
-            axes.set_yticks(rows, names)
-            axes.set_ylim(len(names) - 0.3, -0.7)
+            draw_boxes(axes, boxes[part], COLOURS[1])
+            if points is not None and has_points:
+                median = np.median(points[part], axis=0)
+                axes.plot(median, np.arange(len(names)), "o", markersize=3.5, color=COLOURS[0], label=control)
+            label_rows(axes, names)
             set_root_scale(axes)
             axes.set_title(title)
-            axes.grid(False, axis="y")
-        if shown:
-            add_legend(figure, left)
 
     return draw_chart(
         "per_joint",
-        f"Each joint, {series}",
-        f"{series}: boxes from quartile to quartile, lines at the median, whiskers at the 5th and 95th percentile of "
-        f"all scored frames. Points: medians of {which}. The axes have a square-root scale.",
-        f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {series}.",
+        f"Distribution at each joint, {leader}",
+        f"{leader}: boxes from quartile to quartile, lines at the median, whiskers at the 5th and 95th percentile of "
+        f"all scored frames.{f' Points: medians of {control}.' if has_points else ''} The axes have a square-root "
+        "scale.",
+        f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {leader}.",
         draw,
         6.4,
     )
 
 
-def error_distribution(run: RunData) -> Chart:
+def error_distribution(run: RunData, highlights: Highlights) -> Chart:
     """Cumulative distribution of the errors of every method."""
 
     def values(metric: str, name: str) -> Floats:
@@ -121,8 +124,10 @@ def error_distribution(run: RunData) -> Chart:
         return np.concatenate(parts or [np.empty(0)])
 
     def draw(figure: "Figure") -> None:
+        styles = highlights.styles(run.charted_series)
         for axes, (metric, label) in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS.items(), strict=True):
-            draw_distribution(axes, {name: values(metric, name) for name in run.charted_series}, label, line_style)
+            named = {name: values(metric, name) for name in styles}
+            draw_distribution(axes, named, label, styles, highlights.role)
         first = figure.axes[0]
         first.set_ylabel("frames below the error [%]")
         add_legend(figure, first)
@@ -130,11 +135,12 @@ def error_distribution(run: RunData) -> Chart:
     return draw_chart(
         "error_cdf",
         "Error distribution",
-        "Share of all scored frames of all clips whose error is below a value. Curves further left are better."
-        f"{omitted_series_note(run)}",
+        "Share of all scored frames of all clips whose error is below a value. Curves further left are better. "
+        f"{highlights.description}{omitted_series_note(run)}",
         "Cumulative distribution of joint angle and joint position error of methods.",
         draw,
         3.3,
+        hover=True,
     )
 
 
@@ -162,12 +168,15 @@ def _draw_quality(axes: "Axes", trace: Trace) -> None:
     axes.set_xlabel("time [s]")
 
 
-def _draw_sigma_band(axes: "Axes", trace: Trace, colour: str) -> None:
+def _draw_sigma_band(axes: "Axes", trace: Trace, highlights: Highlights) -> None:
     """Shade the area up to the mean standard deviation of a frame's hinges."""
     bottom, top = axes.get_ylim()
     mean_deg = np.where(trace.scored, trace.sigma_deg.mean(axis=1), np.nan)
     time_s, mean_deg = decimate(*insert_gaps(trace.time_s, mean_deg))
-    axes.fill_between(time_s, bottom, np.maximum(mean_deg, bottom), color=colour, alpha=0.13, linewidth=0)
+    name = trace.series
+    style = {"color": highlights.styles([name])[name]["color"], "alpha": 0.13, "linewidth": 0}
+    label = f"{BAND_OF}{name}{highlights.role(name)}"
+    axes.fill_between(time_s, bottom, np.maximum(mean_deg, bottom), label=label, **style)
     axes.set_ylim(bottom, np.nanmax(mean_deg, initial=top))
 
 

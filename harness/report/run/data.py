@@ -116,8 +116,8 @@ class RunData:
 
     @cached_property
     def charted_series(self) -> tuple[str, ...]:
-        """The series with the lowest errors, as many as colours and dashes can distinguish."""
-        return tuple(name for name in self.series if name in self.ranked[:STYLES])
+        """The series with the lowest errors, the lowest first, as many as a chart can distinguish."""
+        return self.ranked[:STYLES]
 
     @cached_property
     def behaviours(self) -> tuple[str, ...]:

@@ -29,6 +29,17 @@ class Headline:
     facts: Mapping[str, str]
     """Title -> text: motion, coverage, what was not measured."""
 
+    @property
+    def opening(self) -> str:
+        """The first sentence."""
+        first, end, _ = self.sentence.partition(". ")
+        return first + end.rstrip()
+
+    @property
+    def rest(self) -> str:
+        """The sentences after the first; empty if there are none."""
+        return self.sentence.partition(". ")[2]
+
 
 def build_headline(run: RunData) -> Headline:
     """Which method is best, by how much and on what motion, and what is missing."""

@@ -10,10 +10,11 @@ from typing import Any
 from harness.core.files import to_json_types
 from harness.core.number_format import format_number
 from harness.core.text_table import Table
-from harness.report.kit.document import Section, chart_figure, data_uri, document
+from harness.report.kit.document import Section, chart_figure, data_uri, document, facts_list
 from harness.report.kit.markup import Markup, bullet_list, details, join, scroll_box, tag
 from harness.report.kit.style import Chart
 from harness.report.kit.table import NOT_MEASURED_CELL, html_table, stacked_cell
+from harness.report.kit.text import list_first
 from harness.report.run import (
     calibration_cost,
     calibration_errors,
@@ -25,6 +26,7 @@ from harness.report.run import (
 )
 from harness.report.run.data import RunData
 from harness.report.run.headline import Headline
+from harness.report.run.joint_errors import JointMeans, joint_table
 from harness.report.run.worst_window import WorstWindow
 from harness.score.metrics import DEFINITIONS
 
@@ -32,6 +34,10 @@ _REPRODUCE_NOTE = (
     "Run the command in a folder from which it finds the scenario file and, for recorded motion, the library. To write "
     "this page alone again: "
 )
+
+_LEADING_FACTS = ("Motion", "Coverage")
+"""Facts on the first screen; the others are in a section of their own."""
+_MOST_NAMED = 8
 
 
 @dataclass(frozen=True)
@@ -47,17 +53,48 @@ class FilmStrip:
 
 
 @dataclass(frozen=True)
+class Still:
+    """A picture of the leading method at the instant of its largest error."""
+
+    caption: str
+    picture: Path
+    """PNG file; if it does not exist, the page says why in its place."""
+
+
+@dataclass(frozen=True)
+class RunCharts:
+    """The charts of the page; empty or None where nothing was measured."""
+
+    rankings: Sequence[Chart] = ()
+    """One for each group of methods that are ranked together, that of the headline first."""
+    varied: Sequence[Chart] = ()
+    over_time: Sequence[Chart] = ()
+    """One for each behaviour."""
+    on_body: Chart | None = None
+    per_joint: Chart | None = None
+    distribution: Chart | None = None
+    sigma: Chart | None = None
+    """Errors of each hinge against the standard deviations that a method states; None where none does."""
+
+    def all(self) -> list[Chart]:
+        """Every chart once."""
+        single = (self.on_body, self.per_joint, self.distribution, self.sigma)
+        return [*self.rankings, *self.varied, *self.over_time, *(chart for chart in single if chart)]
+
+
+@dataclass(frozen=True)
 class RunContent:
     """Everything that the page of a run shows."""
 
     run: RunData
     headline: Headline
-    varied: Sequence[Chart]
-    over_time: Sequence[Chart]
-    per_joint: Chart | None
-    distribution: Chart | None
-    sigma: Chart | None
-    """Errors of each hinge against the standard deviations that a method states; None where none does."""
+    charts: RunCharts
+    joints: JointMeans
+    """Errors at each bone of the leader and of the control."""
+    still: Still | None
+    """None if no method has the lowest error."""
+    no_still: str
+    """Why the picture is missing, "" if it is not."""
     windows: Mapping[tuple[str, str], WorstWindow]
     """(series, metric) -> its worst two seconds."""
     strips: Sequence[FilmStrip]
@@ -70,44 +107,88 @@ class RunContent:
 
 def run_page(content: RunContent) -> str:
     """The HTML of the page."""
-    run = content.run
+    run, headline = content.run, content.headline
     return document(
         title=f"{run.name}: harness report",
         kicker=f"harness report · {run.name}",
-        heading=content.headline.sentence,
-        facts=content.headline.facts,
+        heading=headline.opening,
+        facts={},
         missing=content.missing,
         sections=_sections(content),
+        lead=_overview(content),
     )
 
 
+def _overview(content: RunContent) -> Markup:
+    """The first screen after the heading: the other sentences, the ranking and a picture of the leading method."""
+    headline, charts = content.headline, content.charts
+    about = [f"{title}: {headline.facts[title]}." for title in _LEADING_FACTS if title in headline.facts]
+    return join(
+        tag("p", headline.rest, class_="verdict-text") if headline.rest else None,
+        tag("p", " ".join(about), class_="about"),
+        tag("div", chart_figure(charts.rankings[0]), _still(content), class_="overview") if charts.rankings else None,
+    )
+
+
+def _still(content: RunContent) -> Markup:
+    still = content.still
+    if still is None or not still.picture.is_file():
+        reason = content.no_still or "no method has the lowest error"
+        return tag("figure", tag("p", f"There is no picture of truth and estimate: {reason}."), class_="still absent")
+    image = tag(
+        "img", src=data_uri(still.picture.read_bytes(), "image/png"), alt=f"Truth and estimate of {still.caption}"
+    )
+    caption = tag("figcaption", tag("b", f"{still.caption}. "), _colour_key())
+    return tag("figure", image, caption, class_="still")
+
+
 def _sections(content: RunContent) -> list[Section]:
-    run = content.run
+    run, charts = content.run, content.charts
     measured = bool(run.cells)
     nothing, cells = Markup(), run.full_summary["cells"]
-    effects = join(*(chart_figure(chart, 3) for chart in content.varied), parameter_effects.effect_tables(run))
+    effects = join(*(chart_figure(chart, 3) for chart in charts.varied), parameter_effects.effect_tables(run))
+    further = join(*(chart_figure(chart, 3) for chart in charts.rankings[1:]))
     return [
+        ("In 3-D", "look", _view_3d(content)),
         ("Varied", "varied", effects),
         ("Expected orders", "expected_orders", expected_orders.section(run.full_summary)),
-        ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
-        ("Results", "results", tables.results_tables(run) if measured else nothing),
-        ("Recovery", "recovery", recovery.section(run.summary)),
-        ("Coverage", "coverage", tables.coverage_tables(run)),
-        ("Error over time", "time", join(*(chart_figure(chart, 3) for chart in content.over_time))),
-        ("Each joint", "joints", chart_figure(content.per_joint) if content.per_joint else nothing),
-        ("Stated uncertainty", "sigma", _sigma_section(content)),
-        ("Error distribution", "cdf", chart_figure(content.distribution) if content.distribution else nothing),
-        ("Stream health", "health", tables.health_tables(run) if measured else nothing),
+        ("Results", "results", join(further, tables.results_tables(run)) if measured else nothing),
+        ("Error over time", "time", _over_time(charts.over_time)),
+        ("Error by joint", "joints", _joint_section(content)),
         ("Worst two seconds", "worst", _worst_section(content) if content.windows else nothing),
-        ("In 3-D", "look", _view_3d(content)),
+        ("Error distribution", "cdf", chart_figure(charts.distribution) if charts.distribution else nothing),
+        ("Stated uncertainty", "sigma", _sigma_section(content)),
+        ("Recovery", "recovery", recovery.section(run.summary)),
+        ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
+        ("Coverage", "coverage", tables.coverage_tables(run)),
+        ("Stream health", "health", tables.health_tables(run) if measured else nothing),
         ("All metrics", "metrics", _every_metric(run) if measured else nothing),
-        ("Manifest", "manifest", _manifest(run)),
+        ("Conditions", "conditions", join(facts_list(content.headline.facts), _manifest(run))),
         ("Reproduce", "reproduce", _reproduce(run)),
     ]
 
 
+def _over_time(charts: Sequence[Chart]) -> Markup:
+    """The chart of the first behaviour, and the others folded."""
+    if not charts:
+        return Markup()
+    hint = tag("p", "Point at a line for its value. Click a name to hide or show its line.", class_="screen-only")
+    first, *others = (chart_figure(chart, 3) for chart in charts)
+    names = list_first([chart.title for chart in charts[1:]], _MOST_NAMED)
+    return join(hint, first, details(f"Other behaviours: {names}", *others) if others else None)
+
+
+def _joint_section(content: RunContent) -> Markup:
+    charts = content.charts
+    if charts.on_body is None:
+        return Markup()
+    boxes = details("Distribution at each joint", chart_figure(charts.per_joint)) if charts.per_joint else None
+    return join(chart_figure(charts.on_body), details("Numbers of this chart", joint_table(content.joints)), boxes)
+
+
 def _sigma_section(content: RunContent) -> Markup:
-    chart = chart_figure(content.sigma, 3) if content.sigma else None
+    sigma = content.charts.sigma
+    chart = details("Error of each hinge", chart_figure(sigma, 3)) if sigma else None
     return join(uncertainty.sigma_table(content.run), chart)
 
 
@@ -132,7 +213,7 @@ def _worst_section(content: RunContent) -> Markup:
     strips = [_film_strip(strip) for strip in content.strips if strip.picture.is_file()]
     links = bullet_list([tag("a", path.name, href=path.name) for path in content.movies], class_=None)
     movies = join(tag("h3", "Movies"), links) if links else None
-    return join(summary, key if strips else None, *strips, movies)
+    return join(key if strips else None, *strips, movies, details("All methods", summary) if strips else summary)
 
 
 def _film_strip(strip: FilmStrip) -> Markup:

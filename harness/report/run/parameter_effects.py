@@ -1,11 +1,12 @@
 """Effect of a varied key of the scenario on the errors: curves if its values are numbers, and tables."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from harness.core.text_table import Table
 from harness.report.kit.chart import add_legend, draw_chart
+from harness.report.kit.highlights import Highlights
 from harness.report.kit.markup import Markup, join, tag
-from harness.report.kit.style import Chart, line_style
+from harness.report.kit.style import Chart
 from harness.report.kit.table import count_note, html_table
 from harness.report.kit.text import to_file_name
 from harness.report.run.charts import AXIS_LABELS, omitted_series_note
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def effect_charts(run: RunData) -> list[Chart]:
+def effect_charts(run: RunData, highlights: Highlights) -> list[Chart]:
     """For each behaviour a chart of the error against the varied key; none unless one key takes several numbers."""
     values = [row["varied"] for row in run.full_summary["cells"]]
     keys = {key for varied in values for key in varied}
@@ -27,7 +28,7 @@ def effect_charts(run: RunData) -> list[Chart]:
     (key,) = keys
     if not all(isinstance(varied[key], int | float) and not isinstance(varied[key], bool) for varied in values):
         return []
-    return [_chart(run, behaviour, key) for behaviour in run.behaviours]
+    return [_chart(run, behaviour, key, highlights) for behaviour in run.behaviours]
 
 
 def effect_tables(run: RunData) -> Markup:
@@ -37,19 +38,21 @@ def effect_tables(run: RunData) -> Markup:
     return join(*(_table(run, behaviour, metric) for behaviour in run.behaviours for metric in AXIS_LABELS))
 
 
-def _chart(run: RunData, behaviour: str, key: str) -> Chart:
+def _chart(run: RunData, behaviour: str, key: str, highlights: Highlights) -> Chart:
     by_series = _rows(run, behaviour)
     names = [name for name in run.charted_series if name in by_series]
 
     def draw(figure: "Figure") -> None:
+        styles = highlights.styles(names)
         for axes, (metric, label) in zip(figure.subplots(1, 2), AXIS_LABELS.items(), strict=True):
-            for name in names:
+            for name, style in styles.items():
                 points = sorted(
                     (row["varied"][key], row["metrics"][metric]["mean"]) for row in by_series[name].values()
                 )
                 measured = [(x, y) for x, y in points if y is not None]
                 if measured:
-                    axes.plot(*zip(*measured, strict=True), "o", markersize=3.5, **_line_options(run, name))
+                    options = {**style, "marker": style.get("marker") or "o", "markersize": 3.5}
+                    axes.plot(*zip(*measured, strict=True), label=name + highlights.role(name), **options)
             axes.set_xlabel(key)
             axes.set_ylabel(label)
             axes.set_ylim(bottom=0.0)
@@ -58,15 +61,12 @@ def _chart(run: RunData, behaviour: str, key: str) -> Chart:
     return draw_chart(
         f"varied_{to_file_name(key)}_{to_file_name(behaviour)}",
         f"{behaviour.replace('_', ' ')}: error against {key}",
-        f"Mean over clips; the tables below have the numbers.{omitted_series_note(run)}",
+        f"Mean over clips; the tables below have the numbers. {highlights.description}{omitted_series_note(run)}",
         f"Joint angle and joint position error of {len(names)} methods against {key}.",
         draw,
         3.6,
+        hover=True,
     )
-
-
-def _line_options(run: RunData, name: str) -> dict[str, Any]:
-    return {"label": name, **line_style(run.charted_series.index(name))}
 
 
 def _table(run: RunData, behaviour: str, metric: str) -> Markup:

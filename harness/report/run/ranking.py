@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.compare.margins import MARGINS
-from harness.compare.ranking import ClipValues, find_best, rank_methods
+from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
 from harness.core.number_format import count_noun
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.run.data import Row, lag_of, last_varied, series_name
@@ -63,18 +63,33 @@ def best_series(values: GroupedValues, metric: str) -> set[str]:
     return {best for of_group in values.values() if (best := find_best(of_group, metric))}
 
 
+def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanking | None]:
+    """Group -> its ranking by the primary metric, None where its methods share no clip.
+
+    Where the scenario varies keys, the last combination of values counts.
+    """
+    return {group: rank_methods(of, PRIMARY_METRIC) for group, of in _measured_groups(summary).items()}
+
+
+def _measured_groups(summary: Mapping[str, Any]) -> GroupedValues:
+    """The values of the last combination of varied values, of the series that have the primary metric."""
+    groups = group_values(last_varied(summary)["cells"], summary["methods"])
+    return {
+        group: {name: of for name, of in values.items() if of.get(PRIMARY_METRIC)} for group, values in groups.items()
+    }
+
+
 def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str, str | None]]:
     """For each group a description, and the series with the lowest error.
 
     Where the scenario varies keys, the last combination of values counts. `motion` names the motion.
     """
-    last, methods = last_varied(summary), summary["methods"]
-    groups = group_values(last["cells"], methods)
+    last = last_varied(summary)
+    groups = _measured_groups(summary)
     several, found = len({group.performer for group in groups}) > 1, list[tuple[str, str | None]]()
     setting = varied_text(last["cells"][0]["varied"]) if last["cells"] else ""
-    for group, values in groups.items():
-        measured = {name: of for name, of in values.items() if of.get(PRIMARY_METRIC)}
-        ranking = rank_methods(measured, PRIMARY_METRIC)
+    for group, ranking in rank_groups(summary).items():
+        measured = groups[group]
         if ranking is None:
             if measured:
                 found.append((f"{', '.join(measured)} share no measured sequence, so they are not ranked.", None))

@@ -72,7 +72,7 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Group
     names = [(column or "all").replace("_", " ") for column in values]
     titles = [join(name, n) for name, n in zip(names, numbers, strict=True)]
     notes = {run.series_of(row): _fallback_note(row) for row in run.summary["methods"]}
-    rows = [[join(name, notes.get(name)), *(cell(name, column) for column in values)] for name in run.series]
+    rows = [[join(name, notes.get(name)), *(cell(name, column) for column in values)] for name in run.ranked]
     caption = join(
         tag("b", f"{metric} [{unit}]"),
         f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.{BOLD_NOTE if any(best.values()) else ''}",
@@ -88,7 +88,28 @@ def _fallback_note(row: Row) -> Markup | None:
 
 
 def coverage_tables(run: RunData) -> Markup:
-    """How many frames each method estimated, and which cells failed."""
+    """How many frames each method estimated, and which cells failed; one sentence where nothing is missing."""
+    finished, planned = run.summary["cells_finished"], run.summary["cells_planned"]
+    methods = run.summary["methods"]
+    matched, expected = (sum(row[f"frames_{name}"] for row in methods) for name in ("matched", "expected"))
+    if finished == planned and matched == expected and expected:
+        others = {name: sum(row[f"frames_{name}"] for row in methods) for name in _FRAME_COUNTS[2:]}
+        notes = [f"{count:,} {name.replace('_', ' ')}" for name, count in others.items() if count]
+        which = f" Among them: {', '.join(notes)}." if notes else ""
+        text = f"All {planned:,} cells finished, and all {expected:,} frames after the warm-up have an estimate.{which}"
+        return join(tag("p", text), details("Frames of each method", _coverage_table(run)) if notes else None)
+    failures = [
+        join(tag("b", cell), details(last_line(text), tag("pre", text)))
+        for cell, text in run.summary["failures"].items()
+    ]
+    return join(
+        tag("p", f"{finished} of {planned} cells finished."),
+        _coverage_table(run) if methods else None,
+        join(tag("h3", "Failed cells"), bullet_list(failures, class_=None)) if failures else None,
+    )
+
+
+def _coverage_table(run: RunData) -> Markup:
     rows = []
     for row in run.summary["methods"]:
         share = format_share(row["coverage"], 1)
@@ -104,17 +125,7 @@ def coverage_tables(run: RunData) -> Markup:
         "model. Bridged: there was no reading. Not finite: the estimate is no number and counts as not matched. The "
         "last column is the share of fallbacks where every station has reported for 0.5 s."
     ) + (" A method with a lag leaves the last frames of a take unanswered." if any(run.lags.values()) else "")
-    failures = [
-        join(tag("b", cell), details(last_line(text), tag("pre", text)))
-        for cell, text in run.summary["failures"].items()
-    ]
-    failed = join(tag("h3", "Failed cells"), bullet_list(failures, class_=None)) if failures else None
-    finished, planned = run.summary["cells_finished"], run.summary["cells_planned"]
-    return join(
-        tag("p", f"{finished} of {planned} cells finished."),
-        html_table(Table(head, rows), caption, label="coverage") if rows else None,
-        failed,
-    )
+    return html_table(Table(head, rows), caption, label="coverage")
 
 
 def health_tables(run: RunData) -> Markup:

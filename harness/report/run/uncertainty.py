@@ -10,6 +10,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.text_table import Table
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.rows import label_rows
 from harness.report.kit.scales import set_root_scale
 from harness.report.kit.style import COLOURS, INK, Chart
 from harness.report.kit.table import html_table
@@ -65,10 +66,8 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
         for axes, hinges in zip(panels, halves, strict=True):
             _draw_bands(axes, sigma_deg[:, hinges].mean(axis=0))
             draw_boxes(axes, error_deg[:, hinges], COLOURS[0])
-            axes.set_yticks(range(len(hinges)), [names[hinge] for hinge in hinges])
-            axes.set_ylim(len(hinges) - 0.3, -0.7)
+            label_rows(axes, [names[hinge] for hinge in hinges])
             axes.set_title("error of the hinge angle [deg]")
-            axes.grid(False, axis="y")
             set_root_scale(axes)
             for row, hinge in enumerate(hinges):
                 place = {"transform": axes.get_yaxis_transform(), "ha": "left", "va": "center", "fontsize": 8.0}

@@ -9,7 +9,8 @@ import numpy as np
 
 from harness.core.number_format import format_number
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
-from harness.report.kit.style import COLOURS, GRID, MARKERS, Chart, line_style
+from harness.report.kit.rows import label_rows
+from harness.report.kit.style import GRID, Chart, series_style
 from harness.report.kit.text import shorten, to_file_name
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -127,10 +128,10 @@ def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tu
     """Draw each curve; returns the last value, name and colour of each."""
     ends = []
     for curve in shown:
-        style = line_style(curve.colour_index)
+        style = series_style(curve.colour_index)
         measured = [n for n, point in enumerate(curve.points) if point.mean is not None]
         x, y = [key.numbers[n] for n in measured], [float(curve.points[n].mean or 0.0) for n in measured]
-        axes.plot(x, y, marker=_marker(curve), markersize=4.0, label=shorten(curve.name, _MOST_LETTERS), **style)
+        axes.plot(x, y, markersize=4.0, label=shorten(curve.name, _MOST_LETTERS), **style)
         ends.append((y[-1], curve.name, style["color"]))
         for n in measured:
             low, high = curve.points[n].low, curve.points[n].high
@@ -151,28 +152,20 @@ def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
     """Draw a row for each value with a dot for each series."""
     step = 0.8 / max(len(shown), 1)
     for row, curve in enumerate(shown):
-        colour, label = line_style(curve.colour_index)["color"], shorten(curve.name, _MOST_LETTERS)
+        style, label = series_style(curve.colour_index), shorten(curve.name, _MOST_LETTERS)
         for value, point in enumerate(curve.points):
             if point.mean is None:
                 continue
             y = value + step * (row - 0.5 * (len(shown) - 1))
             if point.low is not None and point.high is not None:
-                axes.plot([point.low, point.high], [y, y], color=colour, linewidth=1.4, alpha=0.7)
-            axes.plot([point.mean], [y], _marker(curve), markersize=4.5, color=colour, label=label)
+                axes.plot([point.low, point.high], [y, y], color=style["color"], linewidth=1.4, alpha=0.7)
+            axes.plot([point.mean], [y], markersize=4.5, label=label, **{**style, "linestyle": "none"})
             label = "_"
-    axes.set_yticks(range(len(key.labels)), _row_labels(key))
-    axes.set_ylim(len(key.labels) - 0.5, -0.5)
+    label_rows(axes, _row_labels(key))
     axes.set_xlabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
     axes.set_xlim(left=0.0)
-    axes.tick_params(axis="y", length=0)
-    axes.grid(False, axis="y")
     for edge in range(1, len(key.labels)):
         axes.axhline(edge - 0.5, color=GRID, linewidth=0.8)
-
-
-def _marker(curve: Curve) -> str:
-    """The marker of a curve, so that curves differ in shape as well as in colour."""
-    return MARKERS[(curve.colour_index + curve.colour_index // len(COLOURS)) % len(MARKERS)]
 
 
 def _curve_mean(curve: Curve) -> float:

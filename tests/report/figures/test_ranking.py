@@ -112,7 +112,7 @@ def test_methods_that_were_not_measured_and_clips_that_not_all_share_are_named(t
     cells = (*whole.cells[:-1], *silent.cells)
     out = write_run(tmp_path / "run", replace(whole, cells=cells, planned=len(cells)))
     caption = ranking_figure(read_conditions(out), FigureSelection()).caption
-    assert caption.startswith("Mean joint angle error on 7 clips that all methods were measured on with its 95 %")
+    assert caption.startswith("Mean joint angle error on 7 clips that all methods were measured on. Lines: 95 % ")
     assert caption.endswith(" Not measured: silent.")
 
 

@@ -7,7 +7,7 @@ import pytest
 from harness.errors import BadInput, UnknownName
 from harness.report.figures.conditions import read_conditions
 from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import choose_condition, choose_highlights, read_series
+from harness.report.figures.traces import choose_condition, rank_highlights, read_series
 from harness.results.reader import ResultSet
 from tests.compare.sides import cell, manifest, side, write_run
 
@@ -24,21 +24,21 @@ def test_the_last_values_and_known_performers_are_shown_unless_a_clip_is_named(c
 def test_the_leader_is_shown_against_ik_or_the_named_control(ranked: Path) -> None:
     run = read_conditions(ranked)
     (condition,) = run.conditions
-    shown = choose_highlights(condition, FigureSelection())
+    shown = rank_highlights(condition, FigureSelection())
     assert (shown.leader, shown.control) == ("expert_map", "ik")
     assert [shown.role(name) for name in ("expert_map", "ik", "twin_map")] == [" (lowest mean)", " (control)", ""]
-    assert choose_highlights(condition, FigureSelection(control="mean_pose")).control == "mean_pose"
+    assert rank_highlights(condition, FigureSelection(control="mean_pose")).control == "mean_pose"
     with pytest.raises(UnknownName, match="Did you mean 'mean_pose'"):
-        choose_highlights(condition, FigureSelection(control="mean_pos"))
+        rank_highlights(condition, FigureSelection(control="mean_pos"))
     with pytest.raises(UnknownName):
-        choose_highlights(condition, FigureSelection(control="expert_map"))
+        rank_highlights(condition, FigureSelection(control="expert_map"))
 
 
 def test_without_ik_the_control_is_the_second_and_one_method_has_none(ranked: Path) -> None:
     run = read_conditions(ranked)
-    without = choose_highlights(run.select(methods=["mean_pose", "twin_map"]).conditions[0], FigureSelection())
+    without = rank_highlights(run.select(methods=["mean_pose", "twin_map"]).conditions[0], FigureSelection())
     assert (without.leader, without.control) == ("twin_map", "mean_pose")
-    assert choose_highlights(run.select(methods=["ik"]).conditions[0], FigureSelection()).control is None
+    assert rank_highlights(run.select(methods=["ik"]).conditions[0], FigureSelection()).control is None
 
 
 def test_a_control_may_be_a_method_with_several_inputs(tmp_path: Path) -> None:
@@ -46,14 +46,14 @@ def test_a_control_may_be_a_method_with_several_inputs(tmp_path: Path) -> None:
     cells = tuple(each for result in results for each in result.cells)
     out = write_run(tmp_path / "run", ResultSet("A", manifest(), cells, len(cells)))
     (condition,) = read_conditions(out).conditions
-    assert choose_highlights(condition, FigureSelection()).control is not None
+    assert rank_highlights(condition, FigureSelection()).control is not None
 
 
 def test_methods_without_a_common_clip_have_no_leader(tmp_path: Path) -> None:
     cells = (cell("a", "ik"), cell("b", "expert_map"))
     out = write_run(tmp_path / "run", ResultSet("A", manifest(), cells, 2))
     with pytest.raises(BadInput, match="share no measured clip"):
-        choose_highlights(read_conditions(out).conditions[0], FigureSelection())
+        rank_highlights(read_conditions(out).conditions[0], FigureSelection())
 
 
 def test_traces_are_those_of_the_condition(framed: Path) -> None:

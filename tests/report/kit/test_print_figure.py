@@ -16,7 +16,7 @@ from PIL import Image
 from harness.errors import BadInput, UnknownName
 from harness.report.kit.chart import add_legend
 from harness.report.kit.print_figure import FORMATS, WIDTHS_MM, PrintFigure, draw_figure
-from harness.report.kit.style import MARKERS, muted_line_style, print_line_style
+from harness.report.kit.style import COLOURS, MARKERS, MUTED, muted_line_style, print_line_style
 from tests.report.figures.made_up import drawn
 
 
@@ -112,10 +112,13 @@ def test_what_does_not_fit_is_refused() -> None:
 
 def test_lines_in_print_differ_without_colour() -> None:
     styles = [print_line_style(n) for n in range(28)]
-    assert len({(style["color"], str(style["linestyle"])) for style in styles}) == 28
+    assert len({(str(style["linestyle"]), style["marker"]) for style in styles}) == 28
     for first, second in itertools.pairwise(styles):
         assert first["linestyle"] != second["linestyle"]
         assert first["marker"] != second["marker"]
+    colours = [style["color"] for style in styles]
+    assert len(set(colours)) == len(COLOURS) + 1
+    assert set(colours[len(COLOURS) :]) == {MUTED}, "a colour is used twice"
     muted = [muted_line_style(n) for n in range(4 * (1 + len(MARKERS)))]
     assert len({(str(style["linestyle"]), style["marker"]) for style in muted}) == len(muted)
     assert len({style["color"] for style in muted}) == 1

@@ -1,5 +1,6 @@
 """The page of a run: its content, its safety, and what remains when pictures cannot be rendered."""
 
+import base64
 import json
 import re
 import subprocess
@@ -9,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile
 from harness.report.kit import render_process
-from harness.report.kit.style import COLOURS
 from harness.report.run.data import WORST_METRICS, read_run
 from harness.report.run.headline import build_headline
 from harness.report.run.tables import results_tables
@@ -39,14 +40,21 @@ def text_of(page: Path) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", content))
 
 
+def verdict_of(page: str) -> tuple[str, str]:
+    """The heading, and the sentences below it."""
+    heading, rest = re.search(r"<h1>(.*?)</h1>", page), re.search(r'<p class="verdict-text">(.*?)</p>', page)
+    assert heading is not None
+    assert rest is not None
+    return heading[1], rest[1]
+
+
 def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     page = (run_folder / "report.html").read_text(encoding="utf-8")
-    heading = re.search(r"<h1>(.*?)</h1>", page)
-    assert heading is not None
+    heading, _ = verdict_of(page)
     assert page.index("<h1>") < page.index("<table")
-    assert heading[1].startswith("best_match+ik has the lowest mean joint-angle error, ")
-    assert "on 2 sequences of built-in motion" in heading[1]
-    assert "cannot be called better than any of the other 3 (too few clips: 2, of at least 6)." in heading[1]
+    assert heading.startswith("best_match+ik has the lowest mean joint-angle error, ")
+    assert "on 2 sequences of built-in motion" in heading
+    assert "cannot be called better than any of the other 3 (too few clips: 2, of at least 6)." in heading
     assert "<td><strong>" not in page
     assert "Bold: " not in page
 
@@ -70,11 +78,10 @@ def test_headline_bold_cells_terminal_and_comparison_agree(ten_clips: Path) -> N
     rows = json.loads((ten_clips / "summary.json").read_text())
     errors = {row["method"]: row["metrics"]["joint_angle_mean_deg"]["mean"] for row in rows["methods"]}
     poor = min(("poor", "other"), key=lambda name: errors[name])
-    heading = re.search(r"<h1>(.*?)</h1>", page)
-    assert heading is not None
+    heading, rest = verdict_of(page)
     less = f"That is {errors[poor] - errors['good']:.2f}° ({100 * (1 - errors['good'] / errors[poor]):.0f} %) less than"
-    assert heading[1].startswith(f"good is best: {errors['good']:.2f}° mean joint-angle error on 10 sequences of ")
-    assert f"{less} {poor}, the next, and lower on 10 of 10 sequences." in heading[1]
+    assert heading.startswith(f"good is best: {errors['good']:.2f}° mean joint-angle error on 10 sequences of ")
+    assert rest.startswith(f"{less} {poor}, the next, and lower on 10 of 10 sequences.")
     assert "good is best: " in run_table(read_summary(ten_clips))
     for other in ("poor", "other"):
         line = compare_runs(ten_clips, methods=(other, "good")).differences[0]
@@ -148,7 +155,14 @@ def test_pictures_that_were_not_asked_for_are_named_as_missing(run_folder: Path)
 
 def test_plots_lie_beside_the_page(run_folder: Path) -> None:
     names = {path.name for path in (run_folder / "plots").iterdir()}
-    assert names == {"error_walking.svg", "error_boxing.svg", "per_joint.svg", "error_cdf.svg"}
+    assert names == {
+        "error_walking.svg",
+        "error_boxing.svg",
+        "joints_body.svg",
+        "per_joint.svg",
+        "ranking_1.svg",
+        "error_cdf.svg",
+    }
 
 
 def test_nothing_in_the_page_points_elsewhere(run_folder: Path) -> None:
@@ -233,18 +247,24 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
 
 def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.report.run.data.STYLES", 3)
-    monkeypatch.setattr("harness.report.run.charts.COLOURS", COLOURS[:3])
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"poor": 20.0, **METHODS}, duration_s=3.0))
     page = write_run_page(out, rendered=False).read_text()
     for name in ("error_walking", "error_cdf"):
         drawn = (out / "plots" / f"{name}.svg").read_text()
-        assert [method for method in ("poor", *METHODS) if f">{method}<" in drawn] == [
-            "ik",
-            "best_match",
-            "best_match+ik",
+        shown = re.findall(r">([a-z_+]+)( \([a-z ]+\))?<", drawn)
+        assert [(method, role) for method, role in shown if method in ("poor", *METHODS)] == [
+            ("best_match+ik", " (lowest mean)"),
+            ("ik", " (control)"),
+            ("best_match", ""),
         ]
     assert page.count("Only the 3 of 5 methods with the lowest errors are shown.") == 2
-    assert "medians of the 2 methods with the next lowest errors" in page
+
+
+def test_the_ranking_shows_what_has_room(tmp_path: Path) -> None:
+    methods = {f"m{n}": 1.0 + n for n in range(16)}
+    plan = Plan(behaviours=("walking",), methods=methods, duration_s=2.0)
+    page = write_run_page(fabricate(tmp_path / "run", plan), rendered=False).read_text()
+    assert "The 14 of 16 methods with the lowest means." in page
 
 
 def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
@@ -299,7 +319,11 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
     page = write_run_page(out)
     strips = list((out / "plots").glob("worst_*.png"))
     assert 1 <= len(strips) <= len(WORST_METRICS)
-    assert page.read_text(encoding="utf-8").count("data:image/png;base64,") == len(strips)
+    text = page.read_text(encoding="utf-8")
+    assert all(base64.b64encode(strip.read_bytes()).decode() in text for strip in strips)
+    assert "ik at its worst instant: walking_p1_01, " in text
+    with Image.open(out / "plots" / "worst_instant.png") as still:
+        assert still.size == (640, 600)
     for strip in strips:
         red, _, blue = np.moveaxis(imread(strip)[..., :3], -1, 0)
         assert np.mean(red - blue > 0.3) > 0.003, "no orange estimate"

@@ -60,7 +60,7 @@ def test_a_run_of_causal_methods_has_none_of_this(tmp_path: Path) -> None:
     assert LAG_NOTE not in page
     assert "Stated uncertainty" not in page
     assert "leaves the last frames" not in page
-    assert "FillBetween" not in (out / "plots" / "error_walking.svg").read_text()
+    assert "data:band" not in (out / "plots" / "error_walking.svg").read_text()
     assert not list((out / "plots").glob("sigma*"))
     assert sigma_table(read_run(out)) == ""
 
@@ -100,7 +100,7 @@ def test_charts_draw_the_deviations(run_folder: Path) -> None:
     page = (run_folder / "report.html").read_text(encoding="utf-8")
     assert "Shaded: up to the mean standard deviation" in page
     over_time = (run_folder / "plots" / "error_walking.svg").read_text()
-    assert over_time.count('id="FillBetweenPolyCollection') == 2
+    assert over_time.count('id="data:band=') == 1, "only the leader and the control have a band"
     assert (run_folder / "plots" / "sigma.svg").is_file()
     run = read_run(run_folder)
     svg = error_against_sigma(run, "gauss").svg

@@ -1,0 +1,82 @@
+"""Every kind of page in a browser, at 1400 and 700 pixels and in print, light and dark: nothing is cut."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.report.comparison.writer import write_comparison_page
+from harness.report.paper.writer import write_paper_page
+from harness.report.placement import writer as placement_writer
+from harness.report.run.writer import write_run_page
+from harness.report.sweep.page import write_sweep_page
+from tests.report.fabricate import Plan, fabricate
+from tests.report.fabricate_comparison import comparison
+from tests.report.fabricate_paper import liu, write_study
+from tests.report.fabricate_placement import write_made_up
+from tests.report.fabricate_sweep import fabricate_sweep
+from tests.report.sweep.test_page import VARIED
+
+pytestmark = pytest.mark.long
+KINDS = ("run", "comparison", "sweep", "placement", "paper")
+PRINTED_PX = 703
+"""Width of an A4 page within margins of 12 mm, at 96 pixels an inch."""
+UNFOLD = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+BEYOND = """(width) => [...document.querySelectorAll("body *")]
+  .filter((each) => each.checkVisibility() && !(each.ownerSVGElement))
+  .filter((each) => each.getBoundingClientRect().right > width + 1)
+  .map((each) => `${each.tagName} ${each.className}: ${each.textContent.slice(0, 40)}`)"""
+SCROLLING = """() => [...document.querySelectorAll(".wide")].filter((box) => box.checkVisibility())
+  .map((box) => [box.scrollWidth > box.clientWidth + 2, box.nextElementSibling.checkVisibility()])"""
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Kind -> the file of its page."""
+    folder = tmp_path_factory.mktemp("pages")
+    methods = {f"a_method_with_a_long_name_{n}": 1.0 + n for n in range(12)} | {"ik": 3.0}
+    plan = Plan(behaviours=("walking", "boxing"), methods=methods, duration_s=3.0, failing=("ik",))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(placement_writer, "draw_body_map", lambda *args, **options: (None, "not in this test"))
+        placement = placement_writer.write_placement_page(write_made_up(folder / "placement"))
+    return {
+        "run": write_run_page(fabricate(folder / "run", plan), rendered=False),
+        "comparison": write_comparison_page(comparison(7, ("local_pca",)), folder / "comparison.html"),
+        "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),
+        "placement": placement,
+        "paper": write_paper_page(write_study(folder / "paper", liu())),
+    }
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1400, 700])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_fits_the_window_and_says_what_scrolls(
+    browser: Any, pages: dict[str, Path], kind: str, width: int, scheme: str
+) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page.goto(pages[kind].as_uri())
+    page.evaluate(UNFOLD)
+    page.wait_for_timeout(100)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    boxes = page.evaluate(SCROLLING)
+    assert boxes
+    assert all(scrolls == hinted for scrolls, hinted in boxes)
+    if width == 700 and kind in ("run", "comparison"):
+        assert any(scrolls for scrolls, _ in boxes)
+    light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert light == (scheme == "light")
+    page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_cut_in_print(browser: Any, pages: dict[str, Path], kind: str, scheme: str) -> None:
+    page = browser.new_page(viewport={"width": PRINTED_PX, "height": 1030})
+    page.goto(pages[kind].as_uri())
+    page.emulate_media(media="print", color_scheme=scheme)
+    page.evaluate(UNFOLD)
+    assert page.evaluate(BEYOND, PRINTED_PX) == []
+    assert not any(scrolls for scrolls, _ in page.evaluate(SCROLLING))
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    page.close()
