@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from harness.body.places import NAMED_PLACES
 from harness.core.number_format import count_noun
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
@@ -32,6 +33,7 @@ def build_catalogue() -> dict[str, dict[str, str]]:
             "default": "all of it: also excursions, echoes, short losses and the error of fast motion",
         },
         "figures": {name: kind.text for name, kind in KINDS.items()},
+        "places": {place.name: f"{place.text}; bone {place.bone}" for place in NAMED_PLACES.values()},
         "metrics": {name: f"[{d.unit}] {d.text}" for name, d in {**DEFINITIONS, **SIGMA_DEFINITIONS}.items()},
     }
 

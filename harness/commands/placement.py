@@ -1,21 +1,65 @@
 """The verb `placement`: find out how many stations to wear, and where."""
 
 import argparse
+import re
 import sys
 from contextlib import redirect_stdout
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
+from harness.commands.common import (
+    Verbs,
+    add_verb,
+    positive_float,
+    positive_int,
+    print_result,
+    print_status,
+    progress_note,
+    this_command,
+    this_words,
+)
 from harness.core.progress import ProgressBar
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.results.placement_findings import PlacementFindings, StatisticalPower
+    from harness.study.placement.question import PlacementQuestion
+
+_QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "minutes", "clips", "seed")
+_EXAMPLE = "harness placement --stations 3 --behaviour table_tennis"
 
 
 def add_placement(verbs: Verbs) -> None:
-    text = "rank sets of stations: how many to wear, and where; the same command resumes"
+    text = "find out where to wear how many stations, for a behaviour or by a study; the same command resumes"
     verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
-    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as walking")
+    text = "a TOML file, or the name of a shipped study, such as walking; or none, with a question:"
+    verb.add_argument("study", nargs="?", help=text)
     text = "clips computed at the same time (default 2)"
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
+    question = verb.add_argument_group("question", f"instead of a study, such as `{_EXAMPLE}`")
+    text = "number of stations, such as 3 or 2-4 (default 3)"
+    question.add_argument("--stations", type=parse_sizes, metavar="N", help=text)
+    text = "behaviours, separated by commas (default walking); of the built-in motion, or of the library with --mocap"
+    question.add_argument("--behaviour", metavar="A,B", help=text)
+    text = "places to choose from, separated by commas (default: one for each part; `harness list places`)"
+    question.add_argument("--places", metavar="A,B", help=text)
+    question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
+    text = "noise preset of the tracker (default: default)"
+    question.add_argument("--noise", choices=["clean", "noise", "default"], help=text)
+    text = "budget of time, which limits sets and clips (default 10)"
+    question.add_argument("--minutes", type=positive_float, metavar="N", help=text)
+    text = "number of clips to choose on, whatever the time (default 16, or what the budget allows)"
+    question.add_argument("--clips", type=positive_int, metavar="N", help=text)
+    question.add_argument("--seed", type=int, help="seed of motion and noise (default 1)")
+
+
+def parse_sizes(text: str) -> tuple[int, int]:
+    """Fewest and most stations from 3 or 2-4, for argparse."""
+    match = re.fullmatch(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of stations, such as 3, and no range, such as 2-4")
+    return int(match[1]), int(match[2] or match[1])
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
@@ -24,20 +68,80 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.placement.text import text
+    from harness.report.placement.wording import sentence
     from harness.report.placement.writer import write_placement_page
-    from harness.study.placement.placement_study import FINDINGS, run_placement
+    from harness.study.placement import placement_study
 
-    out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
+    question = _read_question(args)
+    name = question.name if question else Path(args.study).stem.removeprefix("placement_")
+    out = args.out or Path("results") / f"placement_{name}"
+    study: Any = (
+        partial(placement_study.answer_question, question)
+        if question
+        else partial(placement_study.run_placement, args.study)
+    )
     with (
         progress_note(out),
         ProgressBar("cells") as bar,
         redirect_stdout(sys.stderr),  # a method may print; stdout is for data
         process_executor(args.jobs) as each,
     ):
-        findings, outcome = run_placement(
-            args.study, out, folder=args.mocap, executor=each, command=this_command(), progress=bar
+        findings: PlacementFindings
+        findings, outcome = study(
+            out,
+            folder=args.mocap,
+            executor=each,
+            jobs=args.jobs,
+            command=this_command(),
+            progress=bar,
+            announce=_announce,
         )
     page = write_placement_page(out)
-    content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
-    lines = (text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}")
-    return print_result(args, content, *lines, outcome=outcome)
+    answer = sentence(findings)
+    content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
+    lines = (text(findings), "", f"findings: {out / placement_study.FINDINGS}", f"report: {page}", answer)
+    following = ["plot", out] if outcome is Outcome.PASS else this_words()
+    return print_result(args, content, *lines, outcome=outcome, following=following)
+
+
+def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
+    """The question on the command line; None for a study. BadInput for both and for neither."""
+    from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_MINUTES, PlacementQuestion
+
+    given = [name for name in _QUESTION_FLAGS if getattr(args, name) is not None]
+    if args.study is not None:
+        if given:
+            raise BadInput(
+                f"The study {args.study} with --{given[0]}.", "A study has its own: name a study or ask a question."
+            )
+        return None
+    if not given:
+        raise BadInput("Neither a study nor a question.", f"Type: {_EXAMPLE}; or: harness placement walking")
+    fewest, most = args.stations or (3, 3)
+    return PlacementQuestion(
+        fewest,
+        most,
+        _split_names(args.behaviour, "--behaviour") if args.behaviour is not None else ("walking",),
+        places=_split_names(args.places, "--places") if args.places is not None else (),
+        method=args.method or DEFAULT_METHOD,
+        noise=args.noise or "default",
+        minutes=args.minutes or DEFAULT_MINUTES,
+        clips=args.clips or 0,
+        seed=1 if args.seed is None else args.seed,
+    )
+
+
+def _split_names(text: str, flag: str) -> tuple[str, ...]:
+    """Names separated by commas; BadInput for an empty one."""
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise BadInput(f"{flag} {text!r} has an empty name.", "Separate names by commas.")
+    return names
+
+
+def _announce(power: "StatisticalPower", notes: tuple[str, ...]) -> None:
+    """Tell on stderr, before the cells run, what they can show and how long they take."""
+    from harness.report.placement.wording import power_sentences
+
+    for line in (*notes, *power_sentences(power)):
+        print_status(line)

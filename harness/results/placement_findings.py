@@ -185,6 +185,20 @@ class PlacementCondition:
 
 
 @dataclass(frozen=True)
+class ChangedOrder:
+    """Two sets whose order differs between two conditions."""
+
+    first: StationNames
+    """The set that is better under the first condition."""
+    second: StationNames
+    differences: tuple[float, float]
+    """Mean error of `second` minus that of `first`, under either condition, positive where `first` is better."""
+    significant: bool | None = None
+    """Whether the change of the difference is significant: sign flips over clips, corrected for all pairs of sets. None
+    if it was not tested: the conditions have different or few clips, or there are many sets."""
+
+
+@dataclass(frozen=True)
 class RankAgreement:
     """Agreement of two conditions on the ranking of the sets that both measured."""
 
@@ -196,6 +210,44 @@ class RankAgreement:
     low: float | None = None
     """Ends of the 95 % interval by resampling clips; None if it was not computed."""
     high: float | None = None
+    changed: tuple[ChangedOrder, ...] = ()
+    """The first pairs of sets whose order differs: the significant changes first, then the largest."""
+    changes: int = 0
+    """Number of pairs whose order differs."""
+    significant_changes: int = 0
+    """Number of them that are significant."""
+
+
+@dataclass(frozen=True)
+class StatisticalPower:
+    """What the clips of a study can show, estimated from its first sets before the others ran."""
+
+    clips: int
+    """Number of clips on which sets are compared."""
+    sets: int
+    """Number of sets that are compared with each other."""
+    unit: str
+    """Unit of `spread`, `shown` and `wanted`."""
+    least_clips: int
+    """Least number of clips with which any difference between so many sets can be significant."""
+    duration_s: float | None = None
+    """Estimated duration of the whole study [s]; None if no cell was measured."""
+    least_duration_s: float | None = None
+    """The same with `least_clips` clips."""
+    cell_s: float | None = None
+    """Duration of a cell on one worker [s], the median of the first sets."""
+    spread: float | None = None
+    """Standard deviation of paired differences between sets over clips, in the metric's unit; None if unknown."""
+    shown: float | None = None
+    """Smallest difference that is found with probability 0.8; None if none can be significant or it is unknown."""
+    wanted: float | None = None
+    """A tenth of the mean error of the first sets."""
+    needed_clips: int | None = None
+    """Number of clips that would show a difference of `wanted`."""
+    needed_duration_s: float | None = None
+    """The same as a duration [s]."""
+    pilot_sets: int = 0
+    """Number of sets that were measured first."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +290,10 @@ class PlacementFindings:
     """Failed cell -> reason."""
     planned: int = 0
     """Number of planned cells."""
+    sizes: tuple[int, ...] = ()
+    """The numbers of stations that were asked about; () for the smallest number that suffices."""
+    power: StatisticalPower | None = None
+    """What the clips can show; None in findings of versions that did not estimate it."""
     better: Literal["lower", "higher"] = "lower"
     """Which values of the metric are better; all differences are signed accordingly."""
     kind: Literal["placement"] = "placement"

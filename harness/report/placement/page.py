@@ -17,6 +17,7 @@ from harness.report.kit.text import describe_motion_source, last_line
 from harness.report.paper.claims import claims_list
 from harness.report.placement.wording import (
     TIE_NOTE,
+    changes_sentence,
     format_difference,
     format_rank_range,
     format_stays,
@@ -25,6 +26,8 @@ from harness.report.placement.wording import (
     list_sets,
     original_candidates,
     plain_name,
+    power_sentences,
+    ranks_by_condition,
     search_gain_sentence,
     sentence,
     set_name,
@@ -40,7 +43,7 @@ from harness.results.placement_findings import (
     StationSetResult,
 )
 
-_MOST_FAILED = 50
+_MOST_FAILED, _MOST_RANKED = 50, 40
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ def placement_page(content: PlacementContent) -> str:
         "Motion": f"{', '.join(findings.behaviours)}; {describe_motion_source(findings.motion)}",
         "Noise": findings.noise,
         "Link": findings.link or "the same rate for any number of stations",
+        **({"Clips": " ".join(power_sentences(findings.power))} if findings.power else {}),
         "Tried": f"{counts}; {findings.planned:,} cells, {len(findings.failures)} failed",
         "Made by": f"{findings.command} (seed {findings.seed})",
     }
@@ -231,13 +235,35 @@ def _conditions(findings: PlacementFindings) -> Markup:
     head = ["condition", *(_text_cell(count_noun(n, "station")) for n in sizes)]
     best = html_table(Table(head, rows), "The best set of each size.", label="elsewhere")
     pairs = [
-        [f"{pair.a} and {pair.b}", format_value(pair.tau), format_value_interval(pair.low, pair.high), f"{pair.sets:,}"]
+        [
+            _text_cell(f"{pair.a} and {pair.b}"),
+            *(format_value(pair.tau), format_value_interval(pair.low, pair.high), f"{pair.sets:,}"),
+            _text_cell(changes_sentence(findings, pair)),
+        ]
         for pair in findings.agreements
     ]
-    agreement = Table(["pair", "Kendall's tau", "95 % interval", "sets"], pairs)
-    return join(
-        best, details("All pairs of conditions", html_table(agreement, "", label="agreement")) if pairs else None
+    head = [_text_cell("pair"), "Kendall's tau", "95 % interval", "sets", _text_cell("changes of order")]
+    caption = (
+        "A change of order is significant if the change of the difference between the two sets is: sign flips over "
+        "clips, corrected for all pairs of sets (Holm 1979)."
     )
+    agreement = html_table(Table(head, pairs), caption, label="agreement")
+    ranks = _ranks(findings)
+    return join(best, ranks, details("All pairs of conditions", agreement) if pairs else None)
+
+
+def _ranks(findings: PlacementFindings) -> Markup | None:
+    """The rank of each compared set under each condition."""
+    rows = [
+        [_text_cell(set_name(names)), *(NOT_MEASURED_CELL if rank is None else rank for rank in ranks)]
+        for names, ranks in ranks_by_condition(findings, _MOST_RANKED)
+    ]
+    if not rows:
+        return None
+    head = [_text_cell("stations"), *(condition.name for condition in findings.conditions)]
+    more = len(findings.compared) - len(rows)
+    caption = "Rank of each set by its mean error under each condition." + (f" {more:,} more sets." if more else "")
+    return html_table(Table(head, rows), caption, label="ranks")
 
 
 def _stability_note(condition: PlacementCondition) -> str:

@@ -8,6 +8,7 @@ from harness.report.kit.text import last_line
 from harness.report.paper.text import WIDTH, claims_lines
 from harness.report.placement.wording import (
     TIE_NOTE,
+    changes_sentence,
     format_difference,
     format_error,
     format_held_out,
@@ -18,6 +19,8 @@ from harness.report.placement.wording import (
     list_sets,
     original_candidates,
     plain_name,
+    power_sentences,
+    ranks_by_condition,
     search_gain_sentence,
     sentence,
     set_name,
@@ -47,6 +50,7 @@ def _setup(findings: PlacementFindings) -> list[str]:
         f"{len(original_candidates(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
         f"{len(findings.failures)} failed; mean over clips with 95 % interval",
         textwrap.fill(TIE_NOTE, WIDTH),
+        *([textwrap.fill(" ".join(power_sentences(findings.power)), WIDTH)] if findings.power else []),
     ]
 
 
@@ -131,12 +135,25 @@ def _stability(findings: PlacementFindings) -> list[str]:
         for c in findings.conditions
     ]
     lines = ["stability of the ranking", *Table(head, rows, text_columns=1 + len(sizes)).lines()]
+    lines += ["", *_ranks(findings), ""] if findings.compared else []
     for pair in findings.agreements:
         tau = NOT_MEASURED if pair.tau is None else format_value(pair.tau)
         interval = format_value_interval(pair.low, pair.high)
         within = f" ({interval})" if interval else ""
-        lines.append(f"{pair.a} and {pair.b}: the rankings of {pair.sets} sets have Kendall's tau {tau}{within}")
+        line = f"{pair.a} and {pair.b}: the rankings of {pair.sets} sets have Kendall's tau {tau}{within}"
+        lines.append(textwrap.fill(f"{line}; {changes_sentence(findings, pair)}", WIDTH, subsequent_indent="  "))
     return lines
+
+
+def _ranks(findings: PlacementFindings) -> list[str]:
+    """The rank of each compared set under each condition."""
+    head = ["rank of the set under each condition", *(condition.name for condition in findings.conditions)]
+    rows = [
+        [set_name(names), *(NOT_MEASURED if rank is None else str(rank) for rank in ranks)]
+        for names, ranks in ranks_by_condition(findings, _MOST_ROWS)
+    ]
+    more = len(findings.compared) - len(rows)
+    return [*Table(head, rows).lines(), *([f"and {more} more"] if more > 0 else [])]
 
 
 def _notes_and_failures(findings: PlacementFindings) -> list[str]:

@@ -17,11 +17,16 @@ from harness.results.placement_findings import (
     MarginalContribution,
     PlacementFindings,
     PlacementSearch,
+    RankAgreement,
     StationNames,
     StationPlacement,
     StationSetResult,
+    StatisticalPower,
 )
 
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+_SET_NOUNS = {1: "place", 2: "pair", 3: "triple"}
+"""What sets of so many stations are called."""
 _SIDES = ("left_", "right_")
 _IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
 TIE_NOTE = (
@@ -68,7 +73,12 @@ def _plural(name: str) -> str:
 
 
 def sentence(findings: PlacementFindings) -> str:
-    """The recommended set: the smallest one that is not significantly worse than the best set of any size."""
+    """The answer: the best set of each size that was asked about.
+
+    Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
+    """
+    if findings.sizes:
+        return " ".join(_size_sentence(findings, size) for size in findings.sizes)
     best = smallest_sufficient_set(findings)
     if best is None:
         return "No set of stations was measured."
@@ -80,6 +90,78 @@ def sentence(findings: PlacementFindings) -> str:
         sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
         sentences.append(f"{sets} tied with it.")
     return " ".join(sentences)
+
+
+def _size_sentence(findings: PlacementFindings, size: int) -> str:
+    """The best set of a size: "Best three stations for walking: head + pelvis + left hand, 2.00 deg ..."."""
+    best = next((best for best in findings.best if len(best.stations) == size), None)
+    if best is None:
+        return f"No set of {count_noun(size, 'station')} was measured."
+    behaviours = " and ".join(map(plain_name, findings.behaviours))
+    stations = f"{_number_word(size)} stations" if size > 1 else "station"
+    return (
+        f"Best {stations} for {behaviours}: {set_name(best.stations)}, {_size_error(findings, best)}; "
+        f"{_size_ties(findings, best)}."
+    )
+
+
+def _size_error(findings: PlacementFindings, best: BestSet) -> str:
+    """The error on held-out clips; where there are none, the one that favours the set."""
+    if held_out := format_held_out(findings, best):
+        return f"{held_out} on {count_noun(best.held_out_clips, 'held-out clip')}"
+    return f"{format_error(findings, findings.of(best.stations))} on the clips on which it was chosen"
+
+
+def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
+    """Which sets of the same size are tied with the best, or that the clips are too few to tell."""
+    noun = _SET_NOUNS.get(len(best.stations), "set")
+    clips = len(measured_errors(tried)) if (tried := findings.of(best.stations)) else 0
+    if findings.power is not None and clips < findings.power.least_clips and len(best.ties) == best.of - 1 > 0:
+        return f"{count_noun(clips, 'clip')} cannot tell it from the other {best.of - 1:,} {noun}s"
+    if not best.ties:
+        return f"no other {noun} is tied with it" if best.of > 1 else f"no other {noun} was tried"
+    return f"tied with {count_noun(len(best.ties), f'other {noun}')}: {list_sets(best.ties)}"
+
+
+def _number_word(number: int) -> str:
+    return _NUMBERS[number] if number < len(_NUMBERS) else str(number)
+
+
+def power_sentences(power: StatisticalPower) -> list[str]:
+    """What the clips of a study can show, and how long more of them take."""
+    clips, sets = count_noun(power.clips, "clip"), count_noun(power.sets, "set")
+    took = f" The study takes {format_duration(power.duration_s)}." if power.duration_s is not None else ""
+    if power.sets < 2:
+        return [f"One set is measured on {clips}: nothing is compared.{took}"]
+    if power.clips < power.least_clips:
+        more = f" ({format_duration(power.least_duration_s)})" if power.least_duration_s is not None else ""
+        first = f"{clips} cannot show any difference between {sets}, {power.least_clips} might{more}.{took}"
+    elif power.shown is None:
+        first = f"{clips} can show a difference between {sets}; how large it must be is unknown.{took}"
+    else:
+        first = (
+            f"{clips} can show a difference of {format_value(power.shown)} {power.unit} between two of {sets} "
+            f"(power 80 %, p corrected for {power.sets - 1:,} comparisons).{took}"
+        )
+    if power.needed_clips is None or power.wanted is None or power.needed_clips <= power.clips:
+        return [first]
+    more = f", about {format_duration(power.needed_duration_s)}" if power.needed_duration_s is not None else ""
+    second = (
+        f"A difference of {format_value(power.wanted)} {power.unit}, a tenth of the error, would need about "
+        f"{power.needed_clips:,} clips{more}. Spread and time are those of the first {power.pilot_sets} sets."
+    )
+    return [first, second]
+
+
+def format_duration(seconds: float | None) -> str:
+    """A rough duration: "40 s", "7 min", "3.5 h", "12 days"."""
+    if seconds is None:
+        return NOT_MEASURED
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    if seconds < 5400.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.1f} h" if seconds < 172800.0 else f"{seconds / 86400.0:,.0f} days"
 
 
 def _recommendation(findings: PlacementFindings, best: BestSet) -> str:
@@ -175,6 +257,35 @@ def format_value(value: float | None) -> str:
 def format_value_interval(low: float | None, high: float | None) -> str:
     """ "1.78 to 2.02"; empty where the interval was not computed."""
     return "" if low is None or high is None else f"{format_value(low)} to {format_value(high)}"
+
+
+def ranks_by_condition(findings: PlacementFindings, most: int) -> list[tuple[StationNames, list[int | None]]]:
+    """The first sets by the study's own condition, and the rank of each under every condition.
+
+    Only sets that were measured under a condition have a rank there. Sets with equal means share the better rank.
+    """
+    sign = 1.0 if findings.better == "lower" else -1.0
+    columns = []
+    for condition in findings.conditions:
+        costs = [None if mean is None else sign * mean for mean in condition.means]
+        measured = [cost for cost in costs if cost is not None]
+        columns.append([None if cost is None else 1 + sum(other < cost for other in measured) for cost in costs])
+    rows = [(names, [column[at] for column in columns]) for at, names in enumerate(findings.compared)]
+    return sorted(rows, key=lambda row: (row[1][0] is None, row[1][0]))[:most] if columns else []
+
+
+def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
+    """How many pairs of sets change their order between two conditions, and the first of them."""
+    pairs = pair.sets * (pair.sets - 1) // 2
+    if not pair.changes:
+        return f"no pair of {pairs:,} changes its order"
+    first = pair.changed[0]
+    before, after = (format_signed(difference) for difference in first.differences)
+    tested = first.significant is not None
+    shown = f", {pair.significant_changes:,} significantly" if tested else ""
+    noun = "pair changes its" if pair.changes == 1 else "pairs change their"
+    example = f"{set_name(first.first)} against {set_name(first.second)}, {before} to {after} {findings.unit}".rstrip()
+    return f"{pair.changes:,} of {pairs:,} {noun} order{shown}: first {example}"
 
 
 def format_stays(share: float | None) -> str:

@@ -71,6 +71,8 @@ class CellCache:
     """Cell -> why it has no result."""
     planned: int = 0
     """Number of cells that were requested."""
+    seconds: list[float] = field(default_factory=list)
+    """Duration of each cell on its worker [s], also of those of an earlier run."""
     _rows: dict[tuple[str, str, str, str], Mapping[str, Any]] = field(default_factory=dict)
     """(scenario, variant, method, clip) -> row."""
     _variants: dict[str, set[str]] = field(default_factory=dict)
@@ -139,6 +141,8 @@ class CellCache:
             for cell, name in zip(planned, cell_names(scenario), strict=True):
                 if name not in cells.failures:
                     self._rows[cell] = next(rows)
+                    if duration_s := self._rows[cell].get("seconds"):
+                        self.seconds.append(duration_s)
         self.planned += cells.planned
         self.failures |= cells.failures
 

@@ -1,6 +1,6 @@
 """Configuration of a placement study (TOML): candidates, search modes, further conditions, papers' claims."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -141,6 +141,9 @@ class PlacementStudy:
     exhaustive: ExhaustiveOptions | None = None
     refine: RefineOptions | None = None
     condition: tuple[ConditionOptions, ...] = ()
+    sizes: Annotated[tuple[int, ...], Range(1, 12)] = ()
+    """The numbers of stations that are asked about, which the first sentence answers; by default it recommends the
+    smallest number that suffices."""
     condition_size: Annotated[int, Range(1, 12)] = 3
     """Size of the sets that every condition ranks."""
     claim: tuple[PublishedClaim, ...] = ()
@@ -217,6 +220,8 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     for mode, table in (("greedy", study.greedy), ("exhaustive", study.exhaustive)):
         if table and not 1 <= table.most <= MAX_STATIONS:
             return f"{mode}.most = {table.most}", f"1 to {MAX_STATIONS} stations", "An IS-900 has no more."
+    if len(set(study.sizes)) < len(study.sizes):
+        return "sizes has a number twice", "each number once", "Remove the duplicate."
     names = [condition.name for condition in study.condition]
     if len(set(names)) < len(names) or not all(names):
         return f"conditions named {', '.join(names)}", "distinct names", "Rename one of them."
@@ -249,11 +254,16 @@ def check_station_count(stations: int, where: str) -> None:
         )
 
 
-def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptions | None = None) -> Scenario:
-    """The scenario of the study or of a condition: with its changes, all candidates as stations, and nothing varied."""
+def base_scenario(
+    study: PlacementStudy, load: Callable[[str], Scenario], condition: ConditionOptions | None = None
+) -> Scenario:
+    """The scenario of the study or of a condition: with its changes, all candidates as stations, and nothing varied.
+
+    `load` gives the scenario that the study or the condition names.
+    """
     other_scenario = condition is not None and bool(condition.scenario)
     named = condition.scenario if condition is not None and other_scenario else study.scenario
-    scenario = load_scenario(_scenario_file(named, beside))
+    scenario = load(named)
     methods = (condition.methods if condition is not None else ()) or study.methods
     stations = {}
     for unit in study.groups():
@@ -282,10 +292,10 @@ def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -
         raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error
 
 
-def _scenario_file(name: str, beside: Path) -> Path | str:
-    """The scenario's file in the folder of the study, or the shipped one."""
+def load_scenario_beside(name: str, beside: Path) -> Scenario:
+    """The scenario in the folder `beside` of the study, or the shipped one of that name."""
     for folder in (beside, data_folder("scenarios")):
         file = folder / (name if name.endswith(".toml") else f"{name}.toml")
         if names_input_file(file):
-            return file
-    return name
+            return load_scenario(file)
+    return load_scenario(name)

@@ -5,7 +5,8 @@ study has no held-out clips, the cross-validated error of the best set is report
 `ranking.cross_validated_cost`). Papers' claims are tested on the held-out clips where there are enough of them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import statistics
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from harness.results.placement_findings import (
     PlacementFindings,
     PlacementSearch,
     StationNames,
+    StatisticalPower,
     write_placement,
 )
 from harness.score.metrics import DEFINITIONS
@@ -33,13 +35,17 @@ from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.cell_cache import CellCache
 from harness.study.placement.config import PublishedClaim
-from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement
+from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
+from harness.study.placement.power import choose_pilot, estimate_power
+from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
 from harness.study.placement.ranking import Costs, best_by_size, complete_sets, min_clips, summarise_set
 from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
 from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition
 
 FINDINGS = "findings.json"
+Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
+"""Receives what a study can show, and notes on its plan, before its cells run."""
 
 
 def run_placement(
@@ -48,10 +54,15 @@ def run_placement(
     *,
     folder: LibraryFolders | None = None,
     executor: TaskExecutor = run_in_process,
+    jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,
+    announce: Announce = lambda power, notes: None,
 ) -> tuple[PlacementFindings, Outcome]:
     """Run the study in a TOML file, and write findings.json into `out`.
+
+    The first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
+    `jobs` workers, before the other cells run.
 
     `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
     and claims are not part of the identity of a study: they may change while its cells are kept. The outcome is
@@ -60,11 +71,64 @@ def run_placement(
     """
     clear_caches()  # files may have changed since the last run
     plan = plan_placement(path, folder)
-    open_study(out, {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed})
-    with folder_lock(out):
-        (out / "cells").mkdir(exist_ok=True)
-        findings = _PlacementRun(plan, CellCache(out, folder, executor, command, progress)).findings(command)
-        write_placement(out / FINDINGS, findings)
+    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce)
+
+
+def answer_question(
+    question: PlacementQuestion,
+    out: Path,
+    *,
+    folder: LibraryFolders | None = None,
+    executor: TaskExecutor = run_in_process,
+    jobs: int = 1,
+    command: str = "",
+    progress: ProgressCallback = lambda last, done, planned: None,
+    announce: Announce = lambda power, notes: None,
+) -> tuple[PlacementFindings, Outcome]:
+    """Run the study that answers a question within its budget of time; otherwise as `run_placement`.
+
+    Without `folder` the motion is built in; else it is that of the library.
+    """
+    clear_caches()
+    study, scenario = question_study(question, folder)
+
+    def shorten(cell_s: float) -> tuple[PlacementPlan, str]:
+        within, shortened, note = plan_within_budget(study, scenario, question, cell_s, jobs)
+        return plan_study(within, lambda name: shortened, folder), note
+
+    plan = plan_study(study, lambda name: scenario, folder)
+    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce, shorten)
+
+
+def _run_plan(
+    plan: PlacementPlan,
+    cache: CellCache,
+    jobs: int,
+    announce: Announce,
+    shorten: Callable[[float], tuple[PlacementPlan, str]] | None = None,
+) -> tuple[PlacementFindings, Outcome]:
+    """Run a plan; `shorten` gives another one, and a note, for the duration of a cell on one worker [s]."""
+    open_study(cache.out, {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed})
+    with folder_lock(cache.out):
+        (cache.out / "cells").mkdir(exist_ok=True)
+        sets = choose_pilot(plan.first_sets())
+        pilot = _PlacementRun(plan, cache).measure(sets) if sets else {}
+        cell_s = statistics.median(cache.seconds) if cache.seconds else None
+        notes: tuple[str, ...] = ()
+        if shorten is not None and cell_s is not None:
+            plan, note = shorten(cell_s)
+            notes = (note,)
+        power = estimate_power(
+            pilot,
+            clips=len(plan.scenario.motion.test),
+            sets=len(plan.first_sets()),
+            unit=DEFINITIONS[plan.study.metric].unit,
+            cell_s=cell_s,
+            duration_s=lambda clips: None if cell_s is None else plan.cell_count(clips) * cell_s / jobs,
+        )
+        announce(power, notes)
+        findings = _PlacementRun(plan, cache).findings(cache.command, power, notes)
+        write_placement(cache.out / FINDINGS, findings)
     if findings.failures:
         return findings, Outcome.INCOMPLETE
     return findings, Outcome.PASS if findings.best else Outcome.NOT_COMPARABLE
@@ -84,7 +148,7 @@ class _PlacementRun:
         self.costs |= {stations: self.plan.costs(by_clip) for stations, by_clip in errors.items()}
         return {stations: self.costs[stations] for stations in sets}
 
-    def findings(self, command: str) -> PlacementFindings:
+    def findings(self, command: str, power: StatisticalPower, notes: tuple[str, ...]) -> PlacementFindings:
         plan, study, scenario = self.plan, self.study, self.plan.scenario
         self.measure(plan.known_sets())
         modes = list(self._modes())
@@ -130,7 +194,9 @@ class _PlacementRun:
             conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
             claims=tuple(self._claims(alternatives, held)),
-            notes=tuple(self._notes(modes, held)),
+            notes=(*notes, *self._notes(modes, held)),
+            sizes=study.sizes,
+            power=power,
             failures=dict(self.cache.failures),
             planned=self.cache.planned,
             better="lower" if plan.cost_sign > 0.0 else "higher",

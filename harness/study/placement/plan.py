@@ -3,20 +3,30 @@
 Unknown names, impossible placements and too many cells are refused here, before anything is written.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from harness.compare.margins import margin_of
+from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, expand_clips
 from harness.mocap.library import LibraryFolders
+from harness.mocap.sources import MotionSource
 from harness.results.placement_findings import StationPlacement
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.cell_cache import SetRequest, link_rate_hz
-from harness.study.placement.config import PlacementStudy, base_scenario, find_placement_study, load_placement_study
+from harness.study.placement.config import (
+    PlacementStudy,
+    base_scenario,
+    find_placement_study,
+    load_placement_study,
+    load_scenario_beside,
+)
 from harness.study.placement.ranking import Costs
 from harness.study.placement.refinement import check_clip_count
 from harness.study.placement.search import names_of_places
@@ -71,6 +81,33 @@ class PlacementPlan:
             sets += [claimed, *others, full]
         return list(dict.fromkeys(sets))
 
+    def first_sets(self) -> list[StationSet]:
+        """Sets that are measured in any case, of the size that has most of them; the first steps of a search if none.
+
+        The pilot of the study is chosen from them (see `power.choose_pilot`).
+        """
+        study, known = self.study, self.known_sets()
+        if not known and study.greedy:
+            base = select_groups(study.greedy.base, self.groups, "greedy.base") if study.greedy.base else ()
+            added = [unit for unit in select_groups(study.greedy.of, self.groups, "greedy.of") if unit not in base]
+            known = [station_set([*base, unit], self.groups) for unit in added]
+        sizes = Counter(map(len, known))
+        size = max(sizes, key=lambda size: (sizes[size], size), default=0)
+        return [stations for stations in known if len(stations) == size]
+
+    def cell_count(self, clips: int) -> int:
+        """Number of cells with so many clips to choose on; of a search without a fixed number of steps, the most."""
+        study, held = self.study, len(self.study.held_out)
+        sets = len(self.known_sets())
+        if study.greedy:
+            sets += study.greedy.most * len(self.groups)
+        if study.refine:
+            sets += 4 * study.refine.size * study.refine.most_moves
+        sizes = len({len(stations) for stations in self.known_sets()}) or (study.greedy.most if study.greedy else 1)
+        compared = len(self.sets_to_compare(self.known_sets()))
+        elsewhere = sum(len(s.motion.test) * len(s.methods) for s in self.condition_scenarios.values()) * compared
+        return (sets * clips + sizes * held) * len(study.methods) + elsewhere
+
     def sets_to_compare(self, measured: Iterable[StationSet]) -> list[StationSet]:
         """The sets that every condition ranks: those of `exhaustive`, else all measured; none without conditions."""
         if not self.condition_scenarios and len(self.study.methods) < 2:
@@ -106,11 +143,15 @@ def is_refined(stations: StationSet) -> bool:
 def plan_placement(path: Path | str, folder: LibraryFolders | None) -> PlacementPlan:
     """Plan the study of a TOML file; BadFile, BadInput, UnknownName."""
     file = find_placement_study(path)
-    study = load_placement_study(file)
-    scenario = expand_clips(base_scenario(study, file.parent), folder)
-    conditions = {c.name: expand_clips(base_scenario(study, file.parent, c), folder) for c in study.condition}
-    held_out = _held_out_scenario(study, scenario)
+    return plan_study(load_placement_study(file), partial(load_scenario_beside, beside=file.parent), folder)
+
+
+def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: LibraryFolders | None) -> PlacementPlan:
+    """Plan a study whose scenarios `load` gives by name; BadInput, UnknownName."""
+    scenario = expand_clips(base_scenario(study, load), folder)
+    conditions = {c.name: expand_clips(base_scenario(study, load, c), folder) for c in study.condition}
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
+    held_out = _held_out_scenario(study, scenario, source)
     plan = PlacementPlan(study, study.groups(), scenario, held_out, conditions, source.title)
     for checked in filter(None, (scenario, held_out, *conditions.values())):
         first = replace(checked, worn=names_of_places(station_set(plan.groups[:1], plan.groups)))
@@ -125,14 +166,14 @@ def plan_placement(path: Path | str, folder: LibraryFolders | None) -> Placement
     return plan
 
 
-def _held_out_scenario(study: PlacementStudy, scenario: Scenario) -> Scenario | None:
+def _held_out_scenario(study: PlacementStudy, scenario: Scenario, source: MotionSource) -> Scenario | None:
+    """The scenario with the held-out clips; their behaviours are the source's where the test clips have several."""
     motion = scenario.motion
     if not study.held_out:
         return None
     if both := sorted(set(study.held_out) & set(motion.test)):
         raise BadInput(f"held_out: {', '.join(both)} is also a test clip.", "Remove it from one of the two.")
+    behaviours = motion.behaviours[:1]
     if len(set(motion.behaviours)) > 1:
-        raise BadInput(
-            "held_out is given, but the test clips have several behaviours.", "Use one behaviour in a study."
-        )
-    return replace(scenario, motion=replace(motion, test=study.held_out, behaviours=motion.behaviours[:1]))
+        behaviours = tuple(source.behaviour(ClipPart.parse(clip).clip) for clip in study.held_out)
+    return replace(scenario, motion=replace(motion, test=study.held_out, behaviours=behaviours))

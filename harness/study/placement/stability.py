@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.paired_statistics import CONFIDENCE_LEVEL, MIN_CLIPS
+from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.placement_findings import PlacementCondition, RankAgreement, StationNames
+from harness.results.placement_findings import ChangedOrder, PlacementCondition, RankAgreement, StationNames
 from harness.study.placement.ranking import Costs, complete_sets, mean_cost, selection_stability, sort_by_cost
 
 _RESAMPLES = 2000
+_MOST_TESTED_SETS = 24
+"""Most sets whose changes of order are tested: the correction for all pairs of more would leave nothing significant."""
+_MOST_CHANGES = 10
+"""Most changes of order that are kept for two conditions."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,37 @@ def rank_agreements(
         same_clips = list(sides[0][shared[0]]) == list(sides[1][shared[0]])
         low, high = _interval(tables, same_clips)
         tau = float(tau_b(tables[0].mean(axis=1), tables[1].mean(axis=1)))
-        agreements.append(RankAgreement(a.name, b.name, tau if np.isfinite(tau) else None, len(shared), low, high))
+        changes = changed_orders(shared, tables[0], tables[1], paired=same_clips)
+        agreements.append(
+            RankAgreement(
+                *(a.name, b.name, tau if np.isfinite(tau) else None, len(shared), low, high),
+                changed=tuple(changes[:_MOST_CHANGES]),
+                changes=len(changes),
+                significant_changes=sum(bool(change.significant) for change in changes),
+            )
+        )
     return tuple(agreements)
+
+
+def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paired: bool) -> list[ChangedOrder]:
+    """Pairs of sets in opposite order under two conditions, from (sets, clips) costs under each.
+
+    The change of the difference between two sets is tested by sign flips over clips, corrected for all pairs of sets
+    (Holm). That needs the same clips on both sides (`paired`), enough of them, and few sets; elsewhere `significant` is
+    None. Significant changes come first, then the largest.
+    """
+    pairs = list(itertools.combinations(range(len(names)), 2))
+    corrected: list[float | None] = [None] * len(pairs)
+    if paired and a.shape[1] >= MIN_CLIPS and len(names) <= _MOST_TESTED_SETS:
+        corrected = list(holm([sign_flip_p((a[i] - a[j]) - (b[i] - b[j])) for i, j in pairs]))
+    changes = []
+    for (i, j), p in zip(pairs, corrected, strict=True):
+        first, second = (i, j) if a[i].mean() < a[j].mean() else (j, i)
+        before, after = (float((side[second] - side[first]).mean()) for side in (a, b))
+        if before > 0.0 > after:
+            significant = None if p is None else p <= SIGNIFICANCE
+            changes.append(ChangedOrder(names[first], names[second], (before, after), significant))
+    return sorted(changes, key=lambda c: (not c.significant, c.differences[1] - c.differences[0]))
 
 
 def tau_b(a: Floats, b: Floats) -> Floats:

@@ -1,0 +1,195 @@
+"""A placement study from a question: how many stations for which behaviour, without a file.
+
+    harness placement --stations 3 --behaviour table_tennis
+
+Sets are chosen on some clips of the behaviours, tested on others, and methods learn from a third part. The budget of
+time decides how sets are searched and on how many clips: see `plan_within_budget`.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from harness.body.places import select_places
+from harness.core.names import Name
+from harness.errors import BadInput, UnknownName
+from harness.experiment.scenario import Scenario, ScenarioMotion, Station
+from harness.mocap.library import LibraryFolders
+from harness.mocap.sources import MotionSource, open_motion_source
+from harness.study.placement.candidates import Candidate
+from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
+from harness.study.placement.ranking import min_clips
+
+DEFAULT_METHOD = "expert_map"
+DEFAULT_MINUTES = 10.0
+DEFAULT_CLIPS = 16
+"""Clips on which sets are chosen, by default: three more than 165 sets of three need (see `power`)."""
+LEAST_CLIPS = 6
+CLIP_S = 5.0
+"""Length of each clip that is used [s]."""
+EXAMPLE_FRAMES = 2000
+"""Number of frames that a method learns from."""
+NoisePreset = Literal["clean", "noise", "default"]
+_ROLES = 3
+"""Clips to choose on, held-out clips and examples have equal shares of a behaviour."""
+
+
+@dataclass(frozen=True)
+class PlacementQuestion:
+    """How many stations, for which behaviours, and where they may be."""
+
+    fewest: int
+    most: int
+    behaviours: tuple[Name, ...]
+    places: tuple[str, ...] = ()
+    """Names of places (see `harness.body.places`); the common ones by default."""
+    method: str = DEFAULT_METHOD
+    noise: NoisePreset = "default"
+    minutes: float = DEFAULT_MINUTES
+    """Budget of time [min]."""
+    clips: int = 0
+    """Number of clips to choose on, whatever the budget; 0 chooses it within the budget."""
+    seed: int = 1
+
+    @property
+    def name(self) -> str:
+        """A name for files, such as "table_tennis_3" or "walking_boxing_2-4"."""
+        sizes = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest}-{self.most}"
+        return f"{'_'.join(self.behaviours)}_{sizes}"
+
+    @property
+    def title(self) -> str:
+        """The question in words."""
+        sizes = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest} to {self.most}"
+        noun = "station" if self.most == 1 else "stations"
+        return f"Where are {sizes} {noun} worn for {' and '.join(map(spoken, self.behaviours))}?"
+
+
+def spoken(name: str) -> str:
+    """A name with blanks instead of underscores."""
+    return name.replace("_", " ")
+
+
+def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -> tuple[PlacementStudy, Scenario]:
+    """The study that answers a question, with all clips that it may use, and its scenario.
+
+    Without `folder` the motion is built in, else that of the library. UnknownName for a place or a behaviour; BadInput
+    for a number of stations that the places do not allow, and for a behaviour with too few clips.
+    """
+    places = select_places(question.places)
+    most = min(MAX_STATIONS, len(places))
+    if not 1 <= question.fewest <= question.most <= most:
+        raise BadInput(
+            f"{question.fewest} to {question.most} stations of {len(places)} places.",
+            f"Ask for 1 to {most}, the smaller number first; --places names more places, `harness list places` all.",
+        )
+    source = open_motion_source("builtin" if folder is None else "cmu", folder, seed=question.seed, rate_hz=None)
+    parts = [_deal_clips(behaviour, source) for behaviour in dict.fromkeys(question.behaviours)]
+    wanted = question.clips or DEFAULT_CLIPS
+    test, held_out, examples = (list(_interleave([part[role] for part in parts])) for role in range(_ROLES))
+    if question.clips > len(test):
+        raise BadInput(f"{question.clips} clips of {len(test)} to choose on.", f"Ask for {len(test)} clips or fewer.")
+    test, held_out = test[:wanted], held_out[:DEFAULT_CLIPS]
+    scenario = Scenario(
+        name=question.name,
+        motion=ScenarioMotion(
+            source="builtin" if folder is None else "cmu",
+            test=tuple(test),
+            behaviours=_behaviours(test, source),
+            examples=tuple(examples),
+            thin_to=EXAMPLE_FRAMES,
+            body="common",
+            longest_s=CLIP_S,
+        ),
+        stations={place.name: Station(place.bone, place.along, place.around_deg) for place in places},
+        methods=(question.method,),
+        seed=question.seed,
+        noise=question.noise,
+    )
+    study = PlacementStudy(
+        name=question.name,
+        kind="placement",
+        title=question.title,
+        scenario=question.name,
+        methods=(question.method,),
+        held_out=tuple(held_out),
+        link=True,
+        candidate=tuple(Candidate(place.name, place.bone, place.along, place.around_deg) for place in places),
+        exhaustive=ExhaustiveOptions(question.most, question.fewest, most_cells=100_000_000),
+        sizes=tuple(range(question.fewest, question.most + 1)),
+        condition_size=question.most,
+    )
+    return study, scenario
+
+
+def _deal_clips(behaviour: str, source: MotionSource) -> tuple[list[str], list[str], list[str]]:
+    """Clips of a behaviour to choose on, to hold out and to learn from; each performer's takes are dealt in turn."""
+    by_subject: dict[str, list[str]] = {}
+    for name in source.names():
+        if source.behaviour(name) == behaviour:
+            by_subject.setdefault(source.subject(name), []).append(name)
+    if not by_subject:
+        raise UnknownName("behaviour", behaviour, dict.fromkeys(filter(None, map(source.behaviour, source.names()))))
+    dealt: tuple[list[str], list[str], list[str]] = ([], [], [])
+    for at, name in enumerate(name for takes in by_subject.values() for name in takes):
+        dealt[at % _ROLES].append(name)
+    if not all(dealt):
+        raise BadInput(
+            f"{behaviour} has {sum(map(len, dealt))} clips.", "Three are needed: to choose on, to test, to learn from."
+        )
+    return dealt
+
+
+def _interleave(lists: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The items of several lists in turn, so that the first n have equal shares of all while they last."""
+    for at in range(max(map(len, lists))):
+        yield from (items[at] for items in lists if at < len(items))
+
+
+def _behaviours(clips: Sequence[str], source: MotionSource) -> tuple[str, ...]:
+    """One word if all clips have the same behaviour, else one for each clip."""
+    words = tuple(map(source.behaviour, clips))
+    return words[:1] if len(set(words)) == 1 else words
+
+
+def plan_within_budget(
+    study: PlacementStudy, scenario: Scenario, question: PlacementQuestion, cell_s: float, jobs: int
+) -> tuple[PlacementStudy, Scenario, str]:
+    """The study within the question's budget, its scenario, and a sentence about what the budget allowed.
+
+    The first of these that fits is chosen: every set on all clips; every set on the least number of clips that can
+    show a difference between so many sets; one station after another on all clips; the same on ever fewer clips. The
+    last has six clips, and is chosen even if it does not fit.
+    """
+    places = len(study.candidate)
+    sets = sum(math.comb(places, size) for size in study.sizes)
+    one_by_one = sum(places - worn for worn in range(study.sizes[-1]))
+    given = len(scenario.motion.test)
+    least = min(given, min_clips(max(math.comb(places, size) for size in study.sizes) - 1))
+    few = [] if question.clips else [least]
+    fewer = [] if question.clips else list(range(given - 1, min(given, LEAST_CLIPS) - 1, -1))
+    tested = len(study.sizes) * len(study.held_out)
+    plans = [(True, clips) for clips in (given, *few)] + [(False, clips) for clips in (given, *fewer)]
+
+    def duration_s(exhaustive: bool, clips: int) -> float:
+        return ((sets if exhaustive else one_by_one) * clips + tested) * cell_s / jobs
+
+    exhaustive, clips = next((plan for plan in plans if duration_s(*plan) <= 60.0 * question.minutes), plans[-1])
+    motion = replace(scenario.motion, test=scenario.motion.test[:clips])
+    if len(motion.behaviours) > 1:
+        motion = replace(motion, behaviours=motion.behaviours[:clips])
+    scenario = replace(scenario, motion=motion)
+    text = f"every one of {sets:,} sets" if exhaustive else "one station after another, the best next one each time"
+    note = f"Within {question.minutes:g} minutes: {text}, on {clips} clips."
+    if not exhaustive:
+        whole_min = duration_s(True, given) / 60.0
+        note += f" Every one of {sets:,} sets would take about {whole_min:.0f} minutes on {given} clips."
+        options = GreedyOptions(study.sizes[-1])
+        study = replace(study, exhaustive=None, greedy=options)
+    return study, scenario, note
+
+
+def describe_places(study: PlacementStudy) -> Mapping[str, str]:
+    """Name of each candidate -> where it is on the body."""
+    return {place.name: place.text for place in select_places([c.name for c in study.candidate])}
