@@ -1,9 +1,12 @@
 """What `harness list` says."""
 
+import json
 from importlib.metadata import EntryPoint
 
 import pytest
 
+from harness.body.places import NAMED_PLACES
+from harness.cli import main
 from harness.commands.catalogue import build_catalogue
 from harness.reconstruct import registry
 from harness.reconstruct.methods.mean_pose import MeanPose
@@ -33,3 +36,14 @@ def test_a_scenario_says_what_it_varies() -> None:
     assert "varies noise" in build_catalogue()["scenarios"]["boxing"]
     assert "walk" in build_catalogue()["placement studies"]["walking"]
     assert "noise default" in build_catalogue()["scenarios"]["demo"]
+
+
+def test_one_kind_is_listed_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "places"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "places:"
+    assert lines[1:-1] == [f"  {place.name:<15}  {place.text}; bone {place.bone}" for place in NAMED_PLACES.values()]
+    assert main(["list", "motion", "--json"]) == 0
+    assert next(iter(json.loads(capsys.readouterr().out))) == "motion of the built-in performer"
+    assert main(["list", "place"]) == 2
+    assert "Did you mean 'places'?" in capsys.readouterr().err

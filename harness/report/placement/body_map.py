@@ -71,13 +71,13 @@ def draw_body_map(
             return None, str(MissingExtra("A rendered picture", package, "viz"))
     low, high = min(0.0, *measured), max(0.0, *measured)
     ends = (low, high if high > low else low + 1.0)
-    views, reason = _render(shown_places, shown.values, ends)
+    views, reason = render_body(shown_places, shown.values, ends)
     if views is None:
         return None, reason
     return _chart(shown_places, shown, views, ends, unit, number), ""
 
 
-def _render(
+def render_body(
     places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
@@ -141,7 +141,7 @@ def _chart(
             axes.set_axis_off()
             axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
             visible = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
-            _label_places(axes, at[side], {n: texts[n] for n in visible}, views["picture"].shape[1:3])
+            label_places(axes, at[side], {n: texts[n] for n in visible}, views["picture"].shape[1:3])
         bar = figure.add_subplot(grid[1, :])
         figure.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
         bar.set_xlabel(f"{shown.description} [{unit}]")
@@ -172,7 +172,7 @@ def _chart(
     )
 
 
-def _label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
+def label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
     """Write a name with a line to its ball for each place: above the arms, and in columns next to the rest."""
     height, width = size
     for right in (False, True):

@@ -136,12 +136,16 @@ def _stability(findings: PlacementFindings) -> list[str]:
     ]
     lines = ["stability of the ranking", *Table(head, rows, text_columns=1 + len(sizes)).lines()]
     lines += ["", *_ranks(findings), ""] if findings.compared else []
-    for pair in findings.agreements:
+    own = findings.conditions[0].name
+    shown = [pair for pair in findings.agreements if own in (pair.a, pair.b)]
+    for pair in shown:
         tau = NOT_MEASURED if pair.tau is None else format_value(pair.tau)
         interval = format_value_interval(pair.low, pair.high)
         within = f" ({interval})" if interval else ""
         line = f"{pair.a} and {pair.b}: the rankings of {pair.sets} sets have Kendall's tau {tau}{within}"
         lines.append(textwrap.fill(f"{line}; {changes_sentence(findings, pair)}", WIDTH, subsequent_indent="  "))
+    if len(shown) < len(findings.agreements):
+        lines.append(f"pairs of conditions that are on the page alone: {len(findings.agreements) - len(shown)}")
     return lines
 
 

@@ -120,7 +120,10 @@ def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
         return f"{count_noun(clips, 'clip')} cannot tell it from the other {best.of - 1:,} {noun}s"
     if not best.ties:
         return f"no other {noun} is tied with it" if best.of > 1 else f"no other {noun} was tried"
-    return f"tied with {count_noun(len(best.ties), f'other {noun}')}: {list_sets(best.ties)}"
+    if best.of == 2:
+        return f"tied with the only other {noun} that was tried: {list_sets(best.ties)}"
+    others = f"{best.of - 1:,} other {noun}s that were tried"
+    return f"tied with {len(best.ties):,} of the {others}: {list_sets(best.ties)}"
 
 
 def _number_word(number: int) -> str:
@@ -282,10 +285,10 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     first = pair.changed[0]
     before, after = (format_signed(difference) for difference in first.differences)
     tested = first.significant is not None
-    shown = f", {pair.significant_changes:,} significantly" if tested else ""
-    noun = "pair changes its" if pair.changes == 1 else "pairs change their"
+    shown = f", {pair.significant_changes:,} significantly" if tested else " (too few clips or too many sets to test)"
+    verb = "changes its" if pair.changes == 1 else "change their"
     example = f"{set_name(first.first)} against {set_name(first.second)}, {before} to {after} {findings.unit}".rstrip()
-    return f"{pair.changes:,} of {pairs:,} {noun} order{shown}: first {example}"
+    return f"{pair.changes:,} of {pairs:,} pairs {verb} order{shown}: first {example}"
 
 
 def format_stays(share: float | None) -> str:

@@ -225,8 +225,12 @@ def _shapley_worth(
     """Shapley value of each unit, over the sets that were measured.
 
     It is the decrease of the cost when the unit is added, averaged over the sets that it can be added to. Each size of
-    sets has the same weight.
+    sets has the same weight. Where all sets have one size, none can be added to: it is then the mean cost of the sets
+    without the unit minus that of the sets with it.
     """
+    if len({len(stations) for stations in costs}) == 1:
+        yield from _worth_at_one_size(units, costs)
+        return
     for unit in units:
         sizes: dict[int, list[tuple[StationSet, StationSet]]] = {}
         for stations in costs:
@@ -237,6 +241,17 @@ def _shapley_worth(
             [_mean_by_clip([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
         )
         gain = compare_paired(without, with_unit)
+        yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
+
+
+def _worth_at_one_size(
+    units: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
+) -> Iterator[MarginalContribution]:
+    """For each unit, the mean cost of the sets without it minus the mean cost of those with it."""
+    for unit in units:
+        having = [costs[stations] for stations in costs if set(unit) <= set(stations)]
+        lacking = [costs[stations] for stations in costs if not set(unit) & set(stations)]
+        gain = compare_paired(_mean_by_clip(lacking), _mean_by_clip(having))
         yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
 
 

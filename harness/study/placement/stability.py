@@ -11,7 +11,14 @@ from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.placement_findings import ChangedOrder, PlacementCondition, RankAgreement, StationNames
-from harness.study.placement.ranking import Costs, complete_sets, mean_cost, selection_stability, sort_by_cost
+from harness.study.placement.ranking import (
+    Costs,
+    complete_sets,
+    mean_cost,
+    min_clips,
+    selection_stability,
+    sort_by_cost,
+)
 
 _RESAMPLES = 2000
 _MOST_TESTED_SETS = 24
@@ -77,12 +84,12 @@ def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paire
     """Pairs of sets in opposite order under two conditions, from (sets, clips) costs under each.
 
     The change of the difference between two sets is tested by sign flips over clips, corrected for all pairs of sets
-    (Holm). That needs the same clips on both sides (`paired`), enough of them, and few sets; elsewhere `significant` is
-    None. Significant changes come first, then the largest.
+    (Holm). That needs the same clips on both sides (`paired`), as many as can show a change among all pairs, and few
+    sets; elsewhere `significant` is None. Significant changes come first, then the largest.
     """
     pairs = list(itertools.combinations(range(len(names)), 2))
     corrected: list[float | None] = [None] * len(pairs)
-    if paired and a.shape[1] >= MIN_CLIPS and len(names) <= _MOST_TESTED_SETS:
+    if paired and a.shape[1] >= min_clips(len(pairs)) and len(names) <= _MOST_TESTED_SETS:
         corrected = list(holm([sign_flip_p((a[i] - a[j]) - (b[i] - b[j])) for i, j in pairs]))
     changes = []
     for (i, j), p in zip(pairs, corrected, strict=True):

@@ -192,7 +192,7 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
     first = write_placement_page(folder).read_bytes()
     assert main(["report", str(folder), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said == {"report": str(folder / "report.html"), "outcome": "pass"}
+    assert said == {"report": str(folder / "report.html"), "next": f"harness plot {folder}", "outcome": "pass"}
     assert (folder / "report.html").read_bytes() == first
     assert main(["report", str(folder), "--movie"]) == 2
     assert "a placement study" in capsys.readouterr().err
@@ -228,7 +228,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
         "picture": np.full((2, height, width, 4), 200, np.uint8),
         "at": np.array([np.column_stack([at, sign * facing]) for sign in (1.0, -1.0)]),
     }
-    monkeypatch.setattr(body, "_render", lambda *args: (views, ""))
+    monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
     chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", ("right_ankle",)), unit="deg")
     assert chart is not None

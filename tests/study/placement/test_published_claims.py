@@ -68,3 +68,11 @@ def test_too_few_clips_and_none_are_said() -> None:
     few = {SUITED: costs(1.0, clips=5), OTHER: costs(2.0, clips=5), WHOLE: costs(1.0, clips=5)}
     assert [claim.verdict for claim in verdicts(few)] == ["cannot tell", "cannot tell"]
     assert [claim.verdict for claim in verdicts({SUITED: costs(1.0)})] == ["not run", "not run"]
+
+
+def test_the_limit_is_labelled_and_stands_beside_the_error_that_it_is_derived_from() -> None:
+    _, suffices = verdicts({SUITED: costs(2.37), OTHER: costs(3.0), WHOLE: costs(1.98)})
+    assert suffices.ours == "2.37 deg; limit 2.18 deg, 110% of 1.98 of all 1"
+    missing = {**costs(1.98), "clip_0": None}
+    _, suffices = verdicts({SUITED: {**costs(2.37), "clip_0": 99.0}, OTHER: costs(3.0), WHOLE: missing})
+    assert suffices.ours.startswith("2.37 deg; limit 2.18 deg")

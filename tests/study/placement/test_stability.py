@@ -6,7 +6,13 @@ from scipy import stats
 
 from harness.core.arrays import Floats
 from harness.results.placement_findings import StationNames
-from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition, tau_b
+from harness.study.placement.stability import (
+    ConditionCosts,
+    changed_orders,
+    rank_agreements,
+    rank_by_condition,
+    tau_b,
+)
 
 CLIPS = tuple(f"clip_{n}" for n in range(8))
 SETS: tuple[StationNames, ...] = tuple((name,) for name in "abcdef")
@@ -65,3 +71,35 @@ def test_means_are_told_as_the_metric_has_them() -> None:
     (found,) = rank_by_condition([elsewhere("own", -np.arange(6.0))], SETS, -1.0)
     assert found.means == tuple(range(6))
     assert found.best == {"1": ("f",)}
+
+
+def test_sets_that_swap_are_named_and_the_swap_is_tested(rng: np.random.Generator) -> None:
+    up, swapped = np.arange(6.0), np.array([1.0, 0.0, 2.0, 3.0, 4.0, 5.0])
+    noise = 0.01 * rng.normal(size=(2, 6, 12))
+    clips = tuple(f"clip_{n}" for n in range(12))
+    each = [elsewhere(name, means, shake, clips) for name, means, shake in zip("xy", (up, swapped), noise, strict=True)]
+    (pair,) = rank_agreements(each, SETS)
+    assert (pair.changes, pair.significant_changes) == (1, 1)
+    (change,) = pair.changed
+    assert (change.first, change.second, change.significant) == (("a",), ("b",), True)
+    assert change.differences == pytest.approx((1.0, -1.0), abs=0.05)
+
+
+def test_a_swap_within_the_noise_is_not_significant(rng: np.random.Generator) -> None:
+    means = np.array([[0.0, 0.01], [0.01, 0.0]])
+    a, b = (each[:, None] + rng.normal(size=(2, 12)) for each in means)
+    a += means[0][:, None] - a.mean(axis=1, keepdims=True)
+    b += means[1][:, None] - b.mean(axis=1, keepdims=True)
+    (change,) = changed_orders(SETS[:2], a, b, paired=True)
+    assert change.significant is False
+    assert change.differences == pytest.approx((0.01, -0.01))
+
+
+@pytest.mark.parametrize(("sets", "clips", "paired"), [(2, 5, True), (2, 8, False), (6, 9, True), (25, 16, True)])
+def test_a_swap_is_not_tested_where_no_test_could_show_it(sets: int, clips: int, paired: bool) -> None:
+    up = np.repeat(np.arange(float(sets))[:, None], clips, axis=1)
+    names = [(f"place_{n}",) for n in range(sets)]
+    changes = changed_orders(names, up, -up, paired=paired)
+    assert len(changes) == sets * (sets - 1) // 2
+    assert {change.significant for change in changes} == {None}
+    assert changes[0].differences[1] == -(sets - 1.0)

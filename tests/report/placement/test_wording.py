@@ -1,0 +1,144 @@
+"""The answer of a placement study in a sentence, and what its clips can show, before and after it ran."""
+
+from dataclasses import replace
+
+import pytest
+
+from harness.report.placement.page import PlacementContent, placement_page
+from harness.report.placement.text import text
+from harness.report.placement.wording import (
+    changes_sentence,
+    format_duration,
+    power_sentences,
+    ranks_by_condition,
+    sentence,
+)
+from harness.results.placement_findings import (
+    BestSet,
+    ChangedOrder,
+    PlacementFindings,
+    RankAgreement,
+    StatisticalPower,
+)
+from tests.report.fabricate_placement import made_up
+
+POWER = StatisticalPower(
+    *(16, 165, "deg", 13, 590.0, 480.0, 0.4, 0.7, 1.02, 0.3, 190, 7000.0, 4),
+)
+
+
+@pytest.fixture(scope="module")
+def findings() -> PlacementFindings:
+    return replace(made_up(), power=POWER)
+
+
+def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFindings) -> None:
+    best = findings.best[1]
+    tested = replace(best, held_out=2.0, held_out_low=1.8, held_out_high=2.2, held_out_clips=16)
+    tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
+    asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
+    assert sentence(asked) == (
+        "Best two stations for walking: both ankles, 2.00 deg (1.80 to 2.20) on 16 held-out clips; tied with 2 of the "
+        "54 other pairs that were tried: head + pelvis; sternum + pelvis."
+    )
+    assert text(asked).startswith("Best two stations for walking: both ankles")
+    assert f"<h1>{sentence(asked)}</h1>" in placement_page(PlacementContent(asked, {}, ()))
+
+
+def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindings) -> None:
+    asked = replace(findings, sizes=(1, 3, 4), behaviours=("walking", "table_tennis"))
+    said = sentence(asked)
+    assert said.startswith("Best station for walking and table tennis: ")
+    assert "Best three stations for walking and table tennis: both ankles + pelvis, " in said
+    assert said.endswith("No set of 4 stations was measured.")
+
+
+def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
+    alone = BestSet(findings.best[0].stations, of=11)
+    said = sentence(replace(findings, sizes=(1,), best=(alone,)))
+    assert "on the clips on which it was chosen; no other place is tied with it." in said
+    assert "no other place was tried" in sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
+
+
+def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFindings) -> None:
+    best = findings.best[0]
+    others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
+    asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=11),))
+    assert sentence(asked).endswith("8 clips cannot tell it from the other 10 places.")
+    enough = replace(asked, power=replace(POWER, least_clips=8))
+    assert "tied with 10 of the 10 other places that were tried: " in sentence(enough)
+    two = replace(enough, best=(replace(best, ties=others[:1], of=2),))
+    assert "tied with the only other place that was tried: " in sentence(two)
+
+
+def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> None:
+    first, second = power_sentences(POWER)
+    assert first == (
+        "16 clips can show a difference of 1.02 deg between two of 165 sets (power 80 %, p corrected for 164 "
+        "comparisons). The study takes 10 min."
+    )
+    assert second == (
+        "A difference of 0.30 deg, a tenth of the error, would need about 190 clips, about 1.9 h. Spread and time are "
+        "those of the first 4 sets."
+    )
+    assert power_sentences(replace(POWER, needed_clips=16)) == [first]
+
+
+def test_too_few_clips_are_said_before_anything_else() -> None:
+    few = replace(POWER, clips=3, sets=3, least_clips=7, duration_s=20.0, least_duration_s=44.0, needed_clips=None)
+    assert power_sentences(few) == [
+        "3 clips cannot show any difference between 3 sets, 7 might (44 s). The study takes 20 s."
+    ]
+    unknown = replace(few, duration_s=None, least_duration_s=None)
+    assert power_sentences(unknown) == ["3 clips cannot show any difference between 3 sets, 7 might."]
+    assert power_sentences(replace(few, sets=1)) == [
+        "One set is measured on 3 clips: nothing is compared. The study takes 20 s."
+    ]
+    assert "unknown" in power_sentences(replace(few, clips=7, shown=None))[0]
+
+
+def test_the_text_and_the_page_keep_what_was_announced(findings: PlacementFindings) -> None:
+    assert power_sentences(POWER)[0] in " ".join(text(findings).split())
+    assert power_sentences(POWER)[1] in placement_page(PlacementContent(findings, {}, ()))
+    assert "<dt>Clips</dt>" not in placement_page(PlacementContent(replace(findings, power=None), {}, ()))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(None, "not measured"), (40.4, "40 s"), (89.9, "90 s"), (420.0, "7 min"), (12600.0, "3.5 h"), (1e6, "12 days")],
+)
+def test_durations_are_rough(seconds: float | None, said: str) -> None:
+    assert format_duration(seconds) == said
+
+
+def test_sets_have_a_rank_under_each_condition(findings: PlacementFindings) -> None:
+    means = ((2.0, 1.0, 3.0), (2.0, 2.0, None), (1.0, 2.0, 3.0))
+    conditions = tuple(replace(c, means=m) for c, m in zip(findings.conditions, means, strict=True))
+    few = replace(findings, compared=(("head",), ("pelvis",), ("sternum",)), conditions=conditions)
+    assert ranks_by_condition(few, 9) == [
+        (("pelvis",), [1, 1, 2]),
+        (("head",), [2, 1, 1]),
+        (("sternum",), [3, None, 3]),
+    ]
+    assert len(ranks_by_condition(few, 2)) == 2
+    assert ranks_by_condition(replace(few, better="higher"), 9)[0] == (("sternum",), [1, None, 1])
+    assert ranks_by_condition(replace(few, conditions=()), 9) == []
+    rows = [line.split() for line in text(few).splitlines() if line.startswith("sternum  ")]
+    assert ["sternum", "3", "not", "measured", "3"] in rows
+    assert 'aria-label="ranks"' in placement_page(PlacementContent(few, {}, ()))
+
+
+def test_changes_of_order_are_counted_and_the_first_is_named(findings: PlacementFindings) -> None:
+    change = ChangedOrder(("head",), ("left_ankle", "right_ankle"), (0.5, -0.25), significant=True)
+    pair = RankAgreement("a", "b", 0.5, 5, changed=(change,), changes=3, significant_changes=1)
+    said = "3 of 10 pairs change their order, 1 significantly: first head against both ankles, +0.50 to −0.25 deg"
+    assert changes_sentence(findings, pair) == said
+    own = replace(pair, a=findings.conditions[0].name)
+    assert said in " ".join(text(replace(findings, agreements=(own,))).split())
+    assert "pairs of conditions that are on the page alone: 1" in text(replace(findings, agreements=(own, pair)))
+    assert said in placement_page(PlacementContent(replace(findings, agreements=(pair,)), {}, ()))
+    untested = replace(pair, changes=1, changed=(replace(change, significant=None),))
+    assert changes_sentence(findings, untested).startswith(
+        "1 of 10 pairs changes its order (too few clips or too many sets to test): first"
+    )
+    assert changes_sentence(findings, replace(pair, changes=0, changed=())) == "no pair of 10 changes its order"
