@@ -233,7 +233,7 @@ class StatisticalPower:
     duration_s: float | None = None
     """Estimated duration of the whole study [s]; None if no cell was measured."""
     least_duration_s: float | None = None
-    """The same with `least_clips` clips."""
+    """Estimated duration of the study with `least_clips` clips [s]."""
     cell_s: float | None = None
     """Duration of a cell on one worker [s], the median of the first sets."""
     spread: float | None = None
@@ -245,7 +245,7 @@ class StatisticalPower:
     needed_clips: int | None = None
     """Number of clips that would show a difference of `wanted`."""
     needed_duration_s: float | None = None
-    """The same as a duration [s]."""
+    """Estimated duration of the study with `needed_clips` clips [s]."""
     pilot_sets: int = 0
     """Number of sets that were measured first."""
 
