@@ -13,7 +13,7 @@ from harness.cli import main
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.scenario import load_scenario
 from harness.experiment.status import read_status
-from harness.results.placement_findings import PlacementFindings, read_placement, write_placement
+from harness.results.placement_findings import PlacementFindings, StatisticalPower, read_placement, write_placement
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
 from harness.study.placement import placement_study
@@ -370,3 +370,31 @@ def test_the_verb_prints_what_came_out_and_names_the_page(tmp_path: Path, capsys
         assert Path(file).is_file()
     path.write_text(path.read_text().replace("[exhaustive]", "[exhausting]"))
     assert main(words) == 2
+
+
+def test_a_number_of_stations_is_asked_about_once(tmp_path: Path) -> None:
+    path = written(tmp_path, "[exhaustive]\nmost = 2", study=STUDY.replace("metric =", "sizes = [2, 2]\nmetric ="))
+    with pytest.raises(BadFile, match="sizes has a number twice"):
+        load_placement_study(path)
+
+
+def test_the_pilot_is_announced_before_the_other_cells_and_is_part_of_the_study(tmp_path: Path) -> None:
+    tables = ["[exhaustive]", "fewest = 1", "most = 1"]
+    study = STUDY.replace("metric =", "sizes = [1]\nmetric =")
+    path = written(tmp_path, *tables, study=study)
+    announced: list[StatisticalPower] = []
+
+    def announce(power: StatisticalPower, notes: tuple[str, ...]) -> None:
+        announced.append(power)
+        assert not (tmp_path / "out" / FINDINGS).exists()
+        assert notes == ()
+
+    findings, _ = run_placement(path, tmp_path / "out", announce=announce, jobs=2)
+    (power,) = announced
+    assert (power.clips, power.sets, power.least_clips, power.pilot_sets, power.shown) == (2, 3, 7, 3, None)
+    assert power.cell_s is not None
+    assert power.duration_s == pytest.approx(3 * 2 * power.cell_s / 2.0)
+    assert power.least_duration_s == pytest.approx(3 * 7 * power.cell_s / 2.0)
+    assert findings.power == power
+    assert len(list((tmp_path / "out" / "cells").iterdir())) == 3 * 2
+    assert findings.sizes == (1,)

@@ -232,3 +232,12 @@ def test_the_best_that_was_tried_is_where_refining_may_begin() -> None:
     assert best_measured_set(2, costs) == min((START[:2], START[1:]), key=bowl)
     with pytest.raises(BadInput, match="no set of 4 stations"):
         best_measured_set(4, costs)
+
+
+def test_where_all_sets_have_one_size_a_contribution_is_without_it_against_with_it() -> None:
+    found = search_exhaustive(ExhaustiveOptions(2, 2, ("hand", "pelvis", "head")), UNITS, Truth(noise=0.0))
+    worth = {each.candidate: each.difference for each in found.worth}
+    assert worth["pelvis"] == pytest.approx((9.25 + 9.5 + 9.75) / 3.0 - (4.5 + 4.75 + 5.0) / 3.0)
+    assert worth["head"] == pytest.approx((4.5 + 4.75 + 9.25) / 3.0 - (5.0 + 9.5 + 9.75) / 3.0)
+    assert {each.mode for each in found.worth} == {"exhaustive"}
+    assert all(each.clips == len(CLIPS) for each in found.worth)
