@@ -7,7 +7,7 @@ time decides how sets are searched and on how many clips: see `plan_within_budge
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -188,8 +188,3 @@ def plan_within_budget(
         options = GreedyOptions(study.sizes[-1])
         study = replace(study, exhaustive=None, greedy=options)
     return study, scenario, note
-
-
-def describe_places(study: PlacementStudy) -> Mapping[str, str]:
-    """Name of each candidate -> where it is on the body."""
-    return {place.name: place.text for place in select_places([c.name for c in study.candidate])}
