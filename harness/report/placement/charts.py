@@ -119,7 +119,7 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
     return draw_chart(
         f"worth_{number}_{to_file_name(contributions[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
-        "Blue: the station lowers the error; orange: it raises it; grey: neither is significant. Whiskers: 95 % "
+        "Blue: sets with the station err less; orange: they err more; grey: neither is significant. Whiskers: 95 % "
         "interval over clips.",
         f"Contribution of candidates, {title}: {values}.",
         draw,
