@@ -50,13 +50,15 @@ def draw_chart(
     """
     import matplotlib
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     with matplotlib.rc_context(SETTINGS):
-        figure = Figure(figsize=(width_in, height_in), layout=layout)
+        figure = Figure(figsize=(width_in, height_in))
         draw(figure)
+        if layout and figure.axes:  # once, and not as the figure's engine, with which matplotlib would draw everything twice
+            ConstrainedLayoutEngine().execute(figure)
         names = mark_series(figure) if hover else []
         svg = to_svg(figure, name)
-        figure.set_layout_engine("none")  # to_svg has computed the layout; the PNG uses the same
         lines = {"names": names, "plots": describe_plots(figure)} if hover else None
         return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"", lines, titles or {})
 

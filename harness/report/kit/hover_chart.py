@@ -42,7 +42,7 @@ def mark_series(figure: "Figure") -> list[str]:
 def describe_plots(figure: "Figure") -> list[dict[str, Any] | None]:
     """Describe the axes with named lines: box in the SVG [pt], limits, scales and units; None for other axes.
 
-    The figure must have been drawn, because the layout is computed then.
+    The layout of the figure must have been computed.
     """
     return [
         _describe_plot(figure, axes) if any(not str(line.get_label()).startswith("_") for line in axes.lines) else None
