@@ -4,6 +4,7 @@ import io
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.summary import StreamSummary
-from harness.study.placement.config import base_scenario, load_placement_study
+from harness.study.placement.config import base_scenario, load_placement_study, load_scenario_beside
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
@@ -138,7 +139,8 @@ def _read_sweep(folder: Path) -> object:
 
 def _read_placement(folder: Path) -> object:
     study = load_placement_study(folder / "x.toml")
-    return [base_scenario(study, folder, condition) for condition in (None, *study.condition)]
+    load = partial(load_scenario_beside, beside=folder)
+    return [base_scenario(study, load, condition) for condition in (None, *study.condition)]
 
 
 def _read_options(folder: Path) -> object:
