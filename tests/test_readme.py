@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -30,14 +31,14 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 DEMO = load_scenario("demo")
 
 
-def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_documented_method_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the very command; `demo` is a shorter one here, a file of that name."""
     short_demo(tmp_path / "demo")
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    code = re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)[0]
     assert len(code.splitlines()) <= 40
     assert 'harness_gate("upright:Upright"' in OWN_METHOD  # tests/testing/test_regression_gate.py runs one
     (tmp_path / "upright.py").write_text(code)
-    command = next(c for c in commands(README) if c.startswith("run demo --methods"))
+    command = next(c for c in commands(OWN_METHOD) if c.startswith("run demo --methods"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     assert main([*shlex.split(command), "--no-report"]) == 0
@@ -45,14 +46,29 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
-    assert main(shlex.split(next(c for c in commands(README) if c.startswith("check ")))) == 0
+    assert main(shlex.split(next(c for c in commands(OWN_METHOD) if c.startswith("check ")))) == 0
 
 
-def test_the_entry_point_of_the_readme_gives_the_method_its_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_first_screen_of_the_readme_gives_a_verdict_on_an_own_method(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """By the very commands; `gate` is the short demo here, whose five clips are too few for a difference."""
+    first_screen = README.split("## Results")[0]
+    assert len(first_screen.splitlines()) <= 40
+    source, copy = re.findall(r"^    cp (\S+) (\S+)", first_screen, re.MULTILINE)[0]
+    shutil.copy(ROOT / source, tmp_path / copy)
+    short_demo(tmp_path / "gate")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    run, compare = (c for c in commands(first_screen) if c.startswith(("run ", "compare ")))
+    assert main([*shlex.split(run), "--no-report"]) == 0
+    assert main(shlex.split(compare)) == Outcome.NOT_COMPARABLE.exit_code
+    assert "too few clips: 5" in capsys.readouterr().out
+
+
+def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As an installer writes it: the package's folder beside its dist-info."""
-    (tmp_path / "upright.py").write_text(re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0])
+    (tmp_path / "upright.py").write_text(re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)[0])
     (project,) = re.findall(r"```toml\n(.*?)```", OWN_METHOD, re.DOTALL)
     points = tomllib.loads(project)["project"]["entry-points"]
     info = tmp_path / "upright-1.0.dist-info"
