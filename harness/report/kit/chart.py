@@ -55,7 +55,7 @@ def draw_chart(
     with matplotlib.rc_context(SETTINGS):
         figure = Figure(figsize=(width_in, height_in))
         draw(figure)
-        if layout and figure.axes:  # once, and not as the figure's engine, with which matplotlib would draw everything twice
+        if layout and figure.axes:  # not as the figure's engine, with which matplotlib draws everything twice
             ConstrainedLayoutEngine().execute(figure)
         names = mark_series(figure) if hover else []
         svg = to_svg(figure, name)
