@@ -7,7 +7,6 @@ when it is complete, so that a folder that exists is finished. cell.json has its
 import hashlib
 import io
 import json
-import os
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import flush, flush_together, temporary_path, to_json, to_json_types
+from harness.core.files import flush_together, move_into_place, temporary_path, to_json, to_json_types
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
@@ -217,8 +216,7 @@ def write_cell(out: Path, cell: Cell) -> Path:
         for name, data in files.items():
             (beside / name).write_bytes(data)
         flush_together(beside / name for name in files)
-        flush(beside)
-        os.replace(beside, folder)
+        move_into_place(beside, folder, flush_name=False)
     except OSError:
         if not folder.is_dir():  # else another process finished the same cell first
             raise

@@ -11,7 +11,6 @@ import pytest
 
 from harness.core import files
 from harness.errors import BadFile, BadInput
-from harness.results import cell
 from harness.results import index as index_module
 from harness.results.cell import as_row, cell_folder, write_cell
 from harness.results.index import INDEX_FILE, CellCounts, CellIndex
@@ -173,7 +172,7 @@ def test_files_of_a_cell_are_flushed_before_its_name_and_the_name_before_the_dig
         assert folder.exists() == (path.name == "cells")
         flushed.append(path.name)
 
-    for module in (files, cell, index_module):
+    for module in (files, index_module):
         monkeypatch.setattr(module, "flush", note)
     write_cell(tmp_path, made)
     assert sorted(flushed) == sorted(["cell.json", "frames.npz", files.temporary_path(folder).name])
