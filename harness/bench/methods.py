@@ -7,6 +7,7 @@ of its own for each method (`peak_memory`).
 
 import hashlib
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +58,9 @@ CLIP_S = 9.0
 MINK = "mink"
 WORKERS = 2
 MAX_P99_RATIO, MAX_MEMORY_RATIO, MAX_LARGE_RATIO = 3.0, 1.5, 1.3
+MAX_LEARNING_S = 60.0
+_COST_KEYS = ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio", "large_learning_s")
+"""Keys of the rows of a method's other costs in the JSON output, in their order."""
 
 
 def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkRow]:
@@ -82,6 +86,7 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkRow]:
                     costs[name].append(large_database_row(name, small, many, seed, bar))
                 peak_bytes = measure_peak_bytes(name, large_path, seed)
                 costs[name].append(memory_row(name, baseline_bytes, peak_bytes, len(many)))
+                costs[name].append(learning_row(name, many, seed))
             recalls = recall_rows(many, seed)
     rows = [row for speed in speeds for row in (*method_rows(speed, costs[speed.method]), *costs[speed.method])]
     return [*rows, *recalls]
@@ -107,7 +112,7 @@ def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[Bench
         "ratio_to_ik": to_ik,
         "ratio_to_mink": to_mink,
     }
-    for cost, key in zip(costs, ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio"), strict=False):
+    for cost, key in zip(costs, _COST_KEYS, strict=False):
         more[key] = cost.value
     reference = f"error {speed.error_deg:.2f} deg, options {options}; ik x {to_ik:.2f}, mink x {to_mink:.1f}"
     rows = [BenchmarkRow(name, speed.fps, "frames/s", reference, f">= {target}" if target else "", more)]
@@ -147,6 +152,15 @@ def large_database_row(
     )
     ratio = timings["small"].speed_ratio(timings["large"])
     return BenchmarkRow(f"{name}, larger / smaller database", ratio, "x", text, f"<= {MAX_LARGE_RATIO:g}")
+
+
+def learning_row(name: str, database: MotionDatabase, seed: int) -> BenchmarkRow:
+    """Time to learn from a database that lies on the disk."""
+    start_s, start_cpu_s = time.perf_counter(), time.process_time()
+    benchmark_clips.fit_named_method(name, database, seed)
+    wall_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s
+    label = f"{name}, learning from {len(database):,} frames"
+    return BenchmarkRow(label, wall_s, "s", f"{cpu_s:.1f} s CPU", f"<= {MAX_LEARNING_S:g}")
 
 
 def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[BenchmarkRow]:

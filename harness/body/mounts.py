@@ -9,6 +9,7 @@ bone's direction: +90 deg faces down on a left arm, up on a right arm, right on 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import mujoco
@@ -16,7 +17,7 @@ import numpy as np
 
 from harness.body import anatomy
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, immutable
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 
@@ -68,10 +69,12 @@ DEFAULT_MOUNTS: Mapping[str, Mount] = MappingProxyType(
 """Stations that scenarios name: the six of the first paper, the five of the second, and the feet."""
 
 
+@lru_cache(maxsize=256)
 def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     """Origin (3,) [m] and orientation `bone_from_station` (4,) of a station in the frame of its bone.
 
-    Raises UnknownName for the bone and BadInput where the bone has no surface at that place.
+    Both arrays are immutable, since later calls with the same skeleton return them again. Raises UnknownName for the
+    bone and BadInput where the bone has no surface at that place.
     """
     bone = skeleton.index(mount.bone)
     if not skeleton.length_m[bone] > 0.0:
@@ -91,7 +94,7 @@ def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     nominal = rotations.from_matrix(np.stack([along, np.cross(outward, along), outward], axis=1))
     offset_m = rotations.rotate(nominal, np.array(mount.offset_m))
     rotation = rotations.multiply(nominal, rotations.exp(np.array(mount.rotation_rad)))
-    return axis_m + (skin_m + mount.stand_off_m) * outward + offset_m, rotation
+    return immutable(axis_m + (skin_m + mount.stand_off_m) * outward + offset_m), immutable(rotation)
 
 
 def _zero_direction(along: Floats) -> Floats:

@@ -5,6 +5,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
@@ -75,15 +76,17 @@ def temporary_path(path: Path) -> Path:
     return path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
 
 
-def move_into_place(temporary: Path, path: Path) -> None:
+def move_into_place(temporary: Path, path: Path, *, flush_name: bool = True) -> None:
     """Flush a finished file or folder to the disk and rename it: readers see the old state or the new one, never less.
 
     An existing file is replaced; OSError when `path` is a folder with anything in it. Of a folder that is moved, the
-    files inside have to be flushed before (`flush`).
+    files inside have to be flushed before (`flush`). Without `flush_name` the new name is not flushed: a loss of power
+    may lose the file or folder, but leaves no part of it.
     """
     flush(temporary)
     os.replace(temporary, path)
-    flush(path.parent)
+    if flush_name:
+        flush(path.parent)
 
 
 def flush(path: Path) -> None:
@@ -95,6 +98,13 @@ def flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def flush_together(paths: Iterable[Path]) -> None:
+    """Flush several files at the same time: most file systems then write to the disk once."""
+    paths = list(paths)
+    with ThreadPoolExecutor(len(paths)) as pool:
+        list(pool.map(flush, paths))
 
 
 @contextmanager

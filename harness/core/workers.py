@@ -5,7 +5,7 @@ import signal
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -40,16 +40,30 @@ class Pool:
         self._begin()
 
     def __call__(
-        self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]]
+        self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], groups: Sequence[Hashable] = ()
     ) -> Generator[tuple[int, Future[R]], None, None]:
-        """Like `run_in_workers`. If the caller stops early, as after Ctrl-C, running tasks are stopped at once."""
+        """Like `run_in_workers`. If the caller stops early, as after Ctrl-C, running tasks are stopped at once.
+
+        Tasks of one group, if given, share preparation: a worker prefers those of its last group, then those of a group
+        that no other worker has.
+        """
+
+        def next_process() -> _WorkerProcess:
+            return next(process for process in self._processes if process.idle)
 
         def submit(index: int) -> Future[R]:
-            return next(process for process in self._processes if process.idle).submit(function, *tasks[index])
+            process = next_process()
+            process.group = groups[index] if groups else None
+            return process.submit(function, *tasks[index])
+
+        def choose(waiting: Sequence[int]) -> int:
+            own = next_process()
+            taken = {process.group for process in self._processes if process is not own}
+            return min(waiting, key=lambda index: (groups[index] != own.group, groups[index] in taken))
 
         complete = False
         try:
-            yield from schedule_tasks(submit, len(tasks), lambda: self._workers)
+            yield from schedule_tasks(submit, len(tasks), lambda: self._workers, choose=choose if groups else None)
             complete = True
         finally:
             if not complete:
@@ -75,12 +89,18 @@ class Pool:
 
 
 def schedule_tasks(
-    submit: Callable[[int], Future[R]], count: int, room: Callable[[], int], *, look_s: float | None = None
+    submit: Callable[[int], Future[R]],
+    count: int,
+    room: Callable[[], int],
+    *,
+    look_s: float | None = None,
+    choose: Callable[[Sequence[int]], int] | None = None,
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """Submit tasks 0 to `count` - 1, at most `room()` at a time; yields (index, future) as each task ends.
 
     A task whose worker died (BrokenExecutor) is submitted once more, alone, after all others: the worker may have died
     for lack of memory. The second result counts. `room` is called whenever a task ends, and every `look_s` seconds.
+    `choose` names the next of the waiting tasks, by default the first.
     """
     first, again, alone = deque(range(count)), deque[int](), set[int]()
     running: dict[Future[R], int] = {}
@@ -88,7 +108,8 @@ def schedule_tasks(
     while first or again or running or ended:
         places = room()
         while first and len(running) < places:
-            index = first.popleft()
+            index = choose(first) if choose else first[0]
+            first.remove(index)
             running[submit(index)] = index
         if again and not (first or running):
             index = again.popleft()
@@ -109,6 +130,8 @@ class _WorkerProcess:
 
     def __init__(self) -> None:
         self._last: Future[Any] | None = None
+        self.group: Hashable = None
+        """Group of the last task."""
         self._renew()
 
     @property

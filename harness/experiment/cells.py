@@ -79,6 +79,11 @@ class ClipTask:
     """See `PlannedCell.label`."""
     isolation: Isolation = DEFAULT_ISOLATION
 
+    @property
+    def group(self) -> tuple[str, int, str, str]:
+        """Tasks with equal groups share motion and training in one process."""
+        return self.scenario.name, self.scenario.seed, str(self.part), self.behaviour
+
     def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
         return [

@@ -23,6 +23,7 @@ from typing import Any, Protocol, TypeVar
 from harness.core.interrupts import shield_children
 from harness.core.workers import Pool, schedule_tasks
 from harness.errors import BadInput, MissingExtra
+from harness.experiment.cells import ClipTask
 from harness.results.manifest import source_hash
 
 R = TypeVar("R")
@@ -66,7 +67,8 @@ def process_executor(jobs: int) -> Iterator[TaskExecutor]:
 def _run_on_pool(
     pool: Pool, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    return pool(_run_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks])
+    groups = [next((part.group for part in task if isinstance(part, ClipTask)), None) for task in tasks]
+    return pool(_run_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks], groups)
 
 
 def run_in_process(

@@ -8,7 +8,7 @@ from typing import TypeVar
 from harness.core.split import ClipPart
 from harness.experiment.cells import ClipTask, PlannedCell
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.scenario import Scenario, count_variants, variants
 from harness.mocap.library import LibraryFolders, absolute_folders
 
 T = TypeVar("T")
@@ -58,7 +58,7 @@ def plan_tasks(
     shared = max(min(len(clips), workers), 1)
     tasks = []
     for place, task in enumerate(clips):
-        count = len(variants(task.scenario))
+        count = count_variants(task.scenario)
         pieces = -(-_TASKS_PER_WORKER * workers // shared) if workers > 1 and place >= len(clips) - shared else 1
         cells_per_variant = len(task.scenario.inputs) * len(task.scenario.methods)
         pieces = max(pieces, -(-count * cells_per_variant // MAX_CELLS_PER_TASK))
@@ -74,7 +74,7 @@ def plan_tasks(
 
 def split_task(task: ClipTask) -> list[ClipTask]:
     """One task for each cell of a task."""
-    chosen = task.chosen or range(len(variants(task.scenario)))
+    chosen = task.chosen or range(count_variants(task.scenario))
     return [
         replace(task, scenario=replace(task.scenario, methods=(method,), inputs=(inputs,)), chosen=(place,))
         for place in chosen

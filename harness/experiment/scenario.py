@@ -2,6 +2,7 @@
 
 import fnmatch
 import itertools
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -287,6 +288,11 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
             raise BadInput(f"vary: {error}.", "A value must be one that the scenario's own key may have.") from error
         found.append((varied, variant))
     return found
+
+
+def count_variants(scenario: Scenario) -> int:
+    """Number of combinations of varied values, as `variants` lists them."""
+    return math.prod(len(values) for _, values in dotted_keys(scenario.vary))
 
 
 def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

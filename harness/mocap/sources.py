@@ -57,6 +57,11 @@ def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, 
     return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
 
 
+@cache
+def _synthetic_names() -> frozenset[str]:
+    return frozenset(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
+
+
 class SyntheticSource:
     """Takes of the motion generator; `seed` is the scenario's."""
 
@@ -70,7 +75,7 @@ class SyntheticSource:
         return tuple(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
 
     def check(self, name: str) -> None:
-        if name not in self.names():
+        if name not in _synthetic_names():
             raise UnknownName("synthetic take", name, self.names())
 
     def subject(self, name: str) -> str:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import flush, move_into_place, temporary_path, to_json, to_json_types
+from harness.core.files import flush_together, move_into_place, temporary_path, to_json, to_json_types
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
@@ -190,7 +190,10 @@ def has_cell(out: Path, key: str) -> bool:
 
 
 def write_cell(out: Path, cell: Cell) -> Path:
-    """Write a finished cell into a folder; one that exists already stays as it is."""
+    """Write a finished cell into a folder; one that exists already stays as it is.
+
+    The cell reaches the disk whole or not at all. Its name does so with later ones, when the index gets its digest.
+    """
     folder = cell_folder(out, cell.key)
     beside = temporary_path(folder)
     shutil.rmtree(beside, ignore_errors=True)
@@ -212,9 +215,8 @@ def write_cell(out: Path, cell: Cell) -> Path:
         beside.mkdir(parents=True)
         for name, data in files.items():
             (beside / name).write_bytes(data)
-        for name in files:  # after both writes, so that most data reach the disk in one flush
-            flush(beside / name)
-        move_into_place(beside, folder)
+        flush_together(beside / name for name in files)
+        move_into_place(beside, folder, flush_name=False)
     except OSError:
         if not folder.is_dir():  # else another process finished the same cell first
             raise

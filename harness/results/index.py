@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from harness.core.files import TEMPORARY, content_key, to_json_types
+from harness.core.files import TEMPORARY, content_key, flush, to_json_types
 from harness.core.input_file import check_input_file
 from harness.core.parsing import parse_json
 from harness.errors import BadFile
@@ -209,7 +209,12 @@ class CellIndex:
             )
 
     def write_digest(self, files: Mapping[str, str]) -> None:
-        """Store the digests of other files of the folder, and then that of the whole index."""
+        """Store the digests of other files of the folder, and then that of the whole index.
+
+        The names of the finished cells are flushed to the disk before.
+        """
+        if self._cells.is_dir():
+            flush(self._cells)
         with self._db:
             self._db.executemany("INSERT OR REPLACE INTO digests VALUES (?, ?)", files.items())
             self._db.execute("INSERT OR REPLACE INTO digests VALUES (?, ?)", (INDEX_FILE, _content_digest(self._db)))

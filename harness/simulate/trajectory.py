@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
-from harness.core.humanoid24 import QPOS_OF_DOF, unpack
+from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
@@ -72,15 +72,15 @@ class Trajectory:
         at_m, turned, speed, acceleration, omega = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
         return StationMotion(time_s, at_m, rotations.continuous(turned), speed, acceleration, omega)
 
-    def _derivatives(self, time_s: Floats, order: int) -> list[Floats]:
-        """`qpos`, `qvel` and `qacc`, up to the given order."""
+    def _derivatives(self, time_s: Floats, order: int, spline: PPoly | None = None) -> list[Floats]:
+        """`qpos`, `qvel` and `qacc`, up to the given order; with `spline`, of the root and of its hinges alone."""
         t = np.asarray(time_s, dtype=float)
         if t.size and not (t.min() >= -1e-9 and t.max() <= self.duration_s + 1e-9):
             raise BadInput(
                 f"A time between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
                 f"It runs from 0 to {self.duration_s:.3f} s.",
             )
-        splined: list[Floats] = [self._spline(t, k) for k in range(order + 1)]
+        splined: list[Floats] = [(spline or self._spline)(t, k) for k in range(order + 1)]
         # Let p be the splined quaternion, n its length, q = p/n. Components of q' and q'' along q do not change the
         # angular velocity 2 conj(q) q' and its derivative 2 conj(q) q'': conj(q) q and conj(q') q' are scalars.
         p = splined[0][:, 3:7]
@@ -98,19 +98,26 @@ class Trajectory:
     def _station_row(self, calibration: Calibration, row: int, time_s: Floats) -> tuple[Floats, ...]:
         """Position, orientation, velocity, acceleration and angular velocity of a station, from bone to bone."""
         skeleton = self.body.skeleton
-        q, v, a = self._derivatives(time_s, 2)
-        at, turned, angle = unpack(q)
-        rate, hinge_acceleration = v[:, 6:][:, QPOS_OF_DOF], a[:, 6:][:, QPOS_OF_DOF]
-        point = _PointMotion(at, v[:, :3], a[:, :3])
-        omega, alpha = rotations.rotate(turned, v[:, 3:6]), rotations.rotate(turned, a[:, 3:6])
         chain = _chain(skeleton, calibration.bones[row])
-        for bone in chain:
-            hinges = skeleton.dof_of_bone[bone]
-            for d in range(hinges.stop - 1, hinges.start - 1, -1):
+        hinges_of = [
+            range(where.stop - 1, where.start - 1, -1) for where in map(skeleton.dof_of_bone.__getitem__, chain)
+        ]
+        hinges = [d for own in hinges_of for d in own]
+        columns = [*range(7), *(7 + QPOS_OF_DOF[hinges])]  # other hinges do not move the station
+        spline = PPoly.construct_fast(self._spline.c[:, :, columns], self._spline.x)
+        q, v, a = self._derivatives(time_s, 2, spline)
+        turned, rate, hinge_acceleration = q[:, 3:7], v[:, 6:, None], a[:, 6:, None]
+        turns = rotations.exp(q[:, 7:, None] * skeleton.axes[hinges])
+        point = _PointMotion(q[:, :3], v[:, :3], a[:, :3])
+        omega, alpha = rotations.rotate(turned, v[:, 3:6]), rotations.rotate(turned, a[:, 3:6])
+        place = 0
+        for bone, own in zip(chain, hinges_of, strict=True):
+            for d in own:
                 axis = rotations.rotate(turned, skeleton.axes[d])
-                alpha = alpha + hinge_acceleration[:, d, None] * axis + rate[:, d, None] * _cross(omega, axis)
-                omega = omega + rate[:, d, None] * axis
-                turned = rotations.multiply(turned, rotations.exp(angle[:, d, None] * skeleton.axes[d]))
+                alpha = alpha + hinge_acceleration[:, place] * axis + rate[:, place] * _cross(omega, axis)
+                omega = omega + rate[:, place] * axis
+                turned = rotations.multiply(turned, turns[:, place])
+                place += 1
             if bone != chain[-1]:
                 point = point.at_offset(rotations.rotate(turned, skeleton.bone_m[bone]), omega, alpha)
         point = point.at_offset(rotations.rotate(turned, calibration.mount_m[row]), omega, alpha)

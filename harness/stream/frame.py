@@ -4,9 +4,12 @@ Simulator, recording and serial port all yield these frames, and methods see not
 (w, x, y, z). `a_from_b` maps coordinates of b to a.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from harness.core.arrays import Bools, Floats, freeze
 
@@ -37,6 +40,48 @@ class TrackerFrame:
         freeze(self, measured_s=(stations,), position_m=(stations, 3), tracker_from_station=(stations, 4))
         freeze(self, quality=(stations,))
         freeze(self, bool, position_valid=(stations,), orientation_valid=(stations,), suspect=(stations,))
+
+
+def split_frames(
+    received_s: Sequence[float],
+    measured_s: Floats,
+    position_m: Floats,
+    tracker_from_station: Floats,
+    position_valid: Bools,
+    orientation_valid: Bools,
+    quality: Floats,
+    suspect: Bools,
+) -> list[TrackerFrame]:
+    """The F frames of arrays (F, ...) of the fields of `TrackerFrame`, in a tenth of the time of F calls of it.
+
+    Every frame has memory of its own, so that none leads to a later one. Raises ShapeError if the arrays disagree
+    about the stations, and ValueError if they disagree about F.
+    """
+    if not len(received_s):
+        return []
+    arrays = (measured_s, position_m, tracker_from_station, position_valid, orientation_valid, quality, suspect)
+    first = TrackerFrame(received_s[0], *(array[0] for array in arrays))  # checks the shapes and converts
+    columns = [_split_rows(array, getattr(first, name)) for name, array in zip(_ARRAYS, arrays, strict=True)]
+    frames = []
+    for time_s, *row in zip(received_s, *columns, strict=True):
+        frame = object.__new__(TrackerFrame)
+        _SET_RECEIVED(frame, time_s)
+        for set_field, values in zip(_SET_ARRAYS, row, strict=True):
+            set_field(frame, values)
+        frames.append(frame)
+    return frames
+
+
+_ARRAYS = tuple(TrackerFrame.__slots__[1:])
+_SET_RECEIVED, *_SET_ARRAYS = (getattr(TrackerFrame, name).__set__ for name in TrackerFrame.__slots__)
+"""Setters of the fields that bypass the frozen class."""
+
+
+def _split_rows(array: NDArray[Any], first: NDArray[Any]) -> list[NDArray[Any]]:
+    """The rows of an array as immutable arrays like `first`, each over `bytes` of its own (see `core.arrays`)."""
+    data, size = np.asarray(array, first.dtype, order="C").tobytes(), first.nbytes
+    shape, kind = first.shape, first.dtype
+    return [np.ndarray(shape, kind, data[at : at + size]) for at in range(0, len(data), size)]
 
 
 class TrackerStream(Protocol):

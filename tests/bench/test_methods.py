@@ -1,6 +1,7 @@
 """The benchmark of methods reports what was measured, on a database small enough for a test."""
 
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,16 @@ def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.Monke
     row = methods.large_database_row("weighted_blend", learnt, learnt, 1, lambda *_: None)
     assert 0.3 < row.value < 3.0
     assert row.target == "<= 1.3"
+
+
+def test_learning_is_timed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    learnt = MotionDatabase.open(folder)
+    monkeypatch.setattr(methods.benchmark_clips, "fit_named_method", lambda *_: time.sleep(0.2))
+    row = methods.learning_row("weighted_blend", learnt, 1)
+    assert 0.2 <= row.value < 2.0
+    assert (row.unit, row.target) == ("s", "<= 60")
+    assert row.name == f"weighted_blend, learning from {len(learnt):,} frames"
+    assert float(row.reference.split()[0]) < row.value
 
 
 def test_options_change_the_hash() -> None:

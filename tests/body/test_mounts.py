@@ -126,3 +126,9 @@ def test_rays_see_the_flesh() -> None:
     eye_m = data.body("thorax").xpos + np.array([1.0, 0.0, 0.06])
     mujoco.mj_ray(model, data, eye_m, np.array([-1.0, 0.0, 0.0]), None, 1, -1, hit)
     assert model.geom(int(hit[0])).name == "thorax"
+
+
+def test_a_place_that_was_found_before_cannot_be_changed() -> None:
+    for array in mounts.locate_mount(STANDARD, DEFAULT_MOUNTS["head"]):
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            array.flags.writeable = True

@@ -93,3 +93,16 @@ def test_a_digest_notices_a_change_of_one_value(rng: np.random.Generator) -> Non
     changed[57, 1] += 1.1e-5
     assert files.digest(changed) != files.digest(values)
     assert files.digest(values.reshape(300)) != files.digest(values)
+
+
+def test_files_are_flushed_together_and_a_fault_is_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    descriptors: list[int] = []
+    monkeypatch.setattr(os, "fsync", descriptors.append)
+    paths = [tmp_path / "a", tmp_path / "b"]
+    paths[0].touch()
+    with pytest.raises(FileNotFoundError):
+        files.flush_together(iter(paths))
+    paths[1].touch()
+    descriptors.clear()
+    files.flush_together(iter(paths))
+    assert len(descriptors) == 2

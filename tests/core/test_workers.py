@@ -7,14 +7,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from harness.core.interrupts import SIGNALS
-from harness.core.workers import Pool, run_in_workers
+from harness.core.workers import Pool, run_in_workers, schedule_tasks
 
 
 def test_every_task_is_called_once_in_another_process() -> None:
@@ -152,3 +152,33 @@ def test_stopping_early_stops_what_runs() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_order_of_tasks_does_not_matter_to_their_number(workers: int) -> None:
     assert sorted(which for which, _ in run_in_workers(abs, [(-n,) for n in range(5)], workers)) == [0, 1, 2, 3, 4]
+
+
+def _sleep_and_name_process() -> int:
+    time.sleep(0.3)
+    return os.getpid()
+
+
+def test_a_worker_stays_with_the_tasks_of_its_group() -> None:
+    pool = Pool(2)
+    try:
+        list(pool(_sleep_and_name_process, [()] * 2))  # both processes run from here on
+        ended = pool(_sleep_and_name_process, [()] * 6, ["a", "a", "a", "b", "b", "b"])
+        pids = [pid for _, pid in sorted((index, future.result()) for index, future in ended)]
+    finally:
+        pool.close()
+    assert pids == [pids[0]] * 3 + [pids[3]] * 3
+    assert pids[0] != pids[3]
+
+
+def test_the_next_task_can_be_chosen() -> None:
+    begun: list[int] = []
+
+    def submit(index: int) -> Future[int]:
+        begun.append(index)
+        future = Future[int]()
+        future.set_result(index)
+        return future
+
+    ended = list(schedule_tasks(submit, 4, lambda: 1, choose=lambda waiting: waiting[-1]))
+    assert begun == [which for which, _ in ended] == [3, 2, 1, 0]

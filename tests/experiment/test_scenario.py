@@ -8,7 +8,14 @@ import pytest
 from harness.core.fields import replace_fields
 from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
-from harness.experiment.scenario import Station, expand_clips, load_scenario, shipped_scenarios, variants
+from harness.experiment.scenario import (
+    Station,
+    count_variants,
+    expand_clips,
+    load_scenario,
+    shipped_scenarios,
+    variants,
+)
 from harness.results.cell import varied_text
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.lost_station import LostStation
@@ -202,6 +209,7 @@ def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> Non
     assert last.components == {"echo": {"size_m": [0.1, 0.2], "share": 0.05}}
     assert last.vary == {}
     assert variants(last) == [({}, last)]
+    assert [count_variants(scenario), count_variants(last)] == [4, 1]
 
 
 def test_what_is_worn_is_taken_from_the_stations_in_their_order(tmp_path: Path) -> None:

@@ -146,6 +146,22 @@ def test_workers_of_a_cluster_of_whom_some_are_killed_give_the_bytes_of_one(tmp_
     assert kept(tmp_path / "one") == kept(tmp_path / "many")
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("distributed") is None, reason="no Dask: extra `cluster` is not installed")
+def test_two_thousand_cells_of_a_cluster_that_loses_one_of_two_workers_are_those_of_one_process(tmp_path: Path) -> None:
+    motion = replace(NOISY.motion, longest_s=1.2)
+    shares = {"components.echo.share": [n / 2000 for n in range(1000)]}
+    scenario = replace(NOISY, motion=motion, vary=shares, methods=("mean_pose",))
+    with dask_executor("local", workers=2) as each, killing(tmp_path / "many", lambda count: count >= 500) as killed:
+        many = ran(tmp_path / "many", each, scenario)
+    assert len(killed) == 1
+    assert many.failures == {}
+    assert len(many.rows) == many.planned == 2000
+    one = ran(tmp_path / "one", run_in_process, scenario, workers=1)
+    assert told(one) == told(many)
+    assert kept(tmp_path / "one") == kept(tmp_path / "many")
+
+
 STUDY = """
 schema = 1
 scenarios = ["demo"]

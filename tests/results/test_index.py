@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from harness.core import files
 from harness.errors import BadFile, BadInput
-from harness.results.cell import as_row
+from harness.results import index as index_module
+from harness.results.cell import as_row, cell_folder, write_cell
 from harness.results.index import INDEX_FILE, CellCounts, CellIndex
 from harness.results.lock import folder_lock, is_running
 from harness.results.storage import read_cells
@@ -156,6 +158,28 @@ def test_groups_average_each_clip_first(run: Path, tmp_path: Path) -> None:
     assert (group["cells"], group["clips"], group["varied"]) == (4, 2, {"noise": "clean"})
     assert group["metrics"]["mpjpe_mm"] == {"mean": 4.0, "sd": pytest.approx(8.0**0.5), "clips": 2}
     assert set(group["metrics"]) == set(SUMMARY_METRICS)
+
+
+def test_files_of_a_cell_are_flushed_before_its_name_and_the_name_before_the_digest(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the index counts as finished survives a loss of power."""
+    flushed: list[str] = []
+    made = next(iter(read_cells(run)))
+    folder = cell_folder(tmp_path, made.key)
+
+    def note(path: Path) -> None:
+        assert folder.exists() == (path.name == "cells")
+        flushed.append(path.name)
+
+    for module in (files, index_module):
+        monkeypatch.setattr(module, "flush", note)
+    write_cell(tmp_path, made)
+    assert sorted(flushed) == sorted(["cell.json", "frames.npz", files.temporary_path(folder).name])
+    assert flushed[-1] == files.temporary_path(folder).name
+    with CellIndex(tmp_path) as index:
+        index.write_digest({})
+    assert flushed[-1] == "cells"
 
 
 def test_a_folder_has_one_coordinator(tmp_path: Path) -> None:

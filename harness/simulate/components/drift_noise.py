@@ -1,6 +1,7 @@
 """Slow drift of position and orientation."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -42,6 +43,6 @@ def gauss_markov(white: Floats, correlation: float) -> Floats:
     """Gauss-Markov sequences (N, ...) of unit variance and the given lag-1 correlation, from white noise."""
     out: Floats = white * np.sqrt(1.0 - correlation**2)
     out[:1] = white[:1]
-    for k in range(1, len(out)):
-        out[k] += correlation * out[k - 1]
+    for previous, row in pairwise(out.reshape(len(out), -1)):
+        row += correlation * previous
     return out

@@ -7,10 +7,12 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.stream.codec.clock import TimeOrder
 from harness.stream.codec.readings import Readings, concatenate_readings
-from harness.stream.frame import TrackerFrame
+from harness.stream.frame import TrackerFrame, split_frames
 
 TIMEOUT_PERIODS = 1.5
 """A frame that lacks stations is closed after this many periods."""
+_SEQUENTIAL_BELOW = 24
+"""Up to this many readings are split faster one by one than all at once."""
 _NEVER = -np.inf
 
 
@@ -65,7 +67,7 @@ class FrameAssembler:
         if len(new_readings) == 0:
             return []
         readings = new_readings if self._open is None else concatenate_readings([self._open, new_readings])
-        frame, suspect = self._split(readings)
+        frame, suspect = self._split_whole_rounds(readings) or self._split(readings)
         readings = readings.with_suspect(suspect)
         open_from = int(np.searchsorted(frame, frame[-1]))
         if len(readings) - open_from == self._stations:
@@ -88,6 +90,27 @@ class FrameAssembler:
         """Return the unfinished frame."""
         readings, self._open, self._round = self._open, None, self._round_after
         return [] if readings is None else self._frames(readings, np.zeros(len(readings), dtype=np.int64))
+
+    def _split_whole_rounds(self, readings: Readings) -> tuple[Ints, Bools] | None:
+        """The result of `_split` for rounds without a gap or a doubt, all at once; None for any other readings."""
+        count, size, state = len(readings), self._stations, self._round
+        if count <= _SEQUENTIAL_BELOW or not np.array_equal(readings.station, np.arange(count) % size):
+            return None
+        stamp_s, first_s = readings.measured_s, readings.measured_s[::size]
+        round_s = np.diff(first_s, prepend=state.first_s)
+        in_order = np.all(np.diff(stamp_s, prepend=state.previous_s) >= 0.0)
+        on_time = np.all(stamp_s - np.repeat(first_s, size)[:count] < self._period_s)
+        apart = round_s[0] >= self._shortest_gap_s(state.first_station, 0)
+        if not (in_order and on_time and apart and np.all(round_s[1:] >= self._shortest_gap_s(0, 0))):
+            return None  # also where a stamp is NaN
+        last, everyone = size * (len(first_s) - 1), (1 << size) - 1
+        before = last - size  # where the last round but one begins; there are at least two rounds
+        seen_before = everyone if before > 0 else state.seen
+        begins_s, host_s = stamp_s.item, readings.received_s.item
+        self._round = _RoundState(begins_s(before), 0, begins_s(last - 1), host_s(before), 0, everyone, seen_before)
+        seen = (1 << (count - last)) - 1
+        self._round_after = _RoundState(begins_s(last), 0, begins_s(count - 1), host_s(last), 0, seen, everyone)
+        return np.arange(count) // size, readings.suspect.copy()
 
     def _split(self, readings: Readings) -> tuple[Ints, Bools]:
         """Return the frame (N,) of each reading, counted from 0, and which readings (N,) are suspect.
@@ -177,12 +200,15 @@ class FrameAssembler:
             to_frames(readings.quality, missing=0.0),
             to_frames(suspect, missing=0.0) > 0.0,
         )
-        return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
+        return split_frames(*columns)
 
     def _received_times_s(self, readings: Readings, frame: Ints) -> Floats:
         """Time of the last reading of each frame (F,) [s]; strictly increasing, if only by one rounding step."""
         last = np.append(np.flatnonzero(np.diff(frame)), len(frame) - 1)
-        out = np.maximum.accumulate(readings.received_s[last])
+        out: Floats = np.maximum.accumulate(readings.received_s[last])
+        if np.all(np.diff(out, prepend=self._received_s) > 0.0):
+            self._received_s = float(out[-1])
+            return out
         for i, received_s in enumerate(out.tolist()):
             if received_s <= self._received_s:
                 out[i] = np.nextafter(self._received_s, np.inf)

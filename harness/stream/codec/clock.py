@@ -17,6 +17,9 @@ is known to 10 %."""
 MAX_STAMP_S = 1e7
 """Stamps beyond this are damaged: 32-bit milliseconds have a step of one second there [s]."""
 
+_FIRST_CHUNK = 32
+"""Number of records in the first chunk that is checked at once; each further chunk is twice as long."""
+
 _Moment = tuple[float, float]
 """Device time and host time of a record [s]."""
 
@@ -53,6 +56,15 @@ class ClockUnwrapper:
 
         NaN stands for damaged stamps.
         """
+        out: Floats = np.empty(len(stamp_s))
+        start, count = 0, _FIRST_CHUNK
+        while start < len(out):
+            rows = slice(start, start + count)
+            out[rows] = self._unwrap_chunk(stamp_s[rows], received_s[rows], station[rows])
+            start, count = start + count, 2 * count
+        return out
+
+    def _unwrap_chunk(self, stamp_s: Floats, received_s: Floats, station: Ints) -> Floats:
         out: Floats = stamp_s + self._epoch_s
         if self._all_sound(out, received_s, station):
             for row in np.unique(station).tolist():

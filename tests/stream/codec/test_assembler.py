@@ -218,3 +218,56 @@ def test_without_stamps_a_station_that_stays_silent_is_no_sign_of_damage(silent:
     out = assemble(with_columns(readings, measured_s=np.full(len(readings), np.nan), received_s=received_s))
     assert valid_stations(out) == [[s for s in range(4) if s not in silent]] * 6
     assert suspect_rows(out) == []
+
+
+def _split_state(assembler: FrameAssembler) -> tuple[object, object]:
+    return assembler._round, assembler._round_after
+
+
+@pytest.mark.parametrize("stations", [1, 2, 4])
+@pytest.mark.parametrize("count", [25, 26, 27, 28, 57])
+def test_whole_rounds_are_split_at_once_as_one_by_one(stations: int, count: int, rng: np.random.Generator) -> None:
+    """Frames, doubts and the state for the next readings are the same, at the beginning and later."""
+    early = rng.uniform(0.0, 0.1, 100)
+    readings = make_readings(*[(r - float(early[int(r)]), s) for r, s in rounds(100, stations)])
+    readings = with_columns(readings, suspect=rng.random(len(readings)) < 0.1)
+    at_once, one_by_one = FrameAssembler(stations, PERIOD_S), FrameAssembler(stations, PERIOD_S)
+    for part in (readings[:28], readings[28 : 28 + count]):
+        split, expected = at_once._split_whole_rounds(part), one_by_one._split(part)
+        assert split is not None
+        for a, b in zip(split, expected, strict=True):
+            np.testing.assert_array_equal(a, b)
+        assert _split_state(at_once) == _split_state(one_by_one)
+        for assembler in (at_once, one_by_one):
+            assembler._round = assembler._round_after
+
+
+DOUBTS = {
+    "steps back": (13, -1.6 * PERIOD_S),
+    "late in its round": (14, PERIOD_S),
+    "next round too early": (16, -0.6 * PERIOD_S),
+    "no stamp": (14, np.nan),
+    "no stamp at first": (0, np.nan),
+    "no stamp at last": (31, np.nan),
+}
+
+
+@pytest.mark.parametrize("doubt", DOUBTS)
+def test_rounds_with_a_doubt_are_split_one_by_one(doubt: str) -> None:
+    readings = make_readings(*rounds(8))
+    at, shift_s = DOUBTS[doubt]
+    measured_s = readings.measured_s.copy()
+    measured_s[at] += shift_s
+    assert FrameAssembler(4, PERIOD_S)._split_whole_rounds(readings) is not None
+    assert FrameAssembler(4, PERIOD_S)._split_whole_rounds(with_columns(readings, measured_s=measured_s)) is None
+
+
+def test_rounds_that_follow_too_early_are_split_one_by_one() -> None:
+    assembler = FrameAssembler(4, PERIOD_S)
+    assembler.add(make_readings((-0.3, 0), (-0.3, 1), (-0.3, 2), (-0.3, 3)))
+    assert assembler._split_whole_rounds(make_readings(*rounds(8))) is None
+
+
+def test_missing_stations_are_split_one_by_one() -> None:
+    readings = make_readings(*[pair for pair in rounds(9) if pair != (4, 2)])
+    assert FrameAssembler(4, PERIOD_S)._split_whole_rounds(readings) is None
