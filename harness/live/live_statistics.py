@@ -26,7 +26,7 @@ class SecondSummary:
     """What happened in about one second of a session."""
 
     end_s: float
-    """End of the second, since the start of the session [s]."""
+    """End of the second, since the first frame [s]."""
     rate_hz: float
     """Frames with a pose per second [Hz]."""
     held: int
@@ -51,6 +51,8 @@ class LiveStatistics:
     def __init__(self, stations: tuple[str, ...], clock: Callable[[], float]) -> None:
         self.stations = stations
         self._clock, self._lock = clock, Lock()
+        self._began = False
+        """Whether a frame has arrived. Earlier frames may serve a calibration, and the first second waits for them."""
         self._began_s = self._second_s = self._frame_s = clock()
         self._seen_s: Floats = np.full(len(stations), self._began_s)
         """Time of the last valid reading of each station [s]."""
@@ -63,6 +65,9 @@ class LiveStatistics:
         """Add a frame, the status of its pose and the time from its last byte to the pose [s]."""
         now_s, valid = self._clock(), frame.position_valid | frame.orientation_valid
         with self._lock:
+            if not self._began:
+                self._began, self._began_s, self._second_s = True, now_s, now_s
+                self._seen_s[:] = now_s
             self._frame_s = now_s
             self._seen_s[valid] = now_s
             self._second.add(frame.quality, valid, status, latency_s)
@@ -74,6 +79,8 @@ class LiveStatistics:
         """
         now_s = self._clock()
         with self._lock:
+            if not self._began:
+                return []
             second, began_s = self._second, self._second_s
             if over := now_s - began_s >= 1.0:
                 self._second, self._second_s = _Second(len(self.stations)), now_s
