@@ -9,6 +9,7 @@ from harness.bench.neighbour_search import bench_index
 from harness.bench.regression_gate import bench_regression_gate
 from harness.bench.rejected_readings import bench_rejected_readings
 from harness.bench.rows import BenchmarkRow
+from harness.bench.serve import bench_serve
 from harness.bench.simulated_stream import bench_stream
 from harness.bench.startup import bench_startup
 from harness.bench.sweep import bench_sweep
@@ -46,6 +47,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "load": lambda seed, large, runs: bench_load(seed),
     "stream": lambda seed, large, runs: bench_stream(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
+    "serve": lambda seed, large, runs: bench_serve(seed, runs=runs),
     "ik": _ik,
     "index": _index,
     "methods": _methods,
@@ -67,7 +69,7 @@ def run_benchmarks(
     """Run the named benchmarks, or all; returns their rows, and the reasons why some of all could not run.
 
     With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
-    `wire` runs each line `runs` times.
+    `wire` runs each line `runs` times, and so does `serve`.
     UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed.
     """
     for name in names:

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import asdict
@@ -19,6 +18,7 @@ from harness.commands.common import (
     positive_float,
     print_result,
     print_status,
+    show_progress,
 )
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from harness.core.calibration import Calibration
     from harness.experiment.playback import Playback
     from harness.live.pose import Output
-    from harness.stream.driver import LineEvent, Tracker
+    from harness.stream.driver import Tracker
+    from harness.stream.event_counter import EventCounter
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -93,6 +94,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
+    from harness.stream.event_counter import EventCounter
 
     options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
@@ -101,7 +103,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
         playback = playback.with_calibration(read_calibration(args.calibration))
     method = resolve_method(args.method, DEFAULT_ISOLATION)
-    events: list[LineEvent] = []
+    events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":
         playback = playback.with_calibration(_calibrate_by_poses(args, playback, events))
     with ExitStack() as opened:
@@ -125,6 +127,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 outputs,
                 plan,
                 say=print_status,
+                progress=show_progress,
             )
         beside = floor.finish()
         content = {
@@ -134,30 +137,25 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
             "rate_hz": rate_hz,
             **summary.as_dict(done, beside),
             "line": device.counts,
-            "events": [asdict(event) for event in events],
+            "events": [asdict(event) for event in events.events],
         }
-    kinds = Counter(event.kind for event in events)
-    line = [f"{name} {count}" for name, count in (device.counts | kinds).items()]
+    line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
     outcome = Outcome.PASS if (done.poses or done.stopped) and not done.failed else Outcome.INCOMPLETE
     return print_result(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
 
 
 @contextmanager
-def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "Iterator[Tracker]":
+def _open_device(args: argparse.Namespace, playback: "Playback", events: "EventCounter") -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
     from harness.stream.codec.items import position_range_m
     from harness.stream.driver import DriverConfig, open_tracker
-
-    def happened(event: "LineEvent") -> None:
-        events.append(event)
-        print_status(f"line: {event.text}")
 
     tracker = playback.tracker
     stations = tuple(playback.scenario.stations)
     options = {"items": tracker.items, **line_options(args)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
     config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
-    with open_tracker(args.port, config, on_event=happened) as device:
+    with open_tracker(args.port, config, on_event=events) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
             raise BadInput(
@@ -201,7 +199,7 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
     return outputs
 
 
-def _calibrate_by_poses(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "CalibrationFile":
+def _calibrate_by_poses(args: argparse.Namespace, playback: "Playback", events: "EventCounter") -> "CalibrationFile":
     """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.live.pose_terminal import PoseTerminal

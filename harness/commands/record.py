@@ -50,6 +50,11 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--send", action="append", metavar="CMD", help=text)
     text = "allow --send of commands that write the device's memory, restart it, or are in no source"
     verb.add_argument("--allow-writes", action="store_true", help=text)
+    text = (
+        "another program configures and uses the device, at a pseudo terminal under this name, while everything is "
+        "recorded"
+    )
+    verb.add_argument("--serve", type=Path, metavar="LINK", help=text)
     verb.add_argument("--clip", metavar="CLIP", help="with sim: clip to play (default: the scenario's first)")
     verb.add_argument("--noise", metavar="PRESET", help="with sim: clean, noise or default (default: the scenario's)")
     text = "with sim: play the calibration poses of `harness calibrate` instead of the clip"
@@ -60,7 +65,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in (*LINE_FLAGS, "send"):
+        for name in (*LINE_FLAGS, "send", "serve"):
             if getattr(args, name) is not None:
                 raise BadInput(
                     f"--{name.replace('_', '-')} with {args.port}.",
@@ -72,6 +77,8 @@ def run_record(args: argparse.Namespace) -> Outcome:
             raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out.")
     if args.allow_writes and args.send is None:
         raise BadInput("--allow-writes without --send.", "It is for commands that --send names: leave it out.")
+    if args.serve is not None:
+        return _record_served(args)
     return _record_port(args) if args.send is None else _record_commands(args)
 
 
@@ -121,6 +128,31 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     with RecordingWriter(args.file, note) as writer:
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
     return _print_recording(args, writer.counts, line.get("out_of_range", 0))
+
+
+def _record_served(args: argparse.Namespace) -> Outcome:
+    from harness.stream.driver import DriverConfig
+    from harness.stream.recording.line_server import serve_line
+    from harness.stream.recording.recording import RecordingWriter
+
+    for name in ("send", *LINE_FLAGS):
+        if name != "baud" and getattr(args, name) is not None:
+            raise BadInput(
+                f"--{name.replace('_', '-')} with --serve.", "The other program configures the device: leave it out."
+            )
+    if args.port.startswith("udp:"):
+        raise BadInput(f"--serve with {args.port}.", "UDP carries no commands: name the serial line.")
+    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
+    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+    note = {"source": "served", "port": args.port, "harness": VERSION}
+    with RecordingWriter(args.file, note) as writer:
+        counts = serve_line(
+            args.port, args.serve, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
+        )
+    text = [f"{counts['unread']} bytes were not read by a program"] if counts["unread"] else []
+    if counts["undelivered"]:
+        text.append(f"{counts['undelivered']} bytes of a program found no device")
+    return _print_recording(args, writer.counts, more=counts, lines=text)
 
 
 def _record_commands(args: argparse.Namespace) -> Outcome:

@@ -19,6 +19,7 @@ from harness.live.capture import CapturedFrame, CaptureThread
 from harness.live.clock import HostClockEstimator
 from harness.live.dropping_queue import DroppingQueue
 from harness.live.latency import StageLatencies
+from harness.live.live_statistics import LiveStatistics
 from harness.live.low_latency import collect_garbage, low_latency_mode
 from harness.live.pose import LivePose, Output
 from harness.reconstruct.contract import Reconstructor, Session
@@ -29,6 +30,7 @@ QUEUE_FRAMES = 32
 so the queue empties soon after a slow pose, without a gap in the frames [choice]."""
 _COLLECT_PERIOD_S = 1.0
 _POLL_PERIOD_S = 0.1
+_STATUS_PERIOD_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -95,16 +97,19 @@ def run_session(
     options: LiveOptions,
     *,
     say: Notifier = lambda text: None,
+    progress: Notifier = lambda text: None,
     clock: Callable[[], float] = time.monotonic,
 ) -> LiveResult:
     """Run until the stream ends, the time of `options` is over or Ctrl-C; then close stream and outputs.
 
     A `Calibrator` calibrates from the first frames. An error of the stream or the method is raised after everything is
-    closed. An output that fails is closed and reported through `say`; the others continue.
+    closed. An output that fails is closed and reported through `say`; the others continue. `progress` receives the
+    status line about once a second, and `say` which stations are lost or back.
     """
     queue: DroppingQueue[CapturedFrame] = DroppingQueue(options.queue_frames)
     capture = CaptureThread(stream, queue, clock)
-    solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, say, clock)
+    statistics = LiveStatistics(stream.stations, clock)
+    solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, say, clock, statistics)
     thread = Thread(target=solver.run, name="reconstruct")
     stopped = False
     try:
@@ -112,7 +117,13 @@ def run_session(
             solver.prepare()
             thread.start()
             capture.start()
+            shown_s = clock()
             while not solver.done.wait(_POLL_PERIOD_S):
+                for message in statistics.update(solver.dropped):
+                    say(message)
+                if clock() - shown_s >= _STATUS_PERIOD_S:
+                    shown_s = clock()
+                    progress(statistics.status_line())
                 if options.seconds is not None and clock() - solver.start_s >= options.seconds:
                     break
     except KeyboardInterrupt:
@@ -124,6 +135,7 @@ def run_session(
         if thread.ident is not None:
             thread.join()
         solver.close()
+        progress("")
     if error := solver.error or capture.error:
         raise error
     return replace(solver.result(capture.frames), stopped=stopped)
@@ -142,7 +154,9 @@ class _SolverThread:
         options: LiveOptions,
         say: Notifier,
         clock: Callable[[], float],
+        statistics: LiveStatistics,
     ) -> None:
+        self._statistics = statistics
         self._queue, self._reconstructor, self._calibration = queue, reconstructor, calibration
         self._outputs, self._options, self._say, self._clock = list(outputs), options, say, clock
         self._kinematics = Kinematics(body)
@@ -196,7 +210,7 @@ class _SolverThread:
         return LiveResult(
             captured=captured,
             frames_before=self._frames_calibrated + self._frames_discarded,
-            dropped=self._queue.dropped - self._frames_discarded,
+            dropped=self.dropped,
             status={state.name.lower(): self._status[state.name] for state in Status},
             origin={part.name.lower(): self._origin[part.name] for part in Origin},
             seconds=self._last_s - self._first_s,
@@ -205,6 +219,11 @@ class _SolverThread:
             lag=self._lag,
             lag_s=self._lag / self._options.rate_hz,
         )
+
+    @property
+    def dropped(self) -> int:
+        """Frames that the queue dropped so far, but for those that came while the method prepared."""
+        return self._queue.dropped - self._frames_discarded
 
     def _calibrate(self, calibrator: Calibrator) -> Session | None:
         """Calibrate from the first frames and begin a session; None if the stream ends before."""
@@ -240,6 +259,7 @@ class _SolverThread:
             sent_s = self._clock()
             received_s = frame.received_s if self._options.host_timestamps else captured.captured_s
             self._stages.add(received_s, taken_s, ready_s, sent_s)
+            self._statistics.add(frame, estimate.status, ready_s - received_s)
             self._status[estimate.status.name] += 1
             self._origin[estimate.origin.name] += 1
             self._first_s, self._last_s = self._first_s or ready_s, ready_s

@@ -11,11 +11,16 @@ from harness.stream.frame import TrackerFrame
 class Paced:
     """A `TrackerStream` of given frames, stamped on delivery by default; it then waits for `close`, or ends."""
 
-    stations = ("a", "b")
-
     def __init__(
-        self, frames: Iterable[TrackerFrame], period_s: float = 0.0, *, ends: bool = True, stamped: bool = True
+        self,
+        frames: Iterable[TrackerFrame],
+        period_s: float = 0.0,
+        *,
+        ends: bool = True,
+        stamped: bool = True,
+        stations: tuple[str, ...] = ("a", "b"),
     ) -> None:
+        self.stations = stations
         self._frames, self._period_s, self._ends, self._stamped = frames, period_s, ends, stamped
         self.closed = threading.Event()
 

@@ -246,7 +246,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
             yield replace(last, received_s=last.received_s + n / 40.0, measured_s=last.measured_s + n / 40.0)
 
     run_session(
-        Paced(stands(), 0.005, stamped=False),
+        Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
         worn.body,
         worn.clip_evaluation.fit_method(registry.resolve("ik"), "ik"),
         TPoseCalibrator(worn.body, mounts_of(worn.scenario)),
@@ -269,7 +269,8 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     session = reconstructor.begin(worn.calibration)
     offline = [session.step(frame) for frame in boxing]
     output = Kept()
-    run_session(Paced(boxing), worn.body, reconstructor, worn.calibration, [output], LiveOptions(40.0, queue_frames=99))
+    stream = Paced(boxing, stations=worn.calibration.stations)
+    run_session(stream, worn.body, reconstructor, worn.calibration, [output], LiveOptions(40.0, queue_frames=99))
     assert len(output.poses) == 60
     for pose, estimate in zip(output.poses, offline, strict=True):
         np.testing.assert_array_equal(pose.estimate.qpos, estimate.qpos)

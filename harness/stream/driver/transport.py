@@ -146,20 +146,24 @@ class _BaseTransport(ABC):
     def _release(self) -> None: ...
 
 
-class _SelectTransport(_BaseTransport):
+class SelectTransport(_BaseTransport):
     """A transport whose file descriptor can be waited for."""
 
     def __init__(self, name: str, descriptor: int) -> None:
         super().__init__(name)
-        self._descriptor = descriptor
+        self.descriptor = descriptor
+        """What `select` and `poll` wait for."""
         self._woken, self._waker = socket.socketpair()
 
     def _receive(self, timeout_s: float) -> bytes:
-        ready, _, _ = select.select([self._descriptor, self._woken.fileno()], [], [], max(timeout_s, 0.0))
-        if self._descriptor in ready:
+        ready, _, _ = select.select([self.descriptor, self._woken.fileno()], [], [], max(timeout_s, 0.0))
+        if self.descriptor in ready:
             return self._take()
         self._check_alive()
         return b""
+
+    def set_baud(self, baud: int) -> None:
+        """Set the baud rate of an open serial port [bit/s]; without effect on other lines. Raises LineLost."""
 
     @abstractmethod
     def _take(self) -> bytes:
@@ -177,18 +181,24 @@ class _SelectTransport(_BaseTransport):
         self._waker.close()
 
 
-class SelectSerialTransport(_SelectTransport):
+class SelectSerialTransport(SelectTransport):
     """A serial port that the operating system can wait for."""
 
     def __init__(self, name: str, port: serial.Serial) -> None:
         super().__init__(name, port.fileno())
         self._port = port
 
+    def set_baud(self, baud: int) -> None:
+        try:
+            self._port.baudrate = baud
+        except _IO_ERRORS as error:
+            raise LineLost(self.name, self._reason(error)) from error
+
     def _take(self) -> bytes:
         return bytes(self._port.read(READ_BYTES))
 
     def _check_alive(self) -> None:
-        if os.stat(self.name).st_rdev != os.fstat(self._descriptor).st_rdev:
+        if os.stat(self.name).st_rdev != os.fstat(self.descriptor).st_rdev:
             raise OSError("the name belongs to another port now")
 
     def _send(self, data: bytes) -> None:
@@ -220,7 +230,7 @@ class PolledSerialTransport(_BaseTransport):
         self._port.close()
 
 
-class _TcpTransport(_SelectTransport):
+class _TcpTransport(SelectTransport):
     """A TCP connection that sends small packets at once."""
 
     def __init__(self, name: str, address: tuple[str, int]) -> None:
@@ -246,7 +256,7 @@ class _TcpTransport(_SelectTransport):
         super()._release()
 
 
-class _UdpTransport(_SelectTransport):
+class _UdpTransport(SelectTransport):
     """Packets that are sent to an address of this computer; it sends nothing.
 
     The host that first sends station data is the tracker. Packets of other hosts are left out.

@@ -16,7 +16,7 @@ _MAX_UNREAD_BYTES = 4000
 """Bytes that a client may leave unread before records are dropped; the terminal holds 4095."""
 
 
-_BAUD_BY_CONSTANT = {getattr(termios, f"B{rate}"): rate for rate in SUPPORTED_BAUD_RATES}
+BAUD_BY_CONSTANT = {getattr(termios, f"B{rate}"): rate for rate in SUPPORTED_BAUD_RATES}
 
 
 class PtyPort:
@@ -58,12 +58,12 @@ class PtyPort:
         return False
 
     def baud(self) -> int | None:
-        return _BAUD_BY_CONSTANT.get(termios.tcgetattr(self._slave)[5]) if self._slave >= 0 else None
+        return BAUD_BY_CONSTANT.get(termios.tcgetattr(self._slave)[5]) if self._slave >= 0 else None
 
     def plug(self) -> None:
         if self._master >= 0:
             return
-        _check_link_is_free(self._link)
+        check_link_is_free(self._link)
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -105,7 +105,7 @@ class PtyPort:
                 self._unsent = self._unsent[os.write(self._master, self._unsent) :]
 
 
-def _check_link_is_free(link: Path) -> None:
+def check_link_is_free(link: Path) -> None:
     """Raise BadInput unless the place is free, or holds a link to a pty that no longer exists."""
     if link.is_symlink():
         target = os.readlink(link)

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from harness.stream.codec.blocks import RECEIVED
-from harness.stream.driver import DriverConfig, LineEvent, Tracker, open_tracker
+from harness.stream.driver import DriverConfig, Tracker, open_tracker
+from harness.stream.event_counter import EventCounter
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter
 
@@ -29,11 +30,9 @@ def record_port(
     BadFile when the recording cannot be written; blocks written before are kept.
     """
 
-    def report_event(event: LineEvent) -> None:
-        log(event.text)
-
     counts: dict[str, int] = {}
-    with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=report_event) as device:
+    events = EventCounter(log)
+    with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=events) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)

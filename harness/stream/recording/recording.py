@@ -182,7 +182,7 @@ class RecordingWriter:
         self._new = existing is None
         self._stations = existing.formats[-1].stations if existing and existing.formats else None
         self._file: int | None = None
-        self._closed = False
+        self._closed = self._kept = False
         self._lock = Lock()
         """Held while writing: the thread that reads and the one that closes both write."""
 
@@ -227,10 +227,15 @@ class RecordingWriter:
         self._append_json(ANSWERED, fitting)
         self.counts[ANSWERED] += 1
 
+    def keep(self) -> None:
+        """Keep a new file also when no device was configured in it: a program used the device."""
+        self._kept = True
+
     def close(self) -> None:
         """Flush everything to the disk and close the file; may be called twice.
 
-        A new file is removed when no device was ever configured or answered in it, because it contains nothing usable.
+        A new file is removed when no device was ever configured or answered in it and no program used it: it contains
+        nothing usable.
         """
         with self._lock:
             self._closed = True
@@ -238,7 +243,7 @@ class RecordingWriter:
                 os.fsync(self._file)
                 os.close(self._file)
                 self._file = None
-                if self._new and not self.counts[CONFIGURED] and not self.counts[ANSWERED]:
+                if self._new and not self._kept and not self.counts[CONFIGURED] and not self.counts[ANSWERED]:
                     self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> "RecordingWriter":

@@ -1,0 +1,82 @@
+"""Statistics of the last minute of a live session."""
+
+import numpy as np
+
+from harness.core.estimate import Status
+from harness.live.live_statistics import SECONDS_KEPT, LiveStatistics
+from harness.stream.frame import TrackerFrame
+
+
+class Clock:
+    """A clock that the test sets."""
+
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def frame(valid: list[bool]) -> TrackerFrame:
+    seen = np.array(valid)
+    where, turn = np.where(seen[:, None], np.zeros((2, 3)), np.nan), np.tile([1.0, 0, 0, 0], (2, 1))
+    quality = np.where(seen, 0.8, 0.0)
+    return TrackerFrame(0.0, np.zeros(2), where, turn, seen, seen, quality, np.zeros(2, dtype=bool))
+
+
+def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    for k in range(50):
+        clock.now_s += 0.02
+        status = Status.LOST if k < 3 else Status.HELD if k < 5 else Status.SOLVED
+        statistics.add(frame([True, k % 2 == 0]), status, 1e-3 * (k + 1))
+        assert statistics.update(dropped=7) == []
+    clock.now_s += 0.021
+    statistics.update(dropped=7)
+    (second,) = statistics.summaries()
+    np.testing.assert_allclose(second.rate_hz, 50.0, rtol=0.03)
+    assert (second.held, second.lost, second.dropped) == (2, 3, 7)
+    latency_ms = np.array([second.latency_p50_ms, second.latency_p99_ms], dtype=float)
+    np.testing.assert_allclose(latency_ms, [25.5, 49.5], atol=0.6)
+    np.testing.assert_allclose(second.quality, [0.8, 0.4], atol=0.01)
+    np.testing.assert_allclose(second.loss, [0.0, 0.5], atol=0.02)
+    assert "held 2, lost 3, dropped 7, head 80% hand 40%" in statistics.status_line()
+
+
+def test_a_lost_station_is_reported_once_and_so_is_its_return() -> None:
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    said: list[str] = []
+    for k in range(300):
+        clock.now_s += 1 / 64
+        statistics.add(frame([True, not 64 <= k < 192]), Status.SOLVED, 1e-3)
+        said += [f"{k}: {text}" for text in statistics.update()]
+    assert said == ["96: station hand lost at 1.0 s", "192: station hand back at 3.0 s"]
+
+
+def test_silence_shows_and_is_not_the_fault_of_a_station() -> None:
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    clock.now_s += 9.0
+    assert statistics.update() == []
+    assert statistics.status_line() == ""  # frames may serve a calibration first
+    for _ in range(100):
+        clock.now_s += 0.01
+        statistics.add(frame([True, True]), Status.SOLVED, 1e-3)
+        statistics.update()
+    clock.now_s += 0.7
+    assert statistics.update() == []
+    assert statistics.status_line() == "no data for 0.7 s"
+
+
+def test_a_minute_is_kept() -> None:
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    statistics.add(frame([True, True]), Status.SOLVED, 1e-3)
+    for _ in range(SECONDS_KEPT + 5):
+        clock.now_s += 1.0
+        statistics.update()
+    kept = statistics.summaries()
+    assert (len(kept), kept[0].end_s, kept[-1].end_s) == (SECONDS_KEPT, 6.0, SECONDS_KEPT + 5.0)
+    assert kept[0].latency_p50_ms is None
+    assert kept[0].loss == (1.0, 1.0)
