@@ -62,7 +62,7 @@ def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.Monke
 
 def test_learning_is_timed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     learnt = MotionDatabase.open(folder)
-    monkeypatch.setattr(methods.benchmark_clips, "fit_named_method", lambda *_: time.sleep(0.2))
+    monkeypatch.setattr(benchmark_clips, "fit_named_method", lambda *_: time.sleep(0.2))
     row = methods.learning_row("weighted_blend", learnt, 1)
     assert 0.2 <= row.value < 2.0
     assert (row.unit, row.target) == ("s", "<= 60")
