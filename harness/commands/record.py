@@ -194,4 +194,5 @@ def _print_recording(
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
     text += f", {counts['evnt']} events" if counts["evnt"] else ""
     text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
-    return print_result(args, {**content, **(more or {})}, *lines, text)
+    following = ["replay", args.file] if args.file.exists() else []
+    return print_result(args, {**content, **(more or {})}, *lines, text, following=following)
