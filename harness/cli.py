@@ -34,6 +34,7 @@ from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
 from harness.commands.table import add_table
+from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
@@ -41,7 +42,7 @@ from harness.core.python_process import safe_import_path
 from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
-    "first steps": (add_demo, add_list, add_doctor, add_mocap, add_inspect),
+    "first steps": (add_demo, add_list, add_doctor, add_mocap, add_inspect, add_view),
     "if you change an algorithm": (
         add_check,
         add_run,

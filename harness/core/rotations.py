@@ -123,3 +123,11 @@ def about_z(angle_rad: float | Floats) -> Floats:
     half = 0.5 * np.asarray(angle_rad, dtype=float)
     zero = np.zeros_like(half)
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def mean_heading_rad(world_from_root: Floats) -> float:
+    """Mean direction of the x axis of orientations (T, 4) about the world's z axis [rad]; 0 without any."""
+    if not len(world_from_root):
+        return 0.0
+    ahead = np.mean(to_matrix(world_from_root)[:, :, 0], axis=0)
+    return float(np.arctan2(ahead[1], ahead[0]))

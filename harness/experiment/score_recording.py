@@ -199,15 +199,46 @@ def score_methods(
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
+    frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
+    loops = _split_into_loops(frames, zero_s, playback.samples)
+    return [_score_method(name, made[name], loops, playback) for name in methods]
+
+
+@dataclass(frozen=True, eq=False)
+class ReconstructedRecording:
+    """F frames of a recording with their truth and the estimates of methods."""
+
+    frames: tuple[TrackerFrame, ...]
+    truth_row: Ints
+    """(F,) row of the true pose in `Playback.simulation.truth_qpos`; -1 where there is none."""
+    estimates: Mapping[str, tuple[Floats, Ints]]
+    """Method -> configurations (N, 55) and status (N,) of the first N frames; N < F for a method with a lag."""
+
+
+def reconstruct_recording(
+    stream: RecordingStream,
+    playback: Playback,
+    methods: Sequence[str],
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> ReconstructedRecording:
+    """Run methods over a recording, side by side, and find the truth of each frame; BadInput for another motion."""
+    frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
+    truth_row = np.full(len(frames), -1)
+    for loop in _split_into_loops(frames, zero_s, playback.samples):
+        truth_row[loop.rows] = loop.index
+    return ReconstructedRecording(
+        tuple(frames), truth_row, {name: (output.qpos, output.status) for name, output in made.items()}
+    )
+
+
+def _begin_sessions(playback: Playback, methods: Sequence[str], progress: ProgressCallback) -> dict[str, Session]:
     sessions, planned = dict[str, Session](), len(methods) + 1
     for done, name in enumerate(methods):
         progress(f"learning {name}", done, planned)
         fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
         sessions[name] = fitted.begin(playback.calibration)
     progress("playing the recording", len(methods), planned)
-    frames, zero_s, made = _run_methods(stream, sessions)
-    loops = _split_into_loops(frames, zero_s, playback.samples)
-    return [_score_method(name, made[name], loops, playback) for name in methods]
+    return sessions
 
 
 def _run_methods(

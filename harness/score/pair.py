@@ -62,14 +62,6 @@ def compute_poses(skeleton: Skeleton, qpos: Floats) -> PoseSequence:
     return PoseSequence(skeleton, angles_rad, root_m, world_from_root, joints_m, pose.world_from_bone)
 
 
-def heading_rad(motion: PoseSequence) -> float:
-    """Mean direction of the root's forward axis about the world's z axis [rad]; 0 without frames."""
-    if not len(motion.root_m):
-        return 0.0
-    ahead = np.mean(rotations.to_matrix(motion.world_from_root)[:, :, 0], axis=0)
-    return float(np.arctan2(ahead[1], ahead[0]))
-
-
 def joint_names(skeleton: Skeleton) -> tuple[str, ...]:
     """(B + 1,) names of the joint-centre set; a bone's name stands for its far end."""
     return ("root", *skeleton.names)

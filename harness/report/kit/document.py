@@ -29,14 +29,13 @@ def document(
     lead: Markup | None = None,
 ) -> str:
     """The HTML of a page: heading, `lead`, facts, what is missing, links to the sections, then the sections."""
-    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
         tag("meta", http_equiv="Content-Security-Policy", content=_CONTENT_SECURITY_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),
-        tag("style", Markup(style)),
+        tag("style", Markup(page_style())),
     )
     shown = [(title, name, content) for title, name, content in sections if content]
     links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in shown))
@@ -66,6 +65,11 @@ def facts_list(facts: Mapping[str, str], missing: Sequence[str] = ()) -> Markup:
 
 def _script(name: str) -> Markup:
     return tag("script", Markup(Path(__file__).with_name(name).read_text(encoding="utf-8")))
+
+
+def page_style() -> str:
+    """The style sheet of every page."""
+    return Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
 
 def chart_figure(chart: Chart, level: int = 0) -> Markup:

@@ -12,7 +12,7 @@ class Markup(str):
     __slots__ = ()
 
 
-VOID_ELEMENTS = frozenset({"br", "col", "img", "input", "meta"})
+VOID_ELEMENTS = frozenset({"br", "col", "img", "input", "link", "meta"})
 """Elements without an end tag."""
 _CODE = re.compile(r"`([^`]+)`")
 

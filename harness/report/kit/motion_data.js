@@ -38,6 +38,13 @@ const MotionData = (() => {
       this.loaded = new Map();
     }
 
+    // The description of a clip; a server gives it on request.
+    async clip(n) {
+      const clip = this.clips[n];
+      if (clip.href && !clip.tracks) Object.assign(clip, JSON.parse(new TextDecoder().decode(await this.read(clip.href))));
+      return clip;
+    }
+
     // All chunks of one array, joined: values times `scale`, in rows of `columns`. `progress` gets the share that is read.
     array(chunks, scale, progress = () => {}) {
       const key = chunks.join("|");
@@ -83,7 +90,7 @@ const MotionData = (() => {
   async function ofServer(address) {
     const get = async (path) => {
       const answer = await fetch(path);
-      if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+      if (!answer.ok) throw new Error((await answer.text()).trim() || `${path}: ${answer.status}`);
       return answer;
     };
     return new Data(await (await get(address)).json(), async (chunk) => (await get(chunk)).arrayBuffer());

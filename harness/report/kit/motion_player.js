@@ -70,15 +70,15 @@ const MotionPlayer = (() => {
       this.where = make("output", { textContent: "loads when scrolled to" });
       this.said = make("output", { className: "said" });
       this.key = make("div", { className: "key" });
-      const methods = [0, 1, 2].map((n) => list(`method${n}`, ["Method", "and", "and"][n], () => this.#choose()));
+      const methods = [0, 1, 2].map((n) => list(`method${n}`, ["Method", "and", "and"][n], () => this.#try(() => this.#choose())));
       const speed = list("speed", "Speed", () => { if (this.playing) this.play(); });
       options(this.speed, SPEEDS.map((s) => [s, `${s}×`]));
       this.speed.value = 1;
       const layout = list("layout", "View", () => this.redraw());
       options(this.layout, [["side", "side by side"], ["over", "overlaid"]]);
       this.root.replaceChildren(
-        make("div", { className: "controls chooser" }, list("clip", "Clip", () => this.#open(Number(this.clip.value))), ...methods, layout,
-          list("moment", "Go to", () => this.#goTo())),
+        make("div", { className: "controls chooser" }, list("clip", "Clip", () => this.#try(() => this.#open(Number(this.clip.value)))), ...methods, layout,
+          list("moment", "Go to", () => this.#try(() => this.#goTo()))),
         this.stage,
         make("div", { className: "controls" }, button("run", "Play", () => this.toggle(), "space"),
           button("back", "◀", () => this.step(-1), "one frame back (left arrow)"),
@@ -117,7 +117,7 @@ const MotionPlayer = (() => {
       let scrolled = -1e9;
       new ResizeObserver(() => this.redraw()).observe(stage);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
-      addEventListener("hashchange", () => this.#restore());
+      addEventListener("hashchange", () => this.#try(() => this.#restore()));
       addEventListener("scroll", () => { scrolled = performance.now(); }, { passive: true });
       stage.addEventListener("contextmenu", (event) => event.preventDefault());
       stage.addEventListener("dblclick", () => this.resetCamera());
@@ -163,10 +163,19 @@ const MotionPlayer = (() => {
       });
     }
 
+    async #try(act) {
+      try {
+        await act();
+      } catch (error) {
+        this.where.textContent = `the view failed: ${error.message}`;
+      }
+    }
+
     // Open a clip with the methods of these names; the ones that are chosen already, without names.
     async #open(n, names = null, time = null) {
       this.stop();
-      this.now = this.data.clips[n];
+      this.where.textContent = "loading";
+      this.now = await this.data.clip(n);
       this.clip.value = n;
       const estimates = this.now.tracks.filter((track) => track.role === "estimate").map((track) => track.name);
       const before = names || [0, 1, 2].map((k) => this[`method${k}`].value);
@@ -302,7 +311,7 @@ const MotionPlayer = (() => {
         const shown = fields.get("show").split(",");
         for (const name of ["truth", "stations", "errors", "follow"]) this[name].checked = shown.includes(name);
       }
-      this.camera.reset(this.data.clips[n].heading);
+      this.camera.reset((await this.data.clip(n)).heading);
       this.camera.restore(fields.get("camera"));
       const time = Number(fields.get("t"));
       await this.#open(n, fields.getAll("method"), Number.isFinite(time) ? time : 0);
@@ -341,7 +350,11 @@ const MotionPlayer = (() => {
       const look = this.#look(), root = this.reference || this.shown[0];
       if (root) {
         const row = this.follow.checked ? this.frame * root.columns : 0;
-        this.camera.target = [root.joints[row], root.joints[row + 1], 0.9 * this.data.height_m / 1.75];
+        this.camera.target = [root.joints[row], root.joints[row + 1], 0.9 * this.now.height_m / 1.75];
+      } else if (this.worn) {
+        const count = this.worn.names.length, row = this.follow.checked ? this.frame * count : 0, mean = [0, 0, 0];
+        for (let n = 0; n < count; n += 1) for (let i = 0; i < 3; i += 1) mean[i] += this.worn.poses[7 * (row + n) + i] / 1000 / count;
+        this.camera.target = mean;
       }
       renderer.begin(look);
       const views = this.shown.length > 1 && this.layout.value === "side" ? this.shown.map((track) => [track]) : [this.shown];
@@ -356,14 +369,15 @@ const MotionPlayer = (() => {
     }
 
     #bodies(tracks) {
-      const bodies = [], ghost = this.reference && tracks.length > 0;
-      if (this.reference && (!ghost || this.truth.checked)) {
+      const bodies = [], known = this.reference && this.reference.states[this.frame] !== NO_ESTIMATE;
+      const ghost = known && tracks.length > 0, byError = this.errors.checked && known;
+      if (known && (!ghost || this.truth.checked)) {
         bodies.push({ capsules: this.#body(this.reference, rgb(TRUTH)), opacity: ghost ? 0.34 : 1, girth: 1 });
       }
       for (const track of tracks) {
         if (track.states[this.frame] === NO_ESTIMATE) continue;
         const lost = track.states[this.frame] === 2, colour = rgb(lost ? LOST : METHODS[this.shown.indexOf(track)]);
-        bodies.push({ capsules: this.#body(track, colour, this.errors.checked && this.reference), opacity: 1, girth: ghost && this.truth.checked ? 0.6 : 1 });
+        bodies.push({ capsules: this.#body(track, colour, byError), opacity: 1, girth: ghost && this.truth.checked ? 0.6 : 1 });
       }
       if (this.worn && this.stations.checked) bodies.push({ capsules: this.#stations(), opacity: 1, girth: 1 });
       return bodies;
@@ -411,7 +425,8 @@ const MotionPlayer = (() => {
       const text = (track) => {
         const state = track.states[this.frame], name = make("b", { textContent: track.name });
         name.style.color = METHODS[this.shown.indexOf(track)];
-        const mean = this.reference && state !== NO_ESTIMATE ? joints.reduce((sum, j) => sum + this.errorMm(track, j), 0) / joints.length : null;
+        const known = this.reference && this.reference.states[this.frame] !== NO_ESTIMATE;
+        const mean = known && state !== NO_ESTIMATE ? joints.reduce((sum, j) => sum + this.errorMm(track, j), 0) / joints.length : null;
         return make("span", {}, name, `${mean === null ? "" : ` ${mean.toFixed(0)} mm`}${STATES[state] || ""}`);
       };
       this.labels.style.gridTemplate = `repeat(${down}, 1fr) / repeat(${across}, 1fr)`;

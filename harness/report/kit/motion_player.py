@@ -105,6 +105,16 @@ class PlayerMotion:
     moments: Sequence[PlayerMoment] = ()
 
 
+def hold_last(values: Floats) -> Floats:
+    """Values (F, ...) whose rows with NaN repeat the last row before them, or the first one; zeros without any."""
+    known = np.flatnonzero(np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    if not len(known):
+        return np.zeros_like(values)
+    nearest = known[np.maximum(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0)]
+    out: Floats = values[nearest]
+    return out
+
+
 ChunkWriter = Callable[[bytes], str]
 """Stores a compressed chunk; returns what the page needs to find it."""
 
@@ -142,7 +152,27 @@ def _mount_script(load: str) -> str:
 
 def pack_motion(motion: PlayerMotion, write: ChunkWriter, chunk_frames: int = 1 << 30) -> dict[str, Any]:
     """The description of a motion as JSON types, with its arrays written in chunks of at most so many frames."""
-    skeleton = motion.skeleton
+    moments = [
+        {"title": m.title, "clip": m.clip, "method": m.method, "time_s": m.start_s, "end_s": m.end_s}
+        for m in motion.moments
+    ]
+    clips = [pack_clip(motion.skeleton, clip, write, chunk_frames) for clip in motion.clips]
+    return {**describe_body(motion.skeleton), "clips": clips, "moments": moments}
+
+
+def describe_body(skeleton: Skeleton) -> dict[str, Any]:
+    """Bones as pairs of joint centres, and their radii at both ends [mm]."""
+    bones = [[parent + 1, bone + 1] for bone, parent in enumerate(skeleton.parents)]
+    return {"bones": bones, "radii_mm": bone_radii_mm(skeleton)}
+
+
+def bone_radii_mm(skeleton: Skeleton) -> list[list[float]]:
+    """Radii of each bone at its joint and at its far end [mm]."""
+    return [_radii_mm(name, length) for name, length in zip(skeleton.names, skeleton.length_m, strict=True)]
+
+
+def pack_clip(skeleton: Skeleton, clip: PlayerClip, write: ChunkWriter, chunk_frames: int = 1 << 30) -> dict[str, Any]:
+    """The description of one clip as JSON types, with its arrays written in chunks of at most so many frames."""
 
     def chunks(values: Floats | Ints) -> list[str]:
         rows = np.rint(values).astype(np.int64).reshape(len(values), -1)
@@ -153,32 +183,22 @@ def pack_motion(motion: PlayerMotion, write: ChunkWriter, chunk_frames: int = 1 
         joints = _relative_mm(skeleton, content.joints_m)
         return {"name": content.name, "role": role, "joints": chunks(joints), "states": chunks(content.states)}
 
-    clips = []
-    for clip in motion.clips:
-        tracks = [track("truth", clip.truth)] if clip.truth else []
-        tracks += [track("estimate", estimate) for estimate in clip.estimates]
-        stations = None
-        if clip.stations:
-            poses = np.concatenate([1e3 * clip.stations.position_m, 1e3 * clip.stations.world_from_station], axis=2)
-            states = chunks(clip.stations.states)
-            stations = {"names": list(clip.stations.names), "poses": chunks(poses), "states": states}
-        clips.append(
-            {
-                "name": clip.name,
-                "title": clip.title,
-                "heading": round(clip.heading_rad, 3),
-                "time": chunks(1e4 * clip.time_s),
-                "tracks": tracks,
-                "stations": stations,
-            }
-        )
-    moments = [
-        {"title": m.title, "clip": m.clip, "method": m.method, "time_s": m.start_s, "end_s": m.end_s}
-        for m in motion.moments
-    ]
-    bones = [[parent + 1, bone + 1] for bone, parent in enumerate(skeleton.parents)]
-    radii = [_radii_mm(name, length) for name, length in zip(skeleton.names, skeleton.length_m, strict=True)]
-    return {"bones": bones, "radii_mm": radii, "height_m": _height_m(motion), "clips": clips, "moments": moments}
+    tracks = [track("truth", clip.truth)] if clip.truth else []
+    tracks += [track("estimate", estimate) for estimate in clip.estimates]
+    stations = None
+    if clip.stations:
+        poses = np.concatenate([1e3 * clip.stations.position_m, 1e3 * clip.stations.world_from_station], axis=2)
+        states = chunks(clip.stations.states)
+        stations = {"names": list(clip.stations.names), "poses": chunks(poses), "states": states}
+    return {
+        "name": clip.name,
+        "title": clip.title,
+        "heading": round(clip.heading_rad, 3),
+        "height_m": _height_m(clip),
+        "time": chunks(1e4 * clip.time_s),
+        "tracks": tracks,
+        "stations": stations,
+    }
 
 
 def encode(rows: Ints) -> bytes:
@@ -207,9 +227,9 @@ def _relative_mm(skeleton: Skeleton, joints_m: Floats) -> Floats:
     return out
 
 
-def _height_m(motion: PlayerMotion) -> float:
-    """Median height of the first motion [m], for the camera."""
-    tracks = [track for clip in motion.clips[:1] for track in (clip.truth, *clip.estimates) if track is not None]
+def _height_m(clip: PlayerClip) -> float:
+    """Median height of the motion [m], for the camera; that of a person without one."""
+    tracks = [track for track in (clip.truth, *clip.estimates) if track is not None and len(track.joints_m)]
     return round(float(np.median(np.ptp(tracks[0].joints_m[..., 2], axis=1))), 2) if tracks else 1.75
 
 

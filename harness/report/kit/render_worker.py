@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import atomic_path
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
-from harness.score.pair import PoseSequence, compute_poses, heading_rad
+from harness.score.pair import PoseSequence, compute_poses
 
 MOVIE_SIZE = (640, 640)
 """Width and height of a movie [px]; they must be even."""
@@ -77,7 +78,7 @@ def _add_caption(picture: Floats, title: str, time_s: float) -> bytes:
 
 def _pictures(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int]) -> Iterator[Floats]:
     """Rendered frames, (height, width, 3) bytes each."""
-    scene = Scene(truth.skeleton, estimate.skeleton, size, heading_rad(truth))
+    scene = Scene(truth.skeleton, estimate.skeleton, size, rotations.mean_heading_rad(truth.world_from_root))
     try:
         for frame in range(len(truth.root_m)):
             yield scene.picture(truth, estimate, frame)

@@ -136,10 +136,15 @@ class RunData:
 
 def read_run(out: Path) -> RunData:
     """Read the run in `out` one cell at a time; BadFile if the folder holds no run, or a damaged or edited one."""
+    run = read_summary_only(out)
+    return replace(run, traces=read_traces(run, run.cells))
+
+
+def read_summary_only(out: Path) -> RunData:
+    """Read the run in `out` without its traces; BadFile as `read_run`, except that no cell is read."""
     check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
-    run = RunData(out, manifest, last_varied(summary), (), summary)
-    return replace(run, traces=read_traces(run, run.cells))
+    return RunData(out, manifest, last_varied(summary), (), summary)
 
 
 def read_traces(run: RunData, rows: Sequence[Row]) -> tuple[Trace, ...]:

@@ -16,11 +16,12 @@ from harness.report.kit.motion_player import (
     PlayerMotion,
     PlayerStations,
     PlayerTrack,
+    hold_last,
 )
 from harness.report.run.data import Row, RunData, pose_pair
 from harness.report.run.worst_window import WorstWindow, group_overlapping
 from harness.results.cell import Cell
-from harness.score.pair import PoseSequence, heading_rad
+from harness.score.pair import PoseSequence
 
 _MOST_FRAMES = 40_000
 """Estimated frames on a page; 20,000 take about 1 MB."""
@@ -38,7 +39,7 @@ def run_motion(run: RunData, windows: Windows, reader: CellReader) -> tuple[Play
     where they have at most 40,000 frames in total. Else frames are left out, and if that is not enough, only the worst
     seconds are shown.
     """
-    groups = _group_rows(run)
+    groups = group_rows(run)
     total = sum(int(row["frames_matched"]) for row in run.cells)
     rate_hz = max((float(row["rate_hz"]) for row in run.cells), default=0.0)
     most = max(1, int(rate_hz / _LOWEST_RATE_HZ))
@@ -46,7 +47,7 @@ def run_motion(run: RunData, windows: Windows, reader: CellReader) -> tuple[Play
     worst = {name: _worst(windows, name) for name in run.ranked}
     if total > every * _MOST_FRAMES:
         return _worst_seconds(run, worst, reader, most)
-    clips = [_clip(run, name, rows, reader, every) for name, rows in groups.items()]
+    clips = [make_clip(run, name, rows, reader, every) for name, rows in groups.items()]
     names = list(groups)
     place = {str(row["key"]): names.index(name) for name, rows in groups.items() for row in rows.values()}
     moments = [
@@ -67,7 +68,7 @@ def _ordinal(n: int) -> str:
     return {2: "second", 3: "third"}.get(n, f"{n}th")
 
 
-def _group_rows(run: RunData) -> dict[str, dict[str, Row]]:
+def group_rows(run: RunData) -> dict[str, dict[str, Row]]:
     """Clip -> series -> row. Clips with several seeds or noise presets are told apart by them."""
     varying = [key for key in ("scenario", "noise", "seed") if len({str(row[key]) for row in run.cells}) > 1]
     out: dict[str, dict[str, Row]] = {}
@@ -92,7 +93,7 @@ def _worst_seconds(
     run: RunData, worst: Mapping[str, Iterable[Sequence[WorstWindow]]], reader: CellReader, every: int
 ) -> tuple[PlayerMotion, str]:
     """Each method's worst seconds next to the leader, the best methods first, as many as fit."""
-    groups = _group_rows(run)
+    groups = group_rows(run)
     clips: list[PlayerClip] = []
     moments: list[PlayerMoment] = []
     left, shown = _MOST_FRAMES, 0
@@ -101,7 +102,7 @@ def _worst_seconds(
             key = group[0].key
             name, rows = next((n, r) for n, r in groups.items() if any(str(row["key"]) == key for row in r.values()))
             both = {other: rows[other] for other in dict.fromkeys((series, run.ranked[0])) if other in rows}
-            clip = _clip(run, f"{name}, {_span(group[0])}", both, reader, every, group[0])
+            clip = make_clip(run, f"{name}, {_span(group[0])}", both, reader, every, group[0])
             left -= len(clip.time_s) * len(both)
             if left < 0:
                 break
@@ -126,10 +127,13 @@ class _Frames:
     estimate: PoseSequence
 
 
-def _clip(
+def make_clip(
     run: RunData, name: str, rows: Mapping[str, Row], reader: CellReader, every: int, window: WorstWindow | None = None
 ) -> PlayerClip:
-    """A clip with the estimates of some series; its timeline has the frames for which any of them has an estimate."""
+    """A clip with the estimates of some series, of every n-th frame, whole or of a window.
+
+    Its timeline has the frames for which any of the series has an estimate.
+    """
     cells = {series: reader(str(row["key"])) for series, row in rows.items()}
     times: dict[int, float] = {}
     for cell in cells.values():
@@ -143,9 +147,9 @@ def _clip(
     truth = PlayerTrack("truth", _spread(frames.values(), len(index)), np.zeros(len(index), dtype=np.int64))
     ranked = sorted(frames, key=run.ranked.index)
     estimates = [_estimate(series, frames[series], len(index)) for series in ranked]
-    return PlayerClip(
-        name, name, time_s, heading_rad(first.truth), truth, estimates, _stations(list(frames.values()), len(index))
-    )
+    heading_rad = rotations.mean_heading_rad(first.truth.world_from_root)
+    stations = _stations(list(frames.values()), len(index))
+    return PlayerClip(name, name, time_s, heading_rad, truth, estimates, stations)
 
 
 def _within(time_s: Floats, window: WorstWindow) -> Bools:
@@ -164,17 +168,7 @@ def _spread(frames: Iterable[_Frames], count: int) -> Floats:
     out = np.full((count, *parts[0].truth.joints_m.shape[1:]), np.nan)
     for part in parts:
         out[part.places] = part.truth.joints_m
-    return _hold(out)
-
-
-def _hold(values: Floats) -> Floats:
-    """Values (F, ...) with NaN rows filled by the last row before them, or by the first one; zeros without any."""
-    known = np.flatnonzero(np.isfinite(values).reshape(len(values), -1).all(axis=1))
-    if not len(known):
-        return np.zeros_like(values)
-    nearest = known[np.maximum(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0)]
-    out: Floats = values[nearest]
-    return out
+    return hold_last(out)
 
 
 def _estimate(series: str, frames: _Frames, count: int) -> PlayerTrack:
@@ -182,7 +176,7 @@ def _estimate(series: str, frames: _Frames, count: int) -> PlayerTrack:
     joints_m[frames.places] = frames.estimate.joints_m
     states = np.full(count, NO_ESTIMATE)
     states[frames.places] = frames.cell.status[frames.rows]
-    return PlayerTrack(series, _hold(joints_m), states)
+    return PlayerTrack(series, hold_last(joints_m), states)
 
 
 def _stations(frames: Sequence[_Frames], count: int) -> PlayerStations | None:
@@ -200,7 +194,7 @@ def _stations(frames: Sequence[_Frames], count: int) -> PlayerStations | None:
         states[part.places] = _states(part.cell)[part.rows][:, columns]
         for k, (_, mount) in enumerate(known):
             position_m[part.places, k], orientation[part.places, k] = station_poses(part.truth, mount)
-    return PlayerStations([cell.stations[n] for n in columns], _hold(position_m), _hold(orientation), states)
+    return PlayerStations([cell.stations[n] for n in columns], hold_last(position_m), hold_last(orientation), states)
 
 
 def station_poses(motion: PoseSequence, mount: Mount) -> tuple[Floats, Floats]:
