@@ -111,7 +111,7 @@ def _view_run(folder: Path, methods: Sequence[str] | None) -> ViewedMotion:
         estimates = sorted(clip.estimates, key=lambda track: order[track.name])
         return PlayerClip(clip.name, clip.title, clip.time_s, clip.heading_rad, clip.truth, estimates, clip.stations)
 
-    return ViewedMotion(f"{run.name}: {folder}", standard_skeleton(), names, make)
+    return ViewedMotion(f"{run.name}: {folder}", standard_skeleton(), names, make, shown=methods or ())
 
 
 def _view_recording(
@@ -155,7 +155,7 @@ def _view_recording(
     true_track = PlayerTrack("truth", truth.joints_m, truth_states)
     clip = PlayerClip(path.name, path.name, _times_s(done.frames), heading_rad, true_track, tracks, stations)
     title = f"{path.name}: {playback.scenario.name}, {playback.clip_evaluation.part}"
-    return ViewedMotion(title, standard_skeleton(), [path.name], lambda _: clip)
+    return ViewedMotion(title, standard_skeleton(), [path.name], lambda _: clip, shown=methods)
 
 
 def _require_frames(path: Path, count: int) -> None:
@@ -188,6 +188,6 @@ def _stations(
 
 def _unit_or_none(quaternions: Floats) -> Floats:
     """Quaternions (F, 4), with the identity in place of zeros: a station that never had an orientation."""
-    unknown = ~quaternions.any(axis=1)
-    out: Floats = np.where(unknown[:, None], [1.0, 0.0, 0.0, 0.0], quaternions)
+    known = np.max(np.abs(quaternions), axis=1, keepdims=True) > 0.0
+    out: Floats = np.where(known, quaternions, [1.0, 0.0, 0.0, 0.0])
     return out

@@ -30,10 +30,19 @@ class ViewedMotion:
     """Clips by name, each made when it is first looked at."""
 
     def __init__(
-        self, title: str, skeleton: Skeleton, names: Sequence[str], make: Callable[[int], PlayerClip], note: str = ""
+        self,
+        title: str,
+        skeleton: Skeleton,
+        names: Sequence[str],
+        make: Callable[[int], PlayerClip],
+        note: str = "",
+        shown: Sequence[str] = (),
     ) -> None:
-        """`make` makes the clip of that number; `note` is shown above the player."""
-        self.title, self.skeleton, self.names, self.note = title, skeleton, tuple(names), note
+        """`make` makes the clip of that number; `note` stands above the player; `shown` are the methods to begin with.
+
+        Without `shown`, the first method of the clip is shown.
+        """
+        self.title, self.skeleton, self.names, self.note, self.shown = title, skeleton, tuple(names), note, tuple(shown)
         self._make, self._clips, self._lock = make, dict[int, PlayerClip](), threading.Lock()
 
     def clip(self, number: int) -> PlayerClip:
@@ -49,13 +58,12 @@ class ViewedMotion:
             raise UnknownName("clip", name, self.names)
         first = self.names.index(name)
         order = [first, *(n for n in range(len(self.names)) if n != first)]
-        return ViewedMotion(
-            self.title, self.skeleton, [self.names[n] for n in order], lambda n: self.clip(order[n]), self.note
-        )
+        names = [self.names[n] for n in order]
+        return ViewedMotion(self.title, self.skeleton, names, lambda n: self.clip(order[n]), self.note, self.shown)
 
     def whole(self) -> PlayerMotion:
         """All clips at once."""
-        return PlayerMotion(self.skeleton, [self.clip(n) for n in range(len(self.names))])
+        return PlayerMotion(self.skeleton, [self.clip(n) for n in range(len(self.names))], shown=self.shown)
 
 
 class ViewerContent:
@@ -65,6 +73,7 @@ class ViewerContent:
         self.motion = motion
         description = {
             **describe_body(motion.skeleton),
+            "shown": motion.shown,
             "clips": [{"name": name, "title": name, "href": f"/clip/{n}.json"} for n, name in enumerate(motion.names)],
         }
         viewer = files(__package__).joinpath("viewer.js").read_text(encoding="utf-8")

@@ -24,6 +24,7 @@ _CONTENT_SECURITY_POLICY = (
 )
 _MAX_COMMAND_BYTES = 65536
 _REQUEST_TIMEOUT_S = 30.0
+_SHUTDOWN_POLL_S = 0.05
 _HEARTBEAT_S = 2.0
 """Longest time between two lines of an event stream, so that a closed connection is noticed [s]."""
 
@@ -92,7 +93,9 @@ class ViewServer:
         self._lookup, self._commands = lookup, dict(commands or {})
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
         self._server.daemon_threads = True
-        self._thread = threading.Thread(target=self._server.serve_forever, name="view server", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(_SHUTDOWN_POLL_S,), name="view server", daemon=True
+        )
 
     @property
     def port(self) -> int:

@@ -33,6 +33,6 @@
     }
     save.disabled = false;
   } });
-  document.getElementById("player").append(element("div", { className: "controls" }, save, format,
-    element("label", {}, "next ", seconds, " s"), said));
+  document.getElementById("player").append(element("div", { className: "controls" }, save,
+    element("label", {}, "as ", format), element("label", {}, "the next ", seconds, " s"), said));
 })();

@@ -12,7 +12,13 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.method_run import run_method
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenario import find_scenario
-from harness.experiment.score_recording import RecordingScore, find_playback, format_score_table, score_methods
+from harness.experiment.score_recording import (
+    RecordingScore,
+    find_playback,
+    format_score_table,
+    reconstruct_recording,
+    score_methods,
+)
 from harness.reconstruct import registry
 from harness.score.score import score_estimate
 from harness.stream.codec import commands
@@ -94,6 +100,27 @@ def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: 
         assert measured == {name: scores.metrics[name] for name in measured}
         assert one.frames_matched == scores.metrics["frames_matched"] == one.frames_expected
     assert errors(judged)[0]["mpjpe_mm"] is not None
+
+
+def test_a_recording_is_reconstructed_frame_by_frame(played: Playback, simulated: Path) -> None:
+    """Each frame of a recorded simulation has the pose of its own row, and the estimates of a run."""
+    done = reconstruct_recording(RecordingStream(simulated), played, METHODS)
+    assert len(done.frames) == len(played.simulation.frames)
+    np.testing.assert_array_equal(done.truth_row, np.arange(len(done.frames)))
+    assert set(done.estimates) == set(METHODS)
+    for qpos, status in done.estimates.values():
+        assert qpos.shape == (len(done.frames), 55)
+        assert set(status.tolist()) <= set(map(int, Status))
+
+
+def test_frames_on_the_way_back_have_no_truth(played: Playback, tmp_path: Path) -> None:
+    loop_s = played.samples.device_loop_s
+    path = emulated(played, tmp_path / "b.rec", [1.2 * loop_s])
+    done = reconstruct_recording(RecordingStream(path), played, ())
+    rows = done.truth_row
+    assert (rows == -1).any()
+    assert rows[rows >= 0].max() < len(played.simulation.truth_qpos)
+    assert done.estimates == {}
 
 
 def test_scores_at_1x_and_max_are_equal(played: Playback, tmp_path: Path) -> None:

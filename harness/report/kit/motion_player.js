@@ -178,7 +178,7 @@ const MotionPlayer = (() => {
       this.now = await this.data.clip(n);
       this.clip.value = n;
       const estimates = this.now.tracks.filter((track) => track.role === "estimate").map((track) => track.name);
-      const before = names || [0, 1, 2].map((k) => this[`method${k}`].value);
+      const before = names || (this.shown.length ? this.shown.map((track) => track.name) : this.data.shown || []);
       [0, 1, 2].forEach((k) => {
         const list = this[`method${k}`];
         options(list, [...(k ? [["", "–"]] : []), ...estimates.map((name) => [name, name])]);
@@ -372,7 +372,7 @@ const MotionPlayer = (() => {
       const bodies = [], known = this.reference && this.reference.states[this.frame] !== NO_ESTIMATE;
       const ghost = known && tracks.length > 0, byError = this.errors.checked && known;
       if (known && (!ghost || this.truth.checked)) {
-        bodies.push({ capsules: this.#body(this.reference, rgb(TRUTH)), opacity: ghost ? 0.34 : 1, girth: 1 });
+        bodies.push({ capsules: this.#body(this.reference, rgb(TRUTH)), opacity: ghost ? 0.28 : 1, girth: 1 });
       }
       for (const track of tracks) {
         if (track.states[this.frame] === NO_ESTIMATE) continue;

@@ -103,6 +103,8 @@ class PlayerMotion:
     skeleton: Skeleton
     clips: Sequence[PlayerClip]
     moments: Sequence[PlayerMoment] = ()
+    shown: Sequence[str] = ()
+    """Methods that are shown first; the first one of the clip without them."""
 
 
 def hold_last(values: Floats) -> Floats:
@@ -157,7 +159,7 @@ def pack_motion(motion: PlayerMotion, write: ChunkWriter, chunk_frames: int = 1 
         for m in motion.moments
     ]
     clips = [pack_clip(motion.skeleton, clip, write, chunk_frames) for clip in motion.clips]
-    return {**describe_body(motion.skeleton), "clips": clips, "moments": moments}
+    return {**describe_body(motion.skeleton), "clips": clips, "moments": moments, "shown": list(motion.shown)}
 
 
 def describe_body(skeleton: Skeleton) -> dict[str, Any]:

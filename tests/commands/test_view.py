@@ -1,0 +1,197 @@
+"""`harness view` as a user meets it: clips, runs and recordings, files that it writes, and its server."""
+
+import http.client
+import json
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.cli import main
+from harness.commands.viewed_motion import open_motion, view_clip
+from harness.core import rotations
+from harness.experiment.playback import prepare_playback
+from harness.mocap.sources import MOCAP_VARIABLE
+from harness.mocap.synthetic import generate
+from harness.report.kit.motion_player import NO_ESTIMATE
+from harness.results.storage import read_cells
+from harness.score.pair import compute_poses
+from harness.view.page import ViewedMotion
+from tests.report.conftest import renders as renders
+from tests.report.fabricate import Plan, fabricate
+
+CLIP = "boxing_p1_01"
+
+
+def opened(what: Path | str, methods: list[str] | None = None, **playback: str | None) -> ViewedMotion:
+    return open_motion(str(what), methods=methods, mocap=None, rate_hz=None, playback=playback)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    plan = Plan(methods={"ik": 2.0, "map": 1.0, "far": 9.0}, duration_s=3.0)
+    return fabricate(tmp_path_factory.mktemp("view") / "run", plan)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "a.rec"
+    assert main(["record", "sim:demo", str(path), "--clip", CLIP, "--stations", "4", "--seconds", "1.49"]) == 0
+    return path
+
+
+def test_a_built_in_take_is_shown_on_its_own_skeleton() -> None:
+    clip = opened("walking_p1_01").clip(0)
+    made = generate("walking", "p1", 1, seed=1)
+    assert clip.truth is not None
+    np.testing.assert_array_equal(clip.truth.joints_m[:, 0], made.root_m)
+    assert clip.time_s[-1] == pytest.approx(made.duration_s)
+    assert clip.estimates == ()
+
+
+def test_a_clip_faces_where_its_root_does() -> None:
+    made = generate("walking", "p1", 1, seed=1, duration_s=1.0)
+    ahead = rotations.mean_heading_rad(made.world_from_root)
+    assert view_clip(made).clip(0).heading_rad == ahead
+    turned = rotations.multiply(rotations.about_z(1.0), made.world_from_root)
+    assert rotations.mean_heading_rad(turned) == pytest.approx(ahead + 1.0)
+    assert rotations.mean_heading_rad(np.zeros((0, 4))) == 0.0
+
+
+def test_a_run_has_its_methods_the_best_first_or_the_chosen_ones(run: Path) -> None:
+    every = opened(run)
+    assert every.names == ("walking_p1_01", CLIP)
+    assert [track.name for track in every.clip(1).estimates] == ["map", "ik", "far"]
+    chosen = opened(run, ["far", "map"])
+    assert chosen.shown == ("far", "map")
+    clip = chosen.clip(0)
+    assert [track.name for track in clip.estimates] == ["far", "map"]
+    (cell,) = [cell for cell in read_cells(run) if (cell.clip, cell.method) == (clip.name, "far")]
+    poses = compute_poses(chosen.skeleton.with_bones(cell.estimate_bone_m), cell.estimate_qpos)
+    np.testing.assert_array_equal(clip.estimates[0].joints_m, poses.joints_m)
+
+
+def test_a_recording_has_readings_truth_and_estimates(recorded: Path) -> None:
+    motion = opened(recorded, ["ik"], scenario="demo", clip=CLIP)
+    clip = motion.clip(0)
+    assert clip.truth is not None
+    assert clip.stations is not None
+    assert [track.name for track in clip.estimates] == ["ik"]
+    assert (clip.truth.states == 0).all()
+    assert (clip.estimates[0].states != NO_ESTIMATE).all()
+    off_m = np.linalg.norm(clip.estimates[0].joints_m - clip.truth.joints_m, axis=2)
+    assert off_m[10:].mean() < 0.1
+    body = prepare_playback("demo", clip=CLIP, stations=4).body
+    hand = clip.stations.names.index("left_hand")
+    hand_m = clip.truth.joints_m[:, body.skeleton.index("lhand") + 1]
+    assert np.median(np.linalg.norm(clip.stations.position_m[:, hand] - hand_m, axis=1)) < 0.08, "in the same room"
+
+
+def test_a_recording_of_an_unknown_room_shows_its_stations(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.stream.recording.recording.Recording.note", {})
+    motion = opened(recorded)
+    clip = motion.clip(0)
+    assert "The room is not known" in motion.note
+    assert clip.truth is None
+    assert clip.stations is not None
+    assert len(clip.stations.names) == 4
+    assert 0.0 < np.median(clip.stations.position_m[..., 2]) < 2.5
+    np.testing.assert_allclose(np.linalg.norm(clip.stations.world_from_station, axis=2), 1.0)
+    assert set(clip.stations.states.ravel().tolist()) <= {0, 1, 2}
+    with pytest.raises(Exception, match="Name the scenario with --scenario"):
+        opened(recorded, ["ik"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nothing.bvh"], "nothing.bvh: no such file or folder"),
+        (["nothing"], "There is no file, folder or built-in take 'nothing', and no library was named."),
+        (["{tmp}"], "manifest.json: no such file"),
+        (["{text}"], "no recording; expected a recording"),
+        (["{empty}"], "an empty file"),
+        (["{markers}"], "which holds markers"),
+        (["walking_p1_01", "--methods", "ik"], "A clip has no estimates"),
+        (["walking_p1_01", "--scenario", "demo"], "A clip takes no --scenario"),
+        (["{run}", "--methods", "pca"], "no method of this run called 'pca'. Known: ik, map, far."),
+        (["{run}", "--clip", "golf_p1_01"], "no clip called 'golf_p1_01'"),
+        (["{run}", "--scenario", "demo"], "A run takes no --scenario"),
+        (["{run}", "--save", "a.avi"], "Its end must be .mp4 or .gif"),
+        (["{run}", "--out", "{text}"], "text.rec exists. Name another file, or use --force."),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(
+    words: list[str],
+    said: str,
+    run: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv(MOCAP_VARIABLE, raising=False)
+    files = {"text": tmp_path / "text.rec", "empty": tmp_path / "empty", "markers": tmp_path / "a.c3d"}
+    files["text"].write_text("no recording", encoding="utf-8")
+    files["empty"].touch()
+    files["markers"].touch()
+    assert main(["view", "--no-browser", *(word.format(run=run, tmp=tmp_path, **files) for word in words)]) == 2
+    assert said in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_a_run_without_estimates_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0, silent=("ik",))
+    assert main(["view", str(fabricate(tmp_path / "run", plan))]) == 2
+    assert "no frames with an estimate" in capsys.readouterr().err
+
+
+def test_a_damaged_recording_is_refused(recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is left holds no configuration of the device."""
+    damaged = tmp_path / "damaged.rec"
+    damaged.write_bytes(recorded.read_bytes()[:60])
+    assert main(["view", str(damaged)]) == 2
+    assert "the device was never configured in it" in capsys.readouterr().err
+
+
+def test_a_page_is_written(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "page.html"
+    words = ["view", str(run), "--methods", "map,ik", "--out", str(page), "--json"]
+    assert main(words) == 0
+    assert json.loads(capsys.readouterr().out)["page"] == str(page)
+    text = page.read_text(encoding="utf-8")
+    assert '"shown":["map","ik"]' in text
+    assert '"name":"far"' not in text
+    assert main(words) == 2
+    assert main([*words, "--force"]) == 0
+
+
+@pytest.mark.long
+def test_a_movie_is_written(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], renders: None) -> None:
+    movie = tmp_path / "a.gif"
+    assert main(["view", str(run), "--clip", CLIP, "--save", str(movie), "--from", "1", "--to", "1.2"]) == 0
+    said = capsys.readouterr()
+    assert "a.gif: 3 frames" in said.out
+    assert f"drawing {CLIP} with map" in said.err
+    assert movie.read_bytes().startswith(b"GIF89a")
+
+
+def test_the_server_shows_the_run_until_ctrl_c(run: Path) -> None:
+    command = [sys.executable, "-m", "harness", "view", str(run), "--no-browser"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        address = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        assert address is not None, line
+        connection = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=30)
+        connection.request("GET", "/clip/1.json")
+        clip = json.load(connection.getresponse())
+        connection.close()
+        assert [track["name"] for track in clip["tracks"]] == ["truth", "map", "ik", "far"]
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert out.endswith("pass\n")
