@@ -53,7 +53,7 @@ class ViewedMotion:
             return self._clips[number]
 
     def beginning_with(self, name: str) -> "ViewedMotion":
-        """The same motion with the clip of this name first; UnknownName if there is none."""
+        """A copy whose first clip has this name; UnknownName if there is none."""
         if name not in self.names:
             raise UnknownName("clip", name, self.names)
         first = self.names.index(name)
