@@ -1,11 +1,14 @@
 """The verb `view`: show motion, runs and recordings in 3-D in the browser, or save them as a movie or a page."""
 
 import argparse
+import sys
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import Verbs, add_verb, positive_float, print_result, print_status
+from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
@@ -69,7 +72,9 @@ def _open(args: argparse.Namespace) -> "ViewedMotion":
         methods = [name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)]
     of_run = Path(args.what).is_dir()
     playback = {"scenario": args.scenario, "clip": None if of_run else args.clip, "seed": args.seed}
-    motion = open_motion(args.what, methods=methods, mocap=args.mocap, rate_hz=args.rate, playback=playback)
+    options = {"methods": methods, "mocap": args.mocap, "rate_hz": args.rate, "playback": playback}
+    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
+        motion = open_motion(args.what, **options, progress=bar)
     return motion.beginning_with(args.clip) if of_run and args.clip is not None else motion
 
 
@@ -81,14 +86,16 @@ def _save_movie(args: argparse.Namespace, motion: "ViewedMotion") -> int:
     shown = names[: MOST_METHODS if args.methods else 1]
     print_status(f"drawing {clip.name}{' with ' if shown else ''}{', '.join(shown)}")
     part = MoviePart(shown, args.start, args.end, args.colour_by_error)
-    return write_movie(motion.skeleton, clip, part, args.save)
+    with ProgressBar("frames") as bar:
+        return write_movie(motion.skeleton, clip, part, args.save, bar)
 
 
 def _save_page(path: Path, motion: "ViewedMotion") -> None:
     from harness.core.files import write_text
     from harness.view.page import write_page
 
-    write_text(path, write_page(motion))
+    with ProgressBar("clips") as bar:
+        write_text(path, write_page(motion, bar))
 
 
 def _serve(args: argparse.Namespace, motion: "ViewedMotion") -> Outcome:
@@ -104,6 +111,8 @@ def _serve(args: argparse.Namespace, motion: "ViewedMotion") -> Outcome:
     content = ViewerContent(motion, token)
     motion.clip(0)  # a damaged clip is an error now, and not in the browser
     commands = {"save": lambda wanted: _save_for_page(content, wanted)}
+    if motion.note:
+        print_status(motion.note)
     with ViewServer(content.find, commands, token=token) as server:
         print_status(f"{motion.title}: {server.url}  (Ctrl-C ends it)")
         if not args.no_browser and not webbrowser.open(server.url):

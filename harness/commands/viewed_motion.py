@@ -10,6 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
+from harness.core.progress import ProgressCallback
 from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.clip_file import FORMATS, read_clip
@@ -34,12 +35,13 @@ def open_motion(
     mocap: LibraryFolders | None,
     rate_hz: float | None,
     playback: dict[str, Any],
+    progress: ProgressCallback = lambda step, done, planned: None,
 ) -> ViewedMotion:
     """Open the motion that a text names: a folder, a file, or a clip.
 
     `methods` are those of a run or recording; None is all of a run and none of a recording. `rate_hz` is the rate of an
-    AMC file that no index names, `playback` the options of `score_recording.find_playback`. Raises UnknownName, BadFile
-    or BadInput for what cannot be shown.
+    AMC file that no index names, `playback` the options of `score_recording.find_playback`. `progress` is called while
+    methods learn and run. Raises UnknownName, BadFile or BadInput for what cannot be shown.
     """
     path = Path(what)
     if path.is_dir():
@@ -47,7 +49,7 @@ def open_motion(
         return _view_run(path, methods)
     is_motion = path.suffix.lower().lstrip(".") in (*FORMATS, "asf")
     if path.exists() and not is_motion:
-        return _view_recording(path, methods or (), playback, mocap)
+        return _view_recording(path, methods or (), playback, mocap, progress)
     if methods:
         raise BadInput(f"--methods with {what}.", "A clip has no estimates: name a run or a recording.")
     _refuse_options(playback, "A clip")
@@ -115,7 +117,11 @@ def _view_run(folder: Path, methods: Sequence[str] | None) -> ViewedMotion:
 
 
 def _view_recording(
-    path: Path, methods: Sequence[str], playback_options: dict[str, Any], mocap: LibraryFolders | None
+    path: Path,
+    methods: Sequence[str],
+    playback_options: dict[str, Any],
+    mocap: LibraryFolders | None,
+    progress: ProgressCallback,
 ) -> ViewedMotion:
     """The readings of a recording, with the truth and the estimates where the played scenario is known."""
     from harness.experiment.score_recording import find_playback, reconstruct_recording
@@ -124,6 +130,7 @@ def _view_recording(
     from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(path)
+    lost = [f"Lost: {text}." for text in stream.recording.damage]
     known = playback_options.get("scenario") is not None or "scenario" in stream.recording.note
     if not known:
         if methods:
@@ -134,9 +141,9 @@ def _view_recording(
         note = "The room is not known: the tracker's frame is shown as if it hung 2.5 m above the floor."
         stations = _stations(stream.stations, frames, WORLD_FROM_TRACKER, np.array(TrackerConfig().origin_m))
         clip = PlayerClip(path.name, path.name, _times_s(frames), 0.0, None, (), stations)
-        return ViewedMotion(path.name, standard_skeleton(), [path.name], lambda _: clip, note)
+        return ViewedMotion(path.name, standard_skeleton(), [path.name], lambda _: clip, " ".join([note, *lost]))
     playback = find_playback(stream, **playback_options, folder=mocap)
-    done = reconstruct_recording(stream, playback, methods)
+    done = reconstruct_recording(stream, playback, methods, progress)
     count = len(done.frames)
     _require_frames(path, count)
     truth = compute_poses(playback.body.skeleton, playback.simulation.truth_qpos[np.maximum(done.truth_row, 0)])
@@ -155,7 +162,7 @@ def _view_recording(
     true_track = PlayerTrack("truth", truth.joints_m, truth_states)
     clip = PlayerClip(path.name, path.name, _times_s(done.frames), heading_rad, true_track, tracks, stations)
     title = f"{path.name}: {playback.scenario.name}, {playback.clip_evaluation.part}"
-    return ViewedMotion(title, standard_skeleton(), [path.name], lambda _: clip, shown=methods)
+    return ViewedMotion(title, standard_skeleton(), [path.name], lambda _: clip, " ".join(lost), methods)
 
 
 def _require_frames(path: Path, count: int) -> None:

@@ -1,6 +1,7 @@
 """Movies and animated pictures of a viewed clip, drawn in a process of their own."""
 
 import subprocess
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -11,6 +12,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.files import write_npz
+from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra, SystemFault, UnknownName
 from harness.report.kit.motion_player import PlayerClip, bone_radii_mm
@@ -18,9 +20,12 @@ from harness.report.kit.render_process import describe_exit, start_renderer
 
 MOVIE_SUFFIXES = (".mp4", ".gif")
 MOST_METHODS = 3
+DRAWN_SUFFIX = ".drawn"
+"""Ending of a file beside the job that has a byte for each frame that was drawn."""
 _FPS = {".mp4": 25.0, ".gif": 12.5}
 _MOST_FRAMES = 15_000
 """Longest movie: ten minutes of mp4."""
+_POLL_PERIOD_S = 0.2
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 120.0, 2.0
 
 
@@ -45,11 +50,18 @@ def check_movie(path: Path) -> None:
             raise MissingExtra("A movie", package, "viz")
 
 
-def write_movie(skeleton: Skeleton, clip: PlayerClip, part: MoviePart, path: Path) -> int:
+def write_movie(
+    skeleton: Skeleton,
+    clip: PlayerClip,
+    part: MoviePart,
+    path: Path,
+    progress: ProgressCallback = lambda name, done, planned: None,
+) -> int:
     """Draw a part of a clip in real time into `path` (.mp4 at 25 frames per second, .gif at 12.5); returns the frames.
 
-    Raises the errors of `check_movie`, UnknownName for a method that the clip lacks, BadInput for a part without frames
-    or for more than three methods, and SystemFault when the pictures cannot be drawn.
+    `progress` is called while frames are drawn. Raises the errors of `check_movie`, UnknownName for a method that the
+    clip lacks, BadInput for a part without frames or for more than three methods, and SystemFault when the pictures
+    cannot be drawn.
     """
     check_movie(path)
     known = {track.name: track for track in clip.estimates}
@@ -84,12 +96,18 @@ def write_movie(skeleton: Skeleton, clip: PlayerClip, part: MoviePart, path: Pat
     with TemporaryDirectory(prefix="harness-movie-") as folder:
         job = Path(folder) / "movie.npz"
         write_npz(job, **arrays)
+        deadline_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * len(rows)
         with start_renderer("harness.view.movie_worker", [str(job)]) as renderer:
             try:
-                _, stderr = renderer.communicate(timeout=_STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * len(rows))
-            except subprocess.TimeoutExpired as error:
-                renderer.kill()
-                raise SystemFault("The renderer did not finish in time.", "Save a shorter part.") from error
+                stderr = None
+                while stderr is None:
+                    try:
+                        _, stderr = renderer.communicate(timeout=_POLL_PERIOD_S)
+                    except subprocess.TimeoutExpired as error:
+                        if time.monotonic() > deadline_s:
+                            advice = "Save a shorter part."
+                            raise SystemFault("The renderer did not finish in time.", advice) from error
+                        progress(path.name, _drawn_frames(job), len(rows))
             except BaseException:
                 renderer.kill()
                 raise
@@ -97,6 +115,11 @@ def write_movie(skeleton: Skeleton, clip: PlayerClip, part: MoviePart, path: Pat
         reason = describe_exit(renderer.returncode, stderr)
         raise SystemFault(f"The movie was not made: {reason}.", "Does this machine have OpenGL (EGL)?")
     return len(rows)
+
+
+def _drawn_frames(job: Path) -> int:
+    """Number of frames that the renderer of a job has drawn."""
+    return sum(path.stat().st_size for path in job.parent.glob(f"{job.name}{DRAWN_SUFFIX}"))
 
 
 def _rows(time_s: Floats, part: MoviePart, fps: float) -> Ints:

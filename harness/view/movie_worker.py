@@ -15,6 +15,7 @@ from harness.body.rendering import RenderScene
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import atomic_path
+from harness.view.movie import DRAWN_SUFFIX
 
 _TRUTH, _METHODS, _LOST = "#5b87ad", ("#e8850c", "#0f9d76", "#c05f9c"), "#8d98a5"
 _STATIONS = ("#20a4a8", "#e0b000", "#d43c3c")
@@ -142,15 +143,17 @@ def _error_colours(error_m: Floats) -> Floats:
     return np.stack([np.interp(error_m, place, ramp[:, c]) for c in range(3)], axis=1)
 
 
-def _pictures(job: dict[str, Any]) -> Iterator["np.ndarray[Any, Any]"]:
-    """The frames of the movie, with titles."""
+def _pictures(job: dict[str, Any], drawn: Path) -> Iterator["np.ndarray[Any, Any]"]:
+    """The frames of the movie, with titles; the file `drawn` grows by a byte for each."""
     methods: Sequence[int | None] = range(len(job["methods"])) if len(job["methods"]) else [None]
     size = _ALONE if len(methods) == 1 else _PANE
     panes = [MoviePane(job, method, size) for method in methods]
     try:
-        for frame in range(len(job["time_s"])):
-            picture = np.hstack([pane.picture(frame) for pane in panes])
-            yield _add_captions(picture, job, frame, size[0])
+        with drawn.open("wb", buffering=0) as count:
+            for frame in range(len(job["time_s"])):
+                picture = np.hstack([pane.picture(frame) for pane in panes])
+                yield _add_captions(picture, job, frame, size[0])
+                count.write(b".")
     finally:
         for pane in panes:
             pane.close()
@@ -200,7 +203,7 @@ def main(job_file: str) -> None:
     output, fps = Path(str(job["output"])), float(job["fps"])
     write = _write_gif if output.suffix.lower() == ".gif" else _write_mp4
     with atomic_path(output) as temporary:
-        write(_pictures(job), fps, temporary)
+        write(_pictures(job, Path(job_file + DRAWN_SUFFIX)), fps, temporary)
 
 
 if __name__ == "__main__":

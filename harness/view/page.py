@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from typing import Any
 
+from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import UnknownName
 from harness.report.kit.document import document, page_style
@@ -61,9 +62,13 @@ class ViewedMotion:
         names = [self.names[n] for n in order]
         return ViewedMotion(self.title, self.skeleton, names, lambda n: self.clip(order[n]), self.note, self.shown)
 
-    def whole(self) -> PlayerMotion:
-        """All clips at once."""
-        return PlayerMotion(self.skeleton, [self.clip(n) for n in range(len(self.names))], shown=self.shown)
+    def whole(self, progress: ProgressCallback = lambda clip, done, planned: None) -> PlayerMotion:
+        """All clips at once; `progress` is called after each."""
+        clips = []
+        for number, name in enumerate(self.names):
+            clips.append(self.clip(number))
+            progress(name, number + 1, len(self.names))
+        return PlayerMotion(self.skeleton, clips, shown=self.shown)
 
 
 class ViewerContent:
@@ -136,9 +141,9 @@ h1 { margin: 0 0 0.4rem; font-size: 1.2rem; }
 """
 
 
-def write_page(motion: ViewedMotion) -> str:
-    """The HTML of a page that holds all its data and loads nothing."""
-    player = motion_player(motion.whole(), "Bodies and stations in 3-D; drag to turn")
+def write_page(motion: ViewedMotion, progress: ProgressCallback = lambda clip, done, planned: None) -> str:
+    """The HTML of a page that holds all its data and loads nothing; `progress` is called after each clip."""
+    player = motion_player(motion.whole(progress), "Bodies and stations in 3-D; drag to turn")
     note: Any = tag("p", motion.note) if motion.note else None
     return document(
         title=f"{motion.title}: harness view",

@@ -65,7 +65,11 @@ def reddish(picture: Any) -> int:
 @pytest.mark.long
 def test_two_methods_stand_side_by_side_in_real_time(tmp_path: Path, renders: None) -> None:
     """The second method errs by 200 mm and is red, but for the frame without an estimate."""
-    frames = write_movie(*make_clip(), MoviePart(("ik", "map"), 0.0, 0.5, True), tmp_path / "a.gif")
+    told: list[tuple[int, int]] = []
+    part = MoviePart(("ik", "map"), 0.0, 0.5, True)
+    frames = write_movie(*make_clip(), part, tmp_path / "a.gif", lambda _, done, planned: told.append((done, planned)))
+    assert told[0] == (0, 7)
+    assert told == sorted(told)
     with Image.open(tmp_path / "a.gif") as picture:
         assert frames == getattr(picture, "n_frames") == 7  # noqa: B009
         assert picture.size == (960, 560)
