@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from harness.live.pose import Output
     from harness.stream.driver import Tracker
     from harness.stream.event_counter import EventCounter
+    from harness.stream.recording.recording_switch import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -61,9 +62,11 @@ def add_live(verbs: Verbs) -> None:
         "bone lengths from eight poses, held first; FILE: written by `harness calibrate` (default exact)"
     )
     verb.add_argument("--calibration", metavar="exact|tpose|poses|FILE", default="exact", help=text)
-    text = "show the motion in a window, or write PNG files into the folder --out"
-    verb.add_argument("--view", choices=["window", "frames"], help=text)
-    verb.add_argument("--out", type=Path, metavar="DIR", help="folder of --view frames")
+    text = "show the motion in a window or in the browser, or write PNG files into the folder --out"
+    verb.add_argument("--view", choices=["window", "browser", "frames"], help=text)
+    verb.add_argument("--no-browser", action="store_true", help="print the address of --view browser alone")
+    text = "folder of --view frames, and of recordings that --view browser starts (default: this one)"
+    verb.add_argument("--out", type=Path, metavar="DIR", help=text)
     text = "send the VMC protocol over UDP; without HOST, to this computer"
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
@@ -95,6 +98,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
     from harness.stream.event_counter import EventCounter
+    from harness.stream.recording.recording_switch import RecordingSwitch
 
     options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
@@ -107,8 +111,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if args.calibration == "poses":
         playback = playback.with_calibration(_calibrate_by_poses(args, playback, events))
     with ExitStack() as opened:
-        outputs = _open_outputs(args, playback, opened)
-        device = opened.enter_context(_open_device(args, playback, events))
+        recorder = RecordingSwitch()
+        outputs = _open_outputs(args, playback, recorder, opened)
+        device = opened.enter_context(_open_device(args, playback, events, recorder))
         rate_hz = playback.tracker.rate_hz
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
@@ -145,7 +150,12 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 
 
 @contextmanager
-def _open_device(args: argparse.Namespace, playback: "Playback", events: "EventCounter") -> "Iterator[Tracker]":
+def _open_device(
+    args: argparse.Namespace,
+    playback: "Playback",
+    events: "EventCounter",
+    recorder: "RecordingSwitch | None" = None,
+) -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
     from harness.stream.codec.items import position_range_m
     from harness.stream.driver import DriverConfig, open_tracker
@@ -155,7 +165,7 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "EventC
     options = {"items": tracker.items, **line_options(args)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
     config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
-    with open_tracker(args.port, config, on_event=events) as device:
+    with open_tracker(args.port, config, observer=recorder, on_event=events) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
             raise BadInput(
@@ -168,7 +178,9 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "EventC
         yield device
 
 
-def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitStack) -> "list[Output]":
+def _open_outputs(
+    args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch", opened: ExitStack
+) -> "list[Output]":
     """Open the requested outputs; `opened` closes them again, also when a later one is refused."""
     from harness.live.bvh import BvhOutput
     from harness.live.lsl import LslOutput
@@ -176,8 +188,10 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
 
-    if args.out is not None and args.view != "frames":
-        raise BadInput("--out without --view frames.", "Give both, or neither.")
+    if args.out is not None and args.view not in ("frames", "browser"):
+        raise BadInput("--out without --view frames or browser.", "Give both, or neither.")
+    if args.no_browser and args.view != "browser":
+        raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
     if args.lsl_network and args.lsl is None:
         raise BadInput("--lsl-network without --lsl.", "Name the streams with --lsl.")
     skeleton, rate_hz = playback.performer_calibration.body.skeleton, playback.tracker.rate_hz
@@ -187,7 +201,11 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
         "lsl": lambda: LslOutput(args.lsl, skeleton, rate_hz, network=args.lsl_network),
         "bvh": lambda: BvhOutput(args.bvh, skeleton, rate_hz, force=args.force),
         "poses": lambda: PoseTableOutput(args.poses, skeleton, stations, force=args.force),
-        "view": lambda: ViewerOutput(args.view, skeleton, args.out, force=args.force),
+        "view": lambda: (
+            _open_browser(args, playback, recorder)
+            if args.view == "browser"
+            else ViewerOutput(args.view, skeleton, args.out, force=args.force)
+        ),
     }
     outputs: list[Output] = []
     for name, make in config.items():
@@ -197,6 +215,26 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
                 opened.callback(outputs[-1].close)
             print_status(outputs[-1].description)
     return outputs
+
+
+def _open_browser(args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch") -> "Output":
+    """Show the session on a page, and open it in the browser unless --no-browser."""
+    import webbrowser
+
+    from harness.live.browser_view import BrowserOutput
+
+    room = playback.calibration.world_from_tracker, playback.calibration.tracker_origin_m
+    output = BrowserOutput(
+        playback.performer_calibration.body.skeleton,
+        tuple(playback.scenario.stations),
+        None if args.calibration == "tpose" else room,  # found in the session's first seconds
+        recorder,
+        args.out or Path(),
+        f"{args.method} on {args.port}",
+    )
+    if not args.no_browser and not webbrowser.open(output.url):
+        print_status("No browser was found: open the address in one.")
+    return output
 
 
 def _calibrate_by_poses(args: argparse.Namespace, playback: "Playback", events: "EventCounter") -> "CalibrationFile":

@@ -193,7 +193,7 @@ class _RequestHandler(BaseHTTPRequestHandler):
     def _refuse(self, status: HTTPStatus, text: str) -> None:
         if self.command == "POST":  # its body may be unread
             self.close_connection = True
-        self._send(status, Resource("text/plain; charset=utf-8", f"{shorten(text)}\n".encode()))
+        self._send(status, Resource("text/plain; charset=utf-8", f"{shorten(text).rstrip()}\n".encode()))
 
     def _send(self, status: HTTPStatus, resource: Resource) -> None:
         self.send_response(status)

@@ -72,5 +72,43 @@ const MotionCamera = (() => {
       this.zoom(1);
     }
   }
+
+  // Let mouse and touch on an element move a camera; `changed` is called afterwards, `reset` after a double click.
+  Camera.control = (stage, camera, changed, reset) => {
+    const held = new Map();
+    let scrolled = -1e9;
+    addEventListener("scroll", () => { scrolled = performance.now(); }, { passive: true });
+    stage.addEventListener("contextmenu", (event) => event.preventDefault());
+    stage.addEventListener("dblclick", reset);
+    // A page that is being scrolled over the view goes on scrolling.
+    stage.addEventListener("wheel", (event) => {
+      if (performance.now() - scrolled < 250 && !event.ctrlKey) return;
+      event.preventDefault();
+      const steps = event.deltaY * (event.deltaMode ? 0.05 : 0.0015) * (event.ctrlKey ? 4 : 1);
+      camera.zoom(Math.exp(clamp(steps, [-0.5, 0.5])));
+      changed();
+    }, { passive: false });
+    stage.addEventListener("pointerdown", (event) => {
+      stage.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      stage.addEventListener(name, (event) => held.delete(event.pointerId));
+    }
+    stage.addEventListener("pointermove", (event) => {
+      const before = held.get(event.pointerId), at = [event.clientX, event.clientY], high = stage.clientHeight;
+      if (!before) return;
+      const [dx, dy] = [at[0] - before[0], at[1] - before[1]];
+      const other = [...held].find(([id]) => id !== event.pointerId);
+      held.set(event.pointerId, at);
+      if (other) {
+        const apart = (p) => Math.hypot(p[0] - other[1][0], p[1] - other[1][1]) || 1;
+        camera.zoom(apart(before) / apart(at));
+        camera.pan((-0.5 * dx) / high, (0.5 * dy) / high);
+      } else if (event.buttons & 2 || event.buttons & 4 || event.shiftKey) camera.pan(-dx / high, dy / high);
+      else camera.turn((-5 * dx) / high, (4 * dy) / high);
+      changed();
+    });
+  };
   return Camera;
 })();

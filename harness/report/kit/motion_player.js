@@ -3,14 +3,11 @@
 const MotionPlayer = (() => {
   "use strict";
   const TRUTH = "#5b87ad", METHODS = ["#e8850c", "#0f9d76", "#c05f9c"], LOST = "#8d98a5";
-  const STATION = { 0: "#20a4a8", 1: "#e0b000", 2: "#d43c3c" }, AXES = ["#d84a3a", "#3f9b45", "#3b6fd4"];
+  const STATION = ["#20a4a8", "#e0b000", "#d43c3c"];
   const STATES = ["", " · held", " · lost", " · no estimate"], NO_ESTIMATE = 3;
+  const { rgb } = MotionRenderer;
   const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2], WORST_MM = 100, LINK = "view?";
   const RAMP = ["#2c7bb6", "#7fc7c9", "#f2e394", "#f3913c", "#c2182b"].map(rgb);
-
-  function rgb(hex) {
-    return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
-  }
 
   function errorColour(mm) {
     const at = Math.min(1, mm / WORST_MM) * (RAMP.length - 1), k = Math.min(RAMP.length - 2, Math.floor(at));
@@ -113,40 +110,11 @@ const MotionPlayer = (() => {
     }
 
     #listen() {
-      const { stage } = this, held = new Map();
-      let scrolled = -1e9;
+      const { stage } = this;
       new ResizeObserver(() => this.redraw()).observe(stage);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
       addEventListener("hashchange", () => this.#try(() => this.#restore()));
-      addEventListener("scroll", () => { scrolled = performance.now(); }, { passive: true });
-      stage.addEventListener("contextmenu", (event) => event.preventDefault());
-      stage.addEventListener("dblclick", () => this.resetCamera());
-      // A page that is being scrolled over the view goes on scrolling.
-      stage.addEventListener("wheel", (event) => {
-        if (performance.now() - scrolled < 250 && !event.ctrlKey) return;
-        event.preventDefault();
-        this.camera.zoom(Math.exp(Math.max(-0.5, Math.min(0.5, event.deltaY * (event.deltaMode ? 0.05 : 0.0015) * (event.ctrlKey ? 4 : 1)))));
-        this.redraw();
-      }, { passive: false });
-      stage.addEventListener("pointerdown", (event) => {
-        stage.setPointerCapture(event.pointerId);
-        held.set(event.pointerId, [event.clientX, event.clientY]);
-      });
-      for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) stage.addEventListener(name, (event) => held.delete(event.pointerId));
-      stage.addEventListener("pointermove", (event) => {
-        const before = held.get(event.pointerId), at = [event.clientX, event.clientY];
-        if (!before) return;
-        const [dx, dy] = [at[0] - before[0], at[1] - before[1]], high = stage.clientHeight;
-        const other = [...held].find(([id]) => id !== event.pointerId);
-        held.set(event.pointerId, at);
-        if (other) {
-          const apart = (p) => Math.hypot(p[0] - other[1][0], p[1] - other[1][1]) || 1;
-          this.camera.zoom(apart(before) / apart(at));
-          this.camera.pan(-0.5 * dx / high, 0.5 * dy / high);
-        } else if (event.buttons & 2 || event.buttons & 4 || event.shiftKey) this.camera.pan(-dx / high, dy / high);
-        else this.camera.turn(-5 * dx / high, 4 * dy / high);
-        this.redraw();
-      });
+      MotionCamera.control(stage, this.camera, () => this.redraw(), () => this.resetCamera());
       stage.addEventListener("keydown", (event) => {
         if (event.ctrlKey || event.metaKey || event.altKey) return;
         const turns = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
@@ -333,12 +301,6 @@ const MotionPlayer = (() => {
       });
     }
 
-    #look() {
-      const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
-      return dark ? { paper: rgb("#1d2127"), ground: rgb("#262b33"), line: rgb("#4a535f"), shade: [0, 0, 0, 0.38] }
-        : { paper: rgb("#f5f7f9"), ground: rgb("#e9edf1"), line: rgb("#b4bec9"), shade: [0.1, 0.13, 0.18, 0.2] };
-    }
-
     #draw() {
       const ratio = Math.min(2, devicePixelRatio || 1), wide = this.stage.clientWidth, high = this.stage.clientHeight;
       if (!wide || !high) return;
@@ -347,7 +309,7 @@ const MotionPlayer = (() => {
         canvas.width = Math.round(wide * ratio);
         canvas.height = Math.round(high * ratio);
       }
-      const look = this.#look(), root = this.reference || this.shown[0];
+      const look = MotionRenderer.look(), root = this.reference || this.shown[0];
       if (root) {
         const row = this.follow.checked ? this.frame * root.columns : 0;
         this.camera.target = [root.joints[row], root.joints[row + 1], 0.9 * this.now.height_m / 1.75];
@@ -396,26 +358,16 @@ const MotionPlayer = (() => {
     #body(track, colour, byError = false) {
       const capsules = new MotionRenderer.Capsules();
       const paint = (joint) => (byError ? errorColour(this.errorMm(track, joint)) : colour);
-      this.data.bones.forEach(([from, to], n) => {
-        const [start, end] = this.data.radii_mm[n];
-        capsules.add(this.#point(track, from), start / 1000, paint(from), this.#point(track, to), end / 1000, paint(to));
-      });
+      MotionRenderer.addBody(capsules, this.data, (joint) => this.#point(track, joint), paint);
       return capsules;
     }
 
-    // Each station as a disc and its three axes (x red, y green, z blue), where position and orientation are known.
     #stations() {
       const capsules = new MotionRenderer.Capsules(), { poses, states, names } = this.worn;
       names.forEach((_, n) => {
-        const at = 7 * (this.frame * names.length + n), p = [0, 1, 2].map((i) => poses[at + i] / 1000);
-        const colour = rgb(STATION[states[this.frame * names.length + n]]);
-        const [w, x, y, z] = [3, 4, 5, 6].map((i) => poses[at + i] / 1000);
-        const axes = [[1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-          [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-          [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]];
-        const along = (axis, d) => p.map((c, i) => c + d * axis[i]);
-        capsules.add(along(axes[0], -0.022), 0.019, colour, along(axes[0], 0.022), 0.019, colour);
-        axes.forEach((axis, i) => capsules.add(p, 0.0055, rgb(AXES[i]), along(axis, 0.11), 0.0055, rgb(AXES[i])));
+        const row = this.frame * names.length + n, [x, y, z, ...turn] = poses.subarray(7 * row, 7 * row + 7);
+        const pose = [[x, y, z], turn].map((part) => part.map((v) => v / 1000));
+        MotionRenderer.addStation(capsules, ...pose, rgb(STATION[states[row]]));
       });
       return capsules;
     }

@@ -4,6 +4,7 @@ const MotionRenderer = (() => {
   "use strict";
   const FLOATS = 14; // of one capsule: two ends with their radii, then two colours
   const LIGHT = [0.35, 0.25, 0.9];
+  const AXES = ["#d84a3a", "#3f9b45", "#3b6fd4"].map(rgb);
 
   const CAPSULE = `#version 300 es
     in vec4 shape; in vec4 endA; in vec4 endB; in vec3 colourA; in vec3 colourB;
@@ -203,5 +204,34 @@ const MotionRenderer = (() => {
       gl.drawElementsInstanced(gl.TRIANGLES, this.corners, gl.UNSIGNED_SHORT, 0, capsules.count);
     }
   }
-  return { Renderer, Capsules };
+  // "#rrggbb" -> red, green and blue, 0 to 1.
+  function rgb(hex) {
+    return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+  }
+
+  // Colours of the surroundings on the reader's light or dark screen; light ones in print.
+  function look() {
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches;
+    return dark ? { paper: rgb("#1d2127"), ground: rgb("#262b33"), line: rgb("#4a535f"), shade: [0, 0, 0, 0.38] }
+      : { paper: rgb("#f5f7f9"), ground: rgb("#e9edf1"), line: rgb("#b4bec9"), shade: [0.1, 0.13, 0.18, 0.2] };
+  }
+
+  // Add the bones of a body; `point` gives a joint's position [m] and `paint` its colour.
+  function addBody(capsules, { bones, radii_mm: radii }, point, paint) {
+    bones.forEach(([from, to], n) => {
+      const [start, end] = radii[n];
+      capsules.add(point(from), start / 1000, paint(from), point(to), end / 1000, paint(to));
+    });
+  }
+
+  // Add a station at a position [m] with an orientation (w, x, y, z): a disc and three axes, x red, y green, z blue.
+  function addStation(capsules, p, [w, x, y, z], colour) {
+    const axes = [[1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+      [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+      [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]];
+    const along = (axis, d) => p.map((c, i) => c + d * axis[i]);
+    capsules.add(along(axes[0], -0.022), 0.019, colour, along(axes[0], 0.022), 0.019, colour);
+    axes.forEach((axis, i) => capsules.add(p, 0.0055, AXES[i], along(axis, 0.11), 0.0055, AXES[i]));
+  }
+  return { Renderer, Capsules, addBody, addStation, look, rgb };
 })();

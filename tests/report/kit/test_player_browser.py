@@ -210,6 +210,7 @@ def test_speed_scales_the_time(page: Any) -> None:
 
 def test_three_methods_stand_next_to_each_other(page: Any) -> None:
     _choose(page, method1="map", method2="pca")
+    page.wait_for_function("() => document.querySelectorAll('.labels > div').length === 3")
     labels = page.locator(".labels > div").all_inner_texts()
     assert [text.split() for text in labels] == [["ik", "30", "mm"], ["map", "60", "mm"], ["pca", "90", "mm"]]
     page.locator("input[name=errors]").check()

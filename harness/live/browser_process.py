@@ -1,0 +1,114 @@
+"""The process of `live --view browser`: serves the live page and sends it frames and the state of the line."""
+
+import secrets
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from threading import Event, Lock
+from typing import Any
+
+import numpy as np
+
+from harness.core import humanoid24, rotations
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.errors import BadInput
+from harness.live.line_history import LineHistory
+from harness.live.pose_ring import PoseRing
+from harness.view.live_page import LiveContent
+from harness.view.server import ViewServer
+
+_RATE_HZ = 30.0
+"""Most frames per second that are sent to the page."""
+_STATUS_PERIOD_S = 0.5
+_ANSWER_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True)
+class BrowserConfig:
+    """What the process shows."""
+
+    bone_m: Floats
+    """(B, 3) bone vectors of the body [m]."""
+    stations: tuple[str, ...]
+    room: tuple[Floats, Floats] | None
+    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
+    title: str
+
+
+class RecordingCommands:
+    """The page's commands to start and stop a recording, carried out by the session at the other end of a pipe."""
+
+    def __init__(self, pipe: Any) -> None:
+        self._pipe, self._lock, self._answered = pipe, Lock(), Event()
+        self._answer: Mapping[str, Any] = {}
+        self.path = ""
+
+    def record(self, wanted: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Start or stop a recording, by the entry "on"; BadInput when the session refuses."""
+        with self._lock:
+            self._answered.clear()
+            self._pipe.send(bool(wanted.get("on")))
+            if not self._answered.wait(_ANSWER_TIMEOUT_S):
+                raise BadInput("The session does not answer.", "Is it still running?")
+            answer = self._answer
+        if "error" in answer:
+            raise BadInput(str(answer["error"]), "")
+        return answer
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """Take a message of the session: the path of the recording, an error, or both."""
+        self.path = str(message.get("recording", ""))
+        if message.get("answer"):
+            self._answer = message
+            self._answered.set()
+
+
+def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
+    """Serve until the pipe closes. The first message to the session is the address of the page."""
+    skeleton = humanoid24.standard_skeleton().with_bones(config.bone_m)
+    token, commands = secrets.token_urlsafe(24), RecordingCommands(pipe)
+    content = LiveContent(config.title, skeleton, config.stations, token)
+    history, seen, status_s = LineHistory(len(config.stations), time.monotonic()), 0, 0.0
+    with ViewServer(content.find, {"record": commands.record}, token=token) as server:
+        pipe.send(server.url)
+        try:
+            while True:
+                while pipe.poll(1.0 / _RATE_HZ):
+                    commands.take(pipe.recv())
+                seen, records = ring.read(seen)
+                stations = ring.station_columns(records)
+                for head, columns in zip(records[:, :4], stations, strict=True):
+                    history.add(head[1], head[2], columns[:, 7], np.maximum(columns[:, 8], columns[:, 9]))
+                if len(records):
+                    server.publish("frame", _frame(config, skeleton, records[-1:], stations[-1]))
+                now_s = time.monotonic()
+                history.update(now_s)
+                if now_s - status_s >= _STATUS_PERIOD_S:
+                    status_s = now_s
+                    server.publish("status", {**history.content(now_s), "recording": commands.path})
+        except EOFError:
+            return
+
+
+def _frame(config: BrowserConfig, skeleton: Skeleton, record: Floats, stations: Floats) -> dict[str, Any]:
+    """A frame for the page: joints [mm], status, and of each station its pose, quality and state."""
+    root_m, quaternion, angles_rad = humanoid24.unpack(PoseRing.qpos(record))
+    pose = forward_kinematics(skeleton, root_m, quaternion, angles_rad)
+    joints_m = np.concatenate([root_m, pose.end_m[0]])
+    worn: list[dict[str, Any]] = []
+    for columns in stations:
+        valid = columns[8:10] > 0.0
+        station = {"quality": round(float(columns[7]), 3), "state": 2 - int(valid.sum()), "pose": None}
+        if config.room is not None and valid.all():
+            world_from_tracker, origin_m = config.room
+            at_m = rotations.rotate(world_from_tracker, columns[:3]) + origin_m
+            turn = rotations.multiply(world_from_tracker, columns[3:7])
+            station["pose"] = np.rint(1e3 * np.concatenate([at_m, turn])).astype(int).tolist()
+        worn.append(station)
+    return {
+        "number": int(record[0, 0]),
+        "status": int(record[0, 3]),
+        "joints_mm": np.rint(1e3 * joints_m).astype(int).ravel().tolist(),
+        "stations": worn,
+    }

@@ -1,0 +1,121 @@
+"""The output `live --view browser`: a page on loopback that shows the body, the stations and the line.
+
+The session writes each frame to shared memory and waits for nobody. A process of its own serves the page.
+"""
+
+import os
+import time
+from multiprocessing import get_context
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from harness.core.arrays import Floats
+from harness.core.interrupts import shield_children
+from harness.core.skeleton import Skeleton
+from harness.errors import BadFile, BadInput, HarnessError
+from harness.live.browser_process import BrowserConfig
+from harness.live.pose import LivePose
+from harness.live.pose_ring import PoseRing
+from harness.stream.recording.recording_switch import RecordingSwitch
+
+_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 10.0
+
+
+class BrowserOutput:
+    """An `Output` that shows poses on a page, from which a recording can be started and stopped."""
+
+    name = "--view browser"
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        stations: tuple[str, ...],
+        room: tuple[Floats, Floats] | None,
+        recorder: RecordingSwitch,
+        folder: Path,
+        title: str,
+    ) -> None:
+        """Start the process and wait until it serves the page.
+
+        `room` is `world_from_tracker` (4,) and the tracker's origin [m]; `recorder` records into new files of `folder`.
+        BadFile when that is no folder, BadInput when the page cannot be served.
+        """
+        if not folder.is_dir():
+            raise BadFile(folder, "no folder", "a folder for recordings", "Name another with --out.")
+        self._recorder, self._folder = recorder, folder
+        config = BrowserConfig(skeleton.bone_m, stations, room, title)
+        with shield_children():  # a signal ends the session, and the session ends the viewer
+            context = get_context("spawn")
+            self._ring = PoseRing(context, len(stations))
+            self._pipe, other_end = context.Pipe()
+            self._process = context.Process(
+                target=_run_process, args=(config, self._ring, other_end), name="view", daemon=True
+            )
+            self._process.start()
+            other_end.close()
+        try:
+            self.url = self._wait_for_url()
+        except BaseException:
+            self.close()
+            raise
+        self.description = f"view: {self.url}"
+        self._thread = Thread(target=self._carry_out, name="page commands", daemon=True)
+        self._thread.start()
+
+    def _wait_for_url(self) -> str:
+        try:
+            message = self._pipe.recv() if self._pipe.poll(_START_TIMEOUT_S) else OSError("it does not answer")
+        except EOFError:
+            self._process.join(_END_TIMEOUT_S)
+            message = OSError(f"its process ended with exit code {self._process.exitcode}")
+        if isinstance(message, OSError):
+            raise BadInput(f"{self.name} cannot be shown: {message}.", "Leave the option out.")
+        return str(message)
+
+    def send(self, pose: LivePose) -> None:
+        """Show a pose; OSError when the viewer's process has ended."""
+        if not self._process.is_alive():
+            raise OSError("its process ended")
+        self._ring.put(pose)
+
+    def _carry_out(self) -> None:
+        """Start and stop recordings as the page asks, until the pipe closes."""
+        try:
+            while True:
+                self._pipe.send({"answer": True, **self._record(self._pipe.recv())})
+        except (EOFError, OSError):
+            return
+
+    def _record(self, on: bool) -> dict[str, Any]:
+        answer: dict[str, Any] = {}
+        try:
+            if on:
+                self._recorder.start(self._folder / time.strftime("live_%Y%m%d_%H%M%S.rec"))
+            else:
+                answer["saved"] = str(self._recorder.stop())
+        except HarnessError as error:
+            answer["error"] = self._recorder.failure or str(error)
+        path = self._recorder.path
+        return answer | {"recording": "" if path is None else str(path)}
+
+    def close(self) -> None:
+        """End the page and the recording."""
+        self._recorder.close()
+        self._pipe.close()
+        self._process.join(_END_TIMEOUT_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _run_process(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
+    """Entry point of the viewer's process, which runs at low priority. It reports its errors through the pipe."""
+    if hasattr(os, "nice"):
+        os.nice(10)
+    try:
+        from harness.live.browser_process import run_browser
+
+        run_browser(config, ring, pipe)
+    except OSError as error:
+        pipe.send(OSError(str(error)))

@@ -1,0 +1,131 @@
+"""`live --view browser`: the page's process, its events, and recordings that the page starts."""
+
+import http.client
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from harness.body import humanoid
+from harness.body.kinematics import Kinematics
+from harness.core import rotations
+from harness.errors import BadFile
+from harness.live.browser_view import BrowserOutput
+from harness.stream.codec.reader import WireFormat
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_switch import RecordingSwitch
+from harness.view.server import COMMAND_HEADER
+from tests.live.posing import configuration, live_pose
+
+pytestmark = pytest.mark.long
+BODY = humanoid.build_body()
+ROOM = rotations.IDENTITY, np.array([0.0, 0.0, 2.5])
+
+
+@pytest.fixture
+def switch() -> RecordingSwitch:
+    switch = RecordingSwitch()
+    switch.on_configured(WireFormat(("head", "torso"), 40.0))
+    return switch
+
+
+@pytest.fixture
+def shown(tmp_path: Path, switch: RecordingSwitch) -> Iterator[BrowserOutput]:
+    output = BrowserOutput(BODY.skeleton, ("head", "torso"), ROOM, switch, tmp_path, "a session")
+    try:
+        yield output
+    finally:
+        output.close()
+
+
+def connect(output: BrowserOutput) -> http.client.HTTPConnection:
+    return http.client.HTTPConnection("127.0.0.1", urlsplit(output.url).port or 0, timeout=20)
+
+
+def newest(output: BrowserOutput, kind: str) -> dict[str, Any]:
+    """The first event of a kind that the page gets."""
+    connection = connect(output)
+    connection.request("GET", "/events")
+    answer, found = connection.getresponse(), ""
+    while True:
+        line = answer.fp.readline().decode().strip()
+        if line.startswith("event: "):
+            found = line.removeprefix("event: ")
+        elif line.startswith("data: ") and found == kind:
+            connection.close()
+            content: dict[str, Any] = json.loads(line.removeprefix("data: "))
+            return content
+
+
+def record(output: BrowserOutput, on: bool) -> tuple[int, str]:
+    connection = connect(output)
+    connection.request("GET", "/")
+    token = re.search(r'data-token="([^"]+)"', connection.getresponse().read().decode())
+    assert token is not None
+    connection.request("POST", "/command/record", json.dumps({"on": on}), {COMMAND_HEADER: token[1]})
+    answer = connection.getresponse()
+    status, text = answer.status, answer.read().decode()
+    connection.close()
+    return status, text
+
+
+def test_the_page_gets_the_newest_pose(shown: BrowserOutput, rng: np.random.Generator) -> None:
+    kinematics, qpos = Kinematics(BODY), configuration(rng)
+    for number in range(200):
+        pose = live_pose(qpos, number, time.monotonic(), kinematics)
+        shown.send(pose)
+    time.sleep(0.5)
+    frame = newest(shown, "frame")
+    assert frame["number"] == 199
+    joints_m = np.reshape(frame["joints_mm"], (25, 3)) / 1e3
+    np.testing.assert_allclose(joints_m, pose.joints_m, atol=6e-4)
+    assert frame["stations"] == [{"quality": 1.0, "state": 0, "pose": [0, 0, 2500, 1000, 0, 0, 0]}] * 2
+
+
+def test_a_line_that_falls_silent_is_reported_within_a_second(shown: BrowserOutput, rng: np.random.Generator) -> None:
+    shown.send(live_pose(configuration(rng), 0, time.monotonic()))
+    began = time.monotonic()
+    while (status := newest(shown, "status"))["silent_s"] <= 0.5:
+        time.sleep(0.05)
+    assert status["lost"] == [True, True]
+    assert time.monotonic() - began < 1.5
+
+
+def test_the_page_starts_and_stops_a_recording(shown: BrowserOutput, switch: RecordingSwitch, tmp_path: Path) -> None:
+    status, text = record(shown, True)
+    path = Path(json.loads(text)["recording"])
+    assert (status, path.parent) == (200, tmp_path)
+    assert switch.path == path
+    assert record(shown, True)[0] == 422
+    status, text = record(shown, False)
+    assert (status, json.loads(text)["saved"]) == (200, str(path))
+    assert read_recording(path).formats[0].stations == ("head", "torso")
+    status, text = record(shown, False)
+    assert (status, text) == (422, "No recording runs. Start one first.\n")
+
+
+def test_a_session_whose_page_has_ended_is_told(shown: BrowserOutput, rng: np.random.Generator) -> None:
+    shown._process.kill()
+    shown._process.join(10)
+    with pytest.raises(OSError, match="its process ended"):
+        shown.send(live_pose(configuration(rng)))
+
+
+def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: RecordingSwitch, tmp_path: Path) -> None:
+    record(shown, True)
+    shown.close()
+    assert switch.path is None
+    assert not shown._process.is_alive()
+    with pytest.raises(OSError, match="refused"):
+        connect(shown).connect()
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
+    with pytest.raises(BadFile, match="no folder"):
+        BrowserOutput(BODY.skeleton, ("head",), None, switch, tmp_path / "none", "a session")
