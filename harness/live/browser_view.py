@@ -75,7 +75,7 @@ class BrowserOutput:
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""
-        if not self._process.is_alive():
+        if not self._thread.is_alive():
             raise OSError("its process ended")
         self._ring.put(pose)
 

@@ -26,6 +26,11 @@ class PoseRing:
         self.size = _HEAD + _QPOS + _STATION * stations
         self._records = context.RawArray("d", _CAPACITY * self.size)
         self._written = context.RawValue("q", 0)
+        self._rows: Floats | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the view of the memory, which another process makes of its own."""
+        return self.__dict__ | {"_rows": None}
 
     def put(self, pose: LivePose) -> None:
         """Write a frame over the oldest one."""
@@ -50,7 +55,9 @@ class PoseRing:
         return count, rows[overwritten:]
 
     def _view(self) -> Floats:
-        return np.frombuffer(self._records, dtype=np.float64).reshape(_CAPACITY, self.size)
+        if self._rows is None:
+            self._rows = np.frombuffer(self._records, dtype=np.float64).reshape(_CAPACITY, self.size)
+        return self._rows
 
     @staticmethod
     def qpos(records: Floats) -> Floats:

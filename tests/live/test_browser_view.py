@@ -112,7 +112,7 @@ def test_the_page_starts_and_stops_a_recording(shown: BrowserOutput, switch: Rec
 
 def test_a_session_whose_page_has_ended_is_told(shown: BrowserOutput, rng: np.random.Generator) -> None:
     shown._process.kill()
-    shown._process.join(10)
+    shown._thread.join(10)
     with pytest.raises(OSError, match="its process ended"):
         shown.send(live_pose(configuration(rng)))
 
