@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, print_status, progress_note, this_command
+from harness.commands.common import Verbs, add_verb, print_result, progress_note, this_command
 from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -30,7 +30,6 @@ def add_all_flag(verb: argparse.ArgumentParser) -> None:
 
 
 def run_scenario(args: argparse.Namespace) -> Outcome:
-    print_status(f"run {args.scenario}: loading")  # before the imports, which take a second
     from dataclasses import replace
 
     from harness.core.options import expand_alternatives, split_outside_brackets

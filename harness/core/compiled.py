@@ -50,7 +50,7 @@ def compiled(function: F) -> F:
         if module not in _source_hashes:
             _source_hashes[module] = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).digest()
         dispatcher._cache = _ModuleCache(function)
-        dispatcher.compile = partial(_compile, dispatcher)
+    dispatcher.compile = partial(_compile, dispatcher)
     return cast(F, dispatcher)
 
 
@@ -69,7 +69,8 @@ def _compile(dispatcher: Any, signature: Any) -> Any:
         with _optimisation_level():
             return Dispatcher.compile(dispatcher, signature)
     finally:
-        dispatcher._cache.release()
+        if isinstance(dispatcher._cache, _ModuleCache):
+            dispatcher._cache.release()
 
 
 @contextmanager
