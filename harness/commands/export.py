@@ -32,7 +32,10 @@ def run_export(args: argparse.Namespace) -> Outcome:
         files = export_run(
             args.run, args.format, folder, clips=clips, methods=methods, force=args.force, progress=bar.count
         )
-    return print_result(args, {"files": [str(f) for f in files]}, f"{len(files)} files in {folder}")
+    following = ["view", files[0]] if args.format == "bvh" else []
+    return print_result(
+        args, {"files": [str(f) for f in files]}, f"{len(files)} files in {folder}", following=following
+    )
 
 
 def _entries(flag: str, texts: list[str]) -> list[str]:

@@ -27,4 +27,5 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
 
     library = args.mocap or folders_of_environment() or None
     found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
-    return print_result(args, found.as_dict(), *found.lines())
+    following = [] if args.file.suffix.lower() == ".c3d" else ["view", args.file]  # a C3D file has markers only
+    return print_result(args, found.as_dict(), *found.lines(), following=following)

@@ -146,7 +146,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         }
     line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
     outcome = Outcome.PASS if (done.poses or done.stopped) and not done.failed else Outcome.INCOMPLETE
-    return print_result(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
+    lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
+    return print_result(args, content, *lines, outcome=outcome, following=["record", args.port, "take.rec"])
 
 
 @contextmanager

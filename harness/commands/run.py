@@ -75,5 +75,5 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         run_table(summary, short=not args.all),
         f"report: {page}" if page else f"results: {out}",
         outcome=outcome,
-        following=["plot", out, "--kind", "ranking"] if outcome is Outcome.PASS else ["status", out],
+        following=["view", out] if outcome is Outcome.PASS else ["status", out],
     )
