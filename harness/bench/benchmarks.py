@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
 from harness.bench.leak_check import bench_leak_check
+from harness.bench.live_viewer import bench_live_viewer
 from harness.bench.load import bench_load
 from harness.bench.neighbour_search import bench_index
 from harness.bench.regression_gate import bench_regression_gate
@@ -48,6 +49,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "stream": lambda seed, large, runs: bench_stream(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "serve": lambda seed, large, runs: bench_serve(seed, runs=runs),
+    "view": lambda seed, large, runs: bench_live_viewer(seed, runs=runs),
     "ik": _ik,
     "index": _index,
     "methods": _methods,
@@ -69,7 +71,7 @@ def run_benchmarks(
     """Run the named benchmarks, or all; returns their rows, and the reasons why some of all could not run.
 
     With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
-    `wire` runs each line `runs` times, and so does `serve`.
+    `wire` runs each line `runs` times, and so do `serve` and `view` their sessions.
     UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed.
     """
     for name in names:

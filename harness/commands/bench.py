@@ -17,13 +17,11 @@ _ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save"
 def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
-    text = "methods, ik, index, wire, serve, stream, load, gate, sweep, startup (default: all), or accuracy"
+    text = "methods, ik, index, wire, serve, view, stream, load, gate, sweep, startup (default: all), or accuracy"
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
-    verb.add_argument(
-        "--runs", type=positive_int, metavar="N", help="wire, serve: number of runs of each line (default 1)"
-    )
+    verb.add_argument("--runs", type=positive_int, metavar="N", help="wire, serve, view: number of runs (default 1)")
     verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default expert_map)")
     verb.add_argument("--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5)")
     text = "accuracy: clips computed at the same time (default 1)"
@@ -40,8 +38,8 @@ def run_bench(args: argparse.Namespace) -> Outcome:
         return _bench_accuracy(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
         raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
-    if args.runs and args.what and not {"wire", "serve"} & set(args.what):
-        raise BadInput("--runs is for wire and serve alone.", "Name it: harness bench wire --runs 10.")
+    if args.runs and args.what and not {"wire", "serve", "view"} & set(args.what):
+        raise BadInput("--runs is for wire, serve and view alone.", "Name it: harness bench wire --runs 10.")
     return _bench_speed(args)
 
 
