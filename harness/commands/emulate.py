@@ -106,6 +106,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
         stations = ["--stations", ",".join(samples.stations)] if args.stations else []
         words = ["harness", "live", "--port", str(args.pty or port.name), "--scenario", args.scenario, *stations]
+        words += ["--view", "browser"]
         print_status(f"next, in another terminal: {shlex.join(words)}")
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
