@@ -33,23 +33,26 @@ _EXAMPLE = "harness placement --stations 3 --behaviour table_tennis"
 def add_placement(verbs: Verbs) -> None:
     text = "find out where to wear how many stations, for a behaviour or by a study; the same command resumes"
     verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
-    text = "a TOML file, or the name of a shipped study, such as walking; or none, with a question:"
+    text = "a TOML file, or the name of a shipped study, such as walking; without one, the options below ask a question"
     verb.add_argument("study", nargs="?", help=text)
     text = "clips computed at the same time (default 2)"
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
     question = verb.add_argument_group("question", f"instead of a study, such as `{_EXAMPLE}`")
     text = "number of stations, such as 3 or 2-4 (default 3)"
     question.add_argument("--stations", type=parse_sizes, metavar="N", help=text)
-    text = "behaviours, separated by commas (default walking); of the built-in motion, or of the library with --mocap"
+    text = (
+        "walking, boxing, jumping, golf or table_tennis of the built-in motion, or behaviours of the library with "
+        "--mocap; several are separated by commas (default walking)"
+    )
     question.add_argument("--behaviour", metavar="A,B", help=text)
-    text = "places to choose from, separated by commas (default: one for each part; `harness list places`)"
+    text = "places to choose from (default: one on each of eleven segments; `harness list places` names all)"
     question.add_argument("--places", metavar="A,B", help=text)
     question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
     text = "noise preset of the tracker (default: default)"
     question.add_argument("--noise", choices=["clean", "noise", "default"], help=text)
     text = "budget of time, which limits sets and clips (default 10)"
     question.add_argument("--minutes", type=positive_float, metavar="N", help=text)
-    text = "number of clips to choose on, whatever the time (default 16, or what the budget allows)"
+    text = "number of clips to choose on, without regard to --minutes (default: what the budget allows, at most 16)"
     question.add_argument("--clips", type=positive_int, metavar="N", help=text)
     question.add_argument("--seed", type=int, help="seed of motion and noise (default 1)")
 
