@@ -32,6 +32,7 @@ OPENS_WITH_AN_EXTRA = {
     "live/pose_sheet.py",
     "live/viewer_process.py",
     "report/placement/body_map_worker.py",
+    "view/movie_worker.py",
 }
 """Files that import a package of an extra when they are loaded; others load them where the extra is installed."""
 
