@@ -21,14 +21,13 @@ from harness.body import humanoid
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, ProgressCallback
 from harness.experiment import benchmark_clips
 from harness.experiment.benchmark_clips import BenchmarkClip
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.round_robin_timing import (
     REFERENCE_METHOD,
     MethodSpeed,
-    ProgressCallback,
     TimedStep,
     measure_speed,
     time_method,

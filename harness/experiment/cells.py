@@ -7,7 +7,7 @@ stopped at any moment and resumed.
 
 import time
 import traceback
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
@@ -35,9 +35,6 @@ from harness.results.cell import as_row, cell_folder, read_row, varied_text
 from harness.score.score import score_estimate
 from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
-
-ProgressCallback = Callable[[str, int, int], None]
-"""Called with the name of the last cell, the number of cells that ended and the number that were planned."""
 
 VariedValues = Mapping[str, Any]
 

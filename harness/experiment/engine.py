@@ -18,12 +18,12 @@ from typing import Any
 
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cell_watcher import CellCount
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
-    ProgressCallback,
     check_names,
     clear_caches,
     open_scenario_motion,

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.progress import ProgressCallback
 from harness.experiment.benchmark_clips import (
     WARM_UP_FRAMES,
     BenchmarkClip,
@@ -27,7 +28,6 @@ FRAMES_PER_TURN = 40
 REFERENCE_METHOD = "ik"
 """The method that every other one is compared with, in the same turns."""
 
-ProgressCallback = Callable[[str, int, int], None]
 TimedStep = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
 """Maps a frame and the true pose of the frame before to a configuration (55,) and the seconds that the step took."""
 TimedMethod = Callable[[BenchmarkClip], TimedStep]

@@ -34,8 +34,9 @@ from harness.bench.accuracy.statements import (
 )
 from harness.bench.accuracy.targets import LAGGED_CONDITION, LagResult, TargetResult, evaluate_lag, evaluate_targets
 from harness.compare.ranking import MethodRanking
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.experiment.cells import ProgressCallback, check_names, clear_caches
+from harness.experiment.cells import check_names, clear_caches
 from harness.experiment.engine import run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.isolation import DEFAULT_ISOLATION

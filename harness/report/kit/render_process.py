@@ -4,7 +4,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,15 +16,13 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.files import TEMPORARY
 from harness.core.interrupts import shield_children
+from harness.core.progress import ProgressCallback
 from harness.core.python_process import python_command, python_environment
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
 """Time allowed for the start, and for each picture [s]."""
 _POLL_INTERVAL_S = 0.5
-
-ProgressCallback = Callable[[str, int, int], None]
-"""Called with the name of the latest finished file, the number of finished files and the number planned."""
 
 
 @dataclass(frozen=True, eq=False)

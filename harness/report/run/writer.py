@@ -10,12 +10,13 @@ import numpy as np
 from harness.core.arrays import Ints
 from harness.core.files import write_text
 from harness.core.number_format import format_number
+from harness.core.progress import ProgressCallback
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.highlights import choose_highlights
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.motion_player import motion_player
-from harness.report.kit.render_process import ProgressCallback, RenderJob, RenderProcess
+from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.report.kit.text import to_file_name
 from harness.report.run import charts, parameter_effects, uncertainty
 from harness.report.run.data import WORST_METRICS, RunData, read_run

@@ -10,8 +10,9 @@ from typing import Literal
 
 from harness.compare.claims import correct_claims
 from harness.core.package_data import data_folder
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome, SystemFault, UnknownName, was_interrupted
-from harness.experiment.cells import ProgressCallback, check_names, open_scenario_motion
+from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest

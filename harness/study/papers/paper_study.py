@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.files import to_json_types
+from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.cells import ProgressCallback
 from harness.experiment.scenario import Scenario, variants
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from harness.core.files import content_key, to_json_types
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.experiment.cells import ProgressCallback
 from harness.experiment.engine import CellResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names

@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, compare_paired
+from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
-from harness.experiment.cells import ProgressCallback, clear_caches
+from harness.experiment.cells import clear_caches
 from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
