@@ -99,7 +99,8 @@ class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: nu
         self._cache_file._source_stamp = module_stamp(self._py_func.__globals__)
         found = self._load(sig, target_context)
         if found is None and not self._lock.is_locked:
-            with suppress(OSError, Timeout):  # no writable folder; a process that was stopped
+            # No writable folder, a file system without locks, a process that was stopped: compile all the same.
+            with suppress(OSError, NotImplementedError, Timeout):
                 self._lock.acquire(timeout=_LONGEST_COMPILATION_S)
                 found = self._load(sig, target_context)
         return found
