@@ -17,6 +17,7 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
+from harness.simulate.simulation import TrackerConfig
 from harness.study.placement.candidates import Candidate
 from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
 from harness.study.placement.ranking import min_clips
@@ -29,7 +30,7 @@ LEAST_CLIPS = 6
 CLIP_S = 5.0
 """Length of each clip that is used [s]."""
 EXAMPLE_FRAMES = 2000
-"""Number of frames that a method learns from."""
+"""Number of frames that a method learns from; all where the examples have fewer."""
 NoisePreset = Literal["clean", "noise", "default"]
 _ROLES = 3
 """Clips to choose on, held-out clips and examples have equal shares of a behaviour."""
@@ -98,7 +99,7 @@ def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -
             test=tuple(test),
             behaviours=_behaviours(test, source),
             examples=tuple(examples),
-            thin_to=EXAMPLE_FRAMES,
+            thin_to=_thinned_frames(examples, source),
             body="common",
             longest_s=CLIP_S,
         ),
@@ -121,6 +122,20 @@ def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -
         condition_size=question.most,
     )
     return study, scenario
+
+
+def _thinned_frames(examples: Sequence[str], source: MotionSource) -> int:
+    """`EXAMPLE_FRAMES` if the examples have so many at the tracker's rate, else 0, which keeps all of them.
+
+    Clips are loaded until there are enough. Resampling may drop the last frame of each.
+    """
+    rate_hz, frames = TrackerConfig().rate_hz, 0
+    for name in examples:
+        clip = source.load(name)
+        frames += int(len(clip) / clip.rate_hz * rate_hz) - 1
+        if frames >= EXAMPLE_FRAMES:
+            return EXAMPLE_FRAMES
+    return 0
 
 
 def _deal_clips(behaviour: str, source: MotionSource) -> tuple[list[str], list[str], list[str]]:

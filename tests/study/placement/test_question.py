@@ -7,7 +7,7 @@ import pytest
 
 from harness.errors import BadInput, UnknownName
 from harness.study.placement.plan import plan_study
-from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
+from harness.study.placement.question import EXAMPLE_FRAMES, PlacementQuestion, plan_within_budget, question_study
 
 TRIPLES = PlacementQuestion(3, 3, ("table_tennis",))
 
@@ -91,3 +91,10 @@ def test_a_library_without_the_behaviour_is_refused_with_those_that_it_has(tmp_p
     (tmp_path / "empty").mkdir()
     with pytest.raises((UnknownName, BadInput)):
         question_study(TRIPLES, tmp_path / "empty")
+
+
+def test_few_example_frames_are_all_kept(mocap: Path) -> None:
+    """Five real takes of boxing leave one to learn from; it has fewer frames than a method usually gets."""
+    _, scenario = question_study(PlacementQuestion(2, 2, ("boxing",), places=("head", "hand")), mocap)
+    assert scenario.motion.thin_to == 0
+    assert question_study(TRIPLES, None)[1].motion.thin_to == EXAMPLE_FRAMES
