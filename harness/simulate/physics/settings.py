@@ -1,0 +1,67 @@
+"""The table `[physics]` of a scenario."""
+
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from harness.simulate.physics.constellation import ConstellationSettings
+from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.inertial import Inertial, InertialErrors
+from harness.simulate.physics.room import Room
+from harness.simulate.physics.sound import Sound
+
+E = TypeVar("E", bound=InertialErrors)
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Errors of an IS-900 from their causes: sound, line of sight, inertia and the filter that fuses them.
+
+    docs/is900.md 16 describes the model. The table replaces the statistical errors of the noise presets.
+    """
+
+    constellation: ConstellationSettings = field(default_factory=ConstellationSettings)
+    room: Room = field(default_factory=Room)
+    sound: Sound = field(default_factory=Sound)
+    inertial: Inertial = field(default_factory=Inertial)
+    fusion: Fusion = field(default_factory=Fusion)
+
+    def with_preset(self, noise: str) -> "Physics":
+        """The physics under a noise preset.
+
+        `default` has every cause of errors. `noise` has no shadow, echo, burst or wrong cycle. `clean` also has no
+        noise of ranges and inertia, no survey error and no temperature error. Cones and reaches of emitters hold
+        under each.
+        """
+        if noise == "default":
+            return self
+        room = replace(self.room, shadow=False, echoes=False)
+        sound = replace(self.sound, bursts_per_min=0.0, wrong_cycle_share=0.0)
+        if noise == "noise":
+            return replace(self, room=room, sound=sound)
+        exact = replace(
+            sound, range_noise_m=0.0, air_speed_sd_m_s=0.0, temperature_sd_c=0.0, temperature_c=sound.assumed_c
+        )
+        return replace(
+            self,
+            constellation=replace(self.constellation, survey_sd_m=0.0),
+            room=room,
+            sound=exact,
+            inertial=replace(
+                self.inertial,
+                gyroscope=_without_errors(self.inertial.gyroscope),
+                accelerometer=_without_errors(self.inertial.accelerometer),
+            ),
+        )
+
+
+def _without_errors(errors: E) -> E:
+    return replace(
+        errors,
+        white=0.0,
+        bias_instability=0.0,
+        random_walk=0.0,
+        turn_on=0.0,
+        scale=0.0,
+        misalignment_rad=0.0,
+        limit=1e6,
+    )
