@@ -221,7 +221,7 @@ def evaluate_cell(
         inputs=planned.inputs,
         split=scenario.motion.split if method.needs_examples else "none",
         calibration=calibration.calibration.kind,
-        noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
+        noise=scenario.noise_label,
         seed=scenario.seed,
         performer=evaluation.subject.performer,
         varied=planned.varied,

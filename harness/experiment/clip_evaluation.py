@@ -68,9 +68,17 @@ def tracker_of(scenario: Scenario) -> TrackerConfig:
 
 
 def noise_of(scenario: Scenario) -> Noise:
-    """The noise preset with the scenario's changes to single components; UnknownName, BadInput."""
+    """The noise preset with the scenario's changes to single components; UnknownName, BadInput.
+
+    With a table [physics] the preset selects causes of errors, and of the statistical components the clock remains.
+    """
+    if "physics" in scenario.components:
+        raise BadInput("components.physics is no component.", "Write the table [physics] beside [components].")
+    preset = noises.noise_preset(scenario.noise)
+    if scenario.physics is not None:
+        preset = Noise(clock=preset.clock, physics=scenario.physics.with_preset(scenario.noise))
     try:
-        return replace_fields(noises.noise_preset(scenario.noise), scenario.components, "components")
+        return replace_fields(preset, scenario.components, "components")
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
@@ -294,7 +302,8 @@ class Observation:
     def conditions(self) -> dict[str, object]:
         """The conditions that all methods and inputs share, as JSON content."""
         scenario, subject = self.scenario, self.subject
-        content = asdict(scenario)
+        content, components = scenario.content(), asdict(noise_of(scenario))
+        del components["physics"]
         for key in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
             del content[key]
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
@@ -310,7 +319,7 @@ class Observation:
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
-            "components": asdict(noise_of(scenario)),
+            "components": components,
             "disturbance": scenario.disturbance.as_dict(),
             "clip": str(subject.part),
             "motion_digest": _motion_digest(subject.clip),
@@ -321,7 +330,9 @@ class Observation:
         }
 
 
-_OBSERVATION_KEYS = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
+_OBSERVATION_KEYS = (
+    *("noise", "profile", "components", "physics", "disturbance", "stations", "worn", "calibration", "calibrating"),
+)
 """Scenario keys that only the observation depends on."""
 _METHOD_KEYS = ("methods", "inputs", "vary")
 """Scenario keys that neither subject nor observation depends on."""

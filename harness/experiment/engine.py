@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import closing, nullcontext, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -79,7 +79,7 @@ def run(
     Returns PASS; INCOMPLETE if cells are missing; NOT_COMPARABLE if no cell reached the floor of coverage.
     """
     scenario = expand_clips(scenario, folder)
-    content = asdict(scenario)
+    content = scenario.content()
     del content["fault"]  # faults concern the emulator alone, a run does not depend on them
     with process_executor(jobs) as executor:
         return _run_folder(
@@ -107,7 +107,7 @@ def run_sweep(
     content = {
         "sweep": sweep.name,
         "scenarios": {
-            scenario_label(scenario): {k: v for k, v in asdict(scenario).items() if k not in _CIRCUMSTANCE_KEYS}
+            scenario_label(scenario): {k: v for k, v in scenario.content().items() if k not in _CIRCUMSTANCE_KEYS}
             for scenario in scenarios
         },
         "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),

@@ -4,7 +4,7 @@ import fnmatch
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +25,7 @@ from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
+from harness.simulate.physics.settings import Physics
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
@@ -145,6 +146,9 @@ class Scenario:
     """Name of changed noise in tables; without it the preset's name and an asterisk."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise preset (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
+    physics: Physics | None = None
+    """Errors from their causes instead of the statistical ones (docs/is900.md 16): the table [physics], which may be
+    empty. The noise preset then selects the causes."""
     disturbance: Disturbance = field(default_factory=Disturbance)
     """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.results.recovery`)."""
     vary: dict[Text, Any] = field(default_factory=dict)
@@ -159,6 +163,19 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def noise_label(self) -> str:
+        """Name of the noise in tables: the profile, or the preset, with an asterisk if components change it."""
+        physical = " physics" if self.physics else ""
+        return self.profile or self.noise + physical + ("*" if self.components else "")
+
+    def content(self) -> dict[str, Any]:
+        """The fields as a dictionary, without a table [physics] that is not there."""
+        content = asdict(self)
+        if self.physics is None:
+            del content["physics"]  # as before the key existed
+        return content
 
     @property
     def worn_stations(self) -> dict[str, Station]:

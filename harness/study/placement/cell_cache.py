@@ -7,7 +7,7 @@ set is run twice, in whichever mode, in this run or a later one.
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -158,7 +158,7 @@ class CellCache:
         }
         if moved:
             scenario = replace(scenario, worn=tuple(names))
-        name = f"{scenario.name}_{content_key(asdict(scenario))[:8]}"  # names are unique by content
+        name = f"{scenario.name}_{content_key(scenario.content())[:8]}"  # names are unique by content
         return replace(scenario, name=name), {"stations": moved} if moved else {"worn": names}
 
 

@@ -177,7 +177,7 @@ class _PlacementRun:
             motion=plan.motion,
             behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
             methods=scenario.methods,
-            noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
+            noise=scenario.noise_label,
             link=plan.describe_link(sizes),
             seed=scenario.seed,
             command=command,
@@ -309,7 +309,7 @@ def _condition_kind(own: Scenario, other: Scenario) -> str:
     for kind, differs in (
         ("behaviour", own.motion != other.motion),
         ("method", own.methods != other.methods),
-        ("noise", (own.noise, own.components) != (other.noise, other.components)),
+        ("noise", (own.noise, own.components, own.physics) != (other.noise, other.components, other.physics)),
     ):
         if differs:
             return kind
