@@ -36,12 +36,12 @@ def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
     """Vectors (..., 3) given in frame b, expressed in frame a."""
     q, v = np.asarray(a_from_b, dtype=float), np.asarray(v_b, dtype=float)
     w, u = q[..., :1], q[..., 1:]
-    t = 2.0 * _cross(u, v)
-    out: Floats = v + w * t + _cross(u, t)
+    t = 2.0 * cross(u, v)
+    out: Floats = v + w * t + cross(u, t)
     return out
 
 
-def _cross(u: Floats, v: Floats) -> Floats:
+def cross(u: Floats, v: Floats) -> Floats:
     """Cross products (..., 3), equal to `np.cross` to the bit, in a quarter of its time for few vectors."""
     x1, y1, z1 = u[..., 0], u[..., 1], u[..., 2]
     x2, y2, z2 = v[..., 0], v[..., 1], v[..., 2]

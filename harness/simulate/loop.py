@@ -15,6 +15,7 @@ from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
+from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.samples import DeviceSamples
@@ -71,6 +72,19 @@ def simulate_loop(
         tracker_from_station=np.concatenate([part.turn for part in parts]),
         quality=np.concatenate([part.quality for part in parts]),
     )
+
+
+def looping_trajectory(body: Body, take: BodyMotion, rate_hz: float) -> tuple[Trajectory, int]:
+    """Trajectory of a take and of the way back in one piece, and the number of frames of a round.
+
+    A round takes this number of periods of `rate_hz`; then the take begins again with its first position and velocity.
+    Inertial sensors need that: they would measure a jump of the velocity as an infinite acceleration.
+    """
+    trajectory = Trajectory(body, take)
+    ends = trajectory.qpos(np.array([trajectory.duration_s, 0.0]))
+    least_s = trajectory.duration_s + STOP_S + _return_duration_s(ends[0], ends[1]) + START_S
+    frames = int(np.ceil(least_s * rate_hz))
+    return trajectory.with_return(frames / rate_hz), frames
 
 
 def _return_duration_s(last: Floats, first: Floats) -> float:

@@ -7,7 +7,6 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount, locate_mount
-from harness.body.soft_tissue import tissue_thickness_m
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
@@ -15,8 +14,9 @@ from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
-from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
-from harness.simulate.trajectory import StationMotion, Trajectory
+from harness.simulate.readings import SimulatedReadings
+from harness.simulate.skin import skin_below, tissue_force_m_s2
+from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import position_range_m
 from harness.stream.codec.reader import FrameReader, WireFormat
@@ -144,8 +144,7 @@ def simulate_readings(
     calibration = exact_calibration(trajectory.body, mounts, tracker)
     motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    skeleton = trajectory.body.skeleton
-    along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
+    skin = skin_below(trajectory.body.skeleton, mounts, calibration)
     readings = SimulatedReadings(
         seed=seed,
         take=take,
@@ -153,9 +152,9 @@ def simulate_readings(
         time_s=time_s + begins_s,
         rate_hz=tracker.rate_hz,
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
-        radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
-        tissue_m=np.array([tissue_thickness_m(mount.bone, mount.along) for mount in mounts]),
-        force_m_s2=_force_m_s2(motion, calibration),
+        radius_m=skin.radius_m,
+        tissue_m=skin.tissue_m,
+        force_m_s2=tissue_force_m_s2(motion, calibration),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
         quality=np.ones(time_s.shape),
@@ -164,14 +163,6 @@ def simulate_readings(
     )
     noise.apply(readings)
     return readings
-
-
-def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
-    """(E, S, 3) specific force at each station minus that in the rest pose, in the station's axes [m/s^2]."""
-    up = np.array([0.0, 0.0, GRAVITY_M_S2])
-    specific_force = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
-    out: Floats = specific_force - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
-    return out
 
 
 def _transmit(

@@ -1,5 +1,6 @@
 """A smooth trajectory with consistent pose, velocity and acceleration, and the motion of stations on it."""
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,20 @@ from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
+from harness.simulate.held_poses import minimum_jerk
+from harness.simulate.resting_ends import (
+    START_S,
+    STOP_S,
+    extended,
+    start_piece,
+    stop_piece,
+    with_rest_after,
+    with_rest_before,
+)
+
+OVERLAP_S = 0.05
+"""Time for which a take goes on into its next round [s]: longer than what a device does at once."""
+_RETURN_HZ = 120.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +57,8 @@ class Trajectory:
     """Cubic spline through the frames of a take, twice continuously differentiable.
 
     The root's quaternion is interpolated with continuous sign and then normalised, which keeps two continuous
-    derivatives. Time runs from 0 to `duration_s` [s]; BadInput outside.
+    derivatives. The take runs from 0 to `duration_s` [s]. `with_lead_in`, `with_lead_out` and `with_return` add motion
+    before and after it, in which accelerations may jump. BadInput for times outside `begins_s` to `ends_s`.
     """
 
     def __init__(self, body: Body, take: BodyMotion) -> None:
@@ -52,7 +68,59 @@ class Trajectory:
         self.duration_s = (len(take) - 1) / take.rate_hz
         knots = np.array(take.qpos)
         knots[:, 3:7] = rotations.continuous(knots[:, 3:7])
-        self._spline = CubicSpline(np.arange(len(take)) / take.rate_hz, knots)
+        self._take: PPoly = CubicSpline(np.arange(len(take)) / take.rate_hz, knots)
+        self._spline: PPoly = self._take
+
+    @property
+    def begins_s(self) -> float:
+        """First time [s]: 0, or the beginning of the lead-in."""
+        return float(self._spline.x[0])
+
+    @property
+    def ends_s(self) -> float:
+        """Last time [s]: `duration_s`, or the end of what follows the take."""
+        return float(self._spline.x[-1])
+
+    def with_lead_in(self, warm_up_s: float) -> "Trajectory":
+        """The trajectory from -`warm_up_s` [s], where the performer rests in the first pose, then starts to move.
+
+        Position and velocity are continuous; the take stays as it is, to the bit. BadInput for a time that is not
+        longer than the start (`resting_ends.START_S`).
+        """
+        return self._with_spline(with_rest_before(self._spline, warm_up_s))
+
+    def with_lead_out(self, rest_s: float) -> "Trajectory":
+        """The trajectory until `rest_s` after its end [s]; the performer stops and rests in the last pose.
+
+        Position and velocity are continuous. BadInput for a time that is not longer than the stop.
+        """
+        return self._with_spline(with_rest_after(self._spline, rest_s))
+
+    def with_return(self, loop_s: float) -> "Trajectory":
+        """The take and a way back to its first position and velocity, where it begins again at `loop_s` [s].
+
+        The performer stops, goes back to the first pose in a minimum-jerk motion, and starts as in `with_lead_in`. The
+        beginning of the take follows once more, for `OVERLAP_S`. BadInput when no time is left for the way back.
+        """
+        from_s, to_s = self.duration_s + STOP_S, loop_s - START_S
+        if not to_s > from_s:
+            raise BadInput(
+                f"A loop of {loop_s:.3f} s is too short for the take and the way back.",
+                f"Stop and start take {STOP_S + START_S:g} s.",
+            )
+        back = _minimum_jerk_spline(self._take(self.duration_s), self._take(0.0), from_s, to_s)
+        # The way back may end at the first pose with the opposite sign of its quaternion.
+        sign = np.ones(self._take.c.shape[2])
+        sign[3:7] = np.copysign(1.0, np.dot(back(to_s)[3:7], self._take(0.0)[3:7]))
+        again = int(np.searchsorted(self._take.x[1:-1], OVERLAP_S)) + 1
+        pieces = [stop_piece(self._take), back.c, sign * start_piece(self._take), sign * self._take.c[:, :again]]
+        ends_s = np.concatenate([back.x, [loop_s], loop_s + self._take.x[1 : again + 1]])
+        return self._with_spline(extended(self._spline, np.concatenate(pieces, axis=1), ends_s))
+
+    def _with_spline(self, spline: PPoly) -> "Trajectory":
+        out = copy(self)
+        out._spline = spline
+        return out
 
     def qpos(self, time_s: Floats) -> Floats:
         """Configurations (N, 55) at N times [s]."""
@@ -75,10 +143,10 @@ class Trajectory:
     def _derivatives(self, time_s: Floats, order: int, spline: PPoly | None = None) -> list[Floats]:
         """`qpos`, `qvel` and `qacc`, up to the given order; with `spline`, of the root and of its hinges alone."""
         t = np.asarray(time_s, dtype=float)
-        if t.size and not (t.min() >= -1e-9 and t.max() <= self.duration_s + 1e-9):
+        if t.size and not (t.min() >= self.begins_s - 1e-9 and t.max() <= self.ends_s + 1e-9):
             raise BadInput(
                 f"A time between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
-                f"It runs from 0 to {self.duration_s:.3f} s.",
+                f"It runs from {self.begins_s:g} to {self.ends_s:.3f} s.",
             )
         splined: list[Floats] = [(spline or self._spline)(t, k) for k in range(order + 1)]
         # Let p be the splined quaternion, n its length, q = p/n. Components of q' and q'' along q do not change the
@@ -104,7 +172,7 @@ class Trajectory:
         ]
         hinges = [d for own in hinges_of for d in own]
         columns = [*range(7), *(7 + QPOS_OF_DOF[hinges])]  # other hinges do not move the station
-        spline = PPoly.construct_fast(self._spline.c[:, :, columns], self._spline.x)
+        spline = _pieces(self._spline, time_s, columns)
         q, v, a = self._derivatives(time_s, 2, spline)
         turned, rate, hinge_acceleration = q[:, 3:7], v[:, 6:, None], a[:, 6:, None]
         turns = rotations.exp(q[:, 7:, None] * skeleton.axes[hinges])
@@ -141,6 +209,25 @@ class _PointMotion:
             self.velocity + swing,
             self.acceleration + _cross(alpha, reach_m) + _cross(omega, swing),
         )
+
+
+def _minimum_jerk_spline(last: Floats, first: Floats, from_s: float, to_s: float) -> PPoly:
+    """Cubic spline through a minimum-jerk motion between two configurations (55,), at rest at both ends."""
+    count = int(np.ceil((to_s - from_s) * _RETURN_HZ)) + 1
+    knots = minimum_jerk(last, first, np.linspace(0.0, 1.0, count + 1))
+    knots[:, 3:7] = rotations.continuous(knots[:, 3:7])
+    knots[-1] = first
+    knots[-1, 3:7] *= np.copysign(1.0, np.dot(knots[-2, 3:7], first[3:7]))
+    return CubicSpline(np.linspace(from_s, to_s, count + 1), knots, bc_type="clamped")
+
+
+def _pieces(spline: PPoly, time_s: Floats, columns: list[int]) -> PPoly:
+    """The pieces of a spline in which these times lie, of some columns alone."""
+    if not time_s.size:
+        return PPoly.construct_fast(spline.c[:, :1, columns], spline.x[:2])
+    inner = spline.x[1:-1]
+    first, last = np.searchsorted(inner, [time_s.min(), time_s.max()], side="right").tolist()
+    return PPoly.construct_fast(spline.c[:, first : last + 1, columns], spline.x[first : last + 2])
 
 
 def _chain(skeleton: Skeleton, bone: str) -> list[int]:

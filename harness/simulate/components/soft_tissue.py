@@ -40,8 +40,7 @@ class SoftTissueArtefact:
         check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
-        frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / readings.tissue_m)
-        pace = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
+        pace = natural_frequency_rad_s(self, readings.tissue_m)
         linear_m = simulate_oscillators(-readings.force_m_s2, pace, self.damping, 1.0 / readings.rate_hz)
         shift_m = soft_limit(linear_m, readings.tissue_m[:, None])
         readings.position_m = readings.position_m + rotations.rotate(readings.turn, shift_m)
@@ -52,6 +51,13 @@ class SoftTissueArtefact:
         )
 
 
+def natural_frequency_rad_s(component: SoftTissueArtefact, tissue_m: Floats) -> Floats:
+    """(S, 3) natural frequency along each axis of stations on tissue of these thicknesses (S,) [rad/s]."""
+    frequency_hz = component.frequency_hz * np.sqrt(component.reference_tissue_m / tissue_m)
+    out: Floats = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
+    return out
+
+
 def simulate_oscillators(push: Floats, pace: Floats, damping: float, step_s: float) -> Floats:
     """Solution (N, ...) of x'' + 2 d w x' + w^2 x = push [m] for sampled pushes (N, ...) [m/s^2].
 
@@ -59,7 +65,7 @@ def simulate_oscillators(push: Floats, pace: Floats, damping: float, step_s: flo
     for which each step is exact, however stiff the oscillator. It starts at rest at the first push's equilibrium.
     """
     # A push u + r t has the solution c + s t + e(t); c, s and the free response e are matched at each sample.
-    step = _free_response(pace, damping, step_s)
+    step = free_response(pace, damping, step_s)
     place, speed = push[0] / pace**2, np.zeros_like(push[0])
     out = np.empty_like(push)
     out[0] = place
@@ -80,7 +86,7 @@ def soft_limit(shift_m: Floats, most_m: Floats) -> Floats:
     return out
 
 
-def _free_response(pace: Floats, damping: float, step_s: float) -> Floats:
+def free_response(pace: Floats, damping: float, step_s: float) -> Floats:
     """(2, 2, ...) state transition of position and velocity over a step without a push."""
     root = np.sqrt(complex(damping**2 - 1.0))
     root = root if abs(root) > 1e-6 else 1e-6  # critical damping is the limit of both sides

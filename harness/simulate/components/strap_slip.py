@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from harness.core.ranges import Range, check_fields
 from harness.simulate.components.mount import MountSlip
 from harness.simulate.readings import SimulatedReadings
@@ -32,13 +34,19 @@ class StrapSlip:
     def apply(self, readings: SimulatedReadings) -> None:
         begin_s, end_s = float(readings.time_s.min()), float(readings.time_s.max())
         for station in readings.stations:
-            rng = readings.take_rng("loose", station)
-            slips, when, along, around = rng.random() < self.share, rng.random(), rng.normal(), rng.normal()
-            if slips:
-                MountSlip(
-                    station,
-                    from_s=begin_s + when * (end_s - begin_s),
-                    over_s=self.over_s,
-                    around_rad=self.around_rad * around,
-                    along_m=self.along_m * along,
-                ).apply(readings)
+            slip = self.draw(readings.take_rng("loose", station), station, begin_s, end_s)
+            if slip is not None:
+                slip.apply(readings)
+
+    def draw(self, rng: np.random.Generator, station: str, begin_s: float, end_s: float) -> MountSlip | None:
+        """The slip of a station in a take between two times [s]; None when its strap holds."""
+        slips, when, along, around = rng.random() < self.share, rng.random(), rng.normal(), rng.normal()
+        if not slips:
+            return None
+        return MountSlip(
+            station,
+            from_s=begin_s + when * (end_s - begin_s),
+            over_s=self.over_s,
+            around_rad=self.around_rad * around,
+            along_m=self.along_m * along,
+        )

@@ -1,11 +1,18 @@
 """Inertial sensors: true increments of angle and velocity, and the errors of gyroscopes and accelerometers."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
 
+from harness.core.arrays import Floats
+from harness.core.compiled import compiled
 from harness.core.ranges import Range, check_fields
+from harness.core.seeds import generator
+from harness.simulate.physics.motion import TrackerMotion
+from harness.simulate.readings import GRAVITY_M_S2
 
 Spread = Annotated[float, Range(0.0, 10.0)]
 Time = Annotated[float, Range(1e-2, 1e6)]
@@ -78,3 +85,112 @@ class Inertial:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+def true_increments(motion: TrackerMotion, lever_m: Floats) -> tuple[Floats, Floats]:
+    """Increments of angle [rad] and velocity [m/s] of inertial units between the ticks of a block, (T, S, 3) each.
+
+    The units are at `lever_m` (3,) in the station's axes [m]. Increments are in the station's axes at the interval's
+    beginning: the rotation vector to its end, and the integral of the specific force. They are exact, since they come
+    from the motion at the ticks: no coning or sculling is left in them.
+    """
+    _, velocity_m_s = motion.points(lever_m)
+    turn, shape = motion.tracker_from_station, (len(motion.time_s) - 1, *velocity_m_s.shape[1:])
+    angle_rad, gain_m_s = np.empty(shape), np.empty(shape)
+    _difference(motion.time_s, turn, velocity_m_s, angle_rad, gain_m_s)
+    return angle_rad, gain_m_s
+
+
+@compiled
+def _difference(time_s: Floats, turn: Floats, velocity_m_s: Floats, angle_rad: Floats, gain_m_s: Floats) -> None:
+    for k in range(len(time_s) - 1):
+        fall_m_s = GRAVITY_M_S2 * (time_s[k + 1] - time_s[k])
+        for s in range(turn.shape[1]):
+            w, x, y, z = turn[k, s]
+            p, q, r, t = turn[k + 1, s]
+            # conjugate of the first times the second
+            real = w * p + x * q + y * r + z * t
+            i = w * q - x * p - y * t + z * r
+            j = w * r + x * t - y * p - z * q
+            m = w * t - x * r + y * q - z * p
+            if real < 0.0:
+                real, i, j, m = -real, -i, -j, -m
+            sine = math.sqrt(i * i + j * j + m * m)
+            scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, real) / sine
+            angle_rad[k, s, 0], angle_rad[k, s, 1], angle_rad[k, s, 2] = scale * i, scale * j, scale * m
+            a = velocity_m_s[k + 1, s, 0] - velocity_m_s[k, s, 0]
+            b = velocity_m_s[k + 1, s, 1] - velocity_m_s[k, s, 1]
+            c = velocity_m_s[k + 1, s, 2] - velocity_m_s[k, s, 2] - fall_m_s
+            # rotation by the conjugate: v - w (2 u x v) + u x (2 u x v)
+            d, e, f = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+            gain_m_s[k, s, 0] = a - w * d + y * f - z * e
+            gain_m_s[k, s, 1] = b - w * e + z * d - x * f
+            gain_m_s[k, s, 2] = c - w * f + x * e - y * d
+
+
+class InertialUnit:
+    """Gyroscopes and accelerometers of S stations. It carries state: `measure` takes block after block.
+
+    Each station has its own draws. Scale, misalignment and turn-on bias are constant for a session.
+    """
+
+    def __init__(self, settings: Inertial, stations: Sequence[str], *, seed: int, take: str, session: str = "") -> None:
+        self._triads = (settings.gyroscope, settings.accelerometer)
+        self._step_s = 1.0 / settings.rate_hz
+        self._rng = [generator(seed, "physics", take, "inertial", station) for station in stations]
+        shape = (2, len(stations), 3)
+        self._matrix, self._turn_on, self._bias = np.empty((*shape, 3)), np.empty(shape), np.zeros((2, *shape))
+        for s, station in enumerate(stations):
+            session_rng = generator(seed, "physics", session or take, "inertial", station, "session")
+            for triad, errors in enumerate(self._triads):
+                self._turn_on[triad, s] = errors.turn_on * session_rng.standard_normal(3)
+                scale = 1.0 + errors.scale * session_rng.standard_normal(3)
+                axes = np.eye(3) + errors.misalignment_rad * session_rng.standard_normal((3, 3)) * (1.0 - np.eye(3))
+                length = np.sqrt(np.sum(axes**2, axis=1, keepdims=True))
+                self._matrix[triad, s] = scale[:, None] * axes / length
+                self._bias[0, triad, s] = errors.bias_instability * self._rng[s].standard_normal(3)
+
+    def measure(self, angle_rad: Floats, velocity_m_s: Floats) -> tuple[Floats, Floats]:
+        """Measured increments for true ones, (T, S, 3) each [rad], [m/s]."""
+        out = np.empty_like(angle_rad), np.empty_like(velocity_m_s)
+        for s, rng in enumerate(self._rng):
+            draws = rng.standard_normal((len(angle_rad), 2, 3, 3))
+            for triad, (errors, true) in enumerate(zip(self._triads, (angle_rad, velocity_m_s), strict=True)):
+                _measure(
+                    true[:, s],
+                    draws[:, triad],
+                    self._matrix[triad, s],
+                    self._turn_on[triad, s],
+                    self._bias[:, triad, s],
+                    (errors.white, errors.bias_instability, errors.correlation_s, errors.random_walk, errors.limit),
+                    self._step_s,
+                    out[triad][:, s],
+                )
+        return out
+
+
+@compiled
+def _measure(
+    true: Floats,
+    draws: Floats,
+    matrix: Floats,
+    turn_on: Floats,
+    bias: Floats,
+    errors: tuple[float, float, float, float, float],
+    step_s: float,
+    out: Floats,
+) -> None:
+    """Increments (T, 3) of one triad of sensors, from draws (T, 3 sources, 3); `bias` (2, 3) is its state."""
+    white, instability, correlation_s, random_walk, limit = errors
+    kept = math.exp(-step_s / correlation_s)
+    fresh = instability * math.sqrt(-math.expm1(-2.0 * step_s / correlation_s))
+    root = math.sqrt(step_s)
+    for a in range(3):
+        wander, walk = bias[0, a], bias[1, a]
+        for k in range(len(true)):
+            wander = kept * wander + fresh * draws[k, 1, a]
+            walk += random_walk * root * draws[k, 2, a]
+            value = matrix[a, 0] * true[k, 0] + matrix[a, 1] * true[k, 1] + matrix[a, 2] * true[k, 2]
+            value += (turn_on[a] + wander + walk) * step_s + white * root * draws[k, 0, a]
+            out[k, a] = min(max(value, -limit * step_s), limit * step_s)
+        bias[0, a], bias[1, a] = wander, walk
