@@ -78,6 +78,14 @@ def _compile(bone_m: bytes, axes: bytes, trackers: tuple[mounts.Mount, ...]) -> 
         standard.hinges,
         np.frombuffer(axes).reshape(-1, 3),
     )
+    return Body(skeleton, trackers, body_spec(skeleton, trackers).compile())
+
+
+def body_spec(skeleton: Skeleton, trackers: Iterable[mounts.Mount] = ()) -> mujoco.MjSpec:
+    """The humanoid scaled to a skeleton, before it is compiled, so that a caller can change its own copy.
+
+    The skeleton must be the humanoid's (`require_humanoid`). Raises the errors of `mounts.locate_mount`.
+    """
     spec = mujoco.MjSpec.from_file(str(data_folder("models") / "humanoid24" / "humanoid24.xml"))
     for name, start_m in zip(skeleton.names, joint_offsets_m(skeleton), strict=True):
         spec.body(name).pos = start_m
@@ -90,7 +98,7 @@ def _compile(bone_m: bytes, axes: bytes, trackers: tuple[mounts.Mount, ...]) -> 
         mount_m, bone_from_station = mounts.locate_mount(skeleton, mount)
         spec.body(mount.bone).add_site(name=mount.station, pos=mount_m, quat=bone_from_station)
     spec.key("tpose").qpos = tpose(skeleton)
-    return Body(skeleton, trackers, spec.compile())
+    return spec
 
 
 def tpose(skeleton: Skeleton) -> Floats:

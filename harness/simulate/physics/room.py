@@ -3,7 +3,12 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, freeze
 from harness.core.ranges import Range, check_fields
+from harness.errors import BadInput
 
 
 @dataclass(frozen=True)
@@ -38,3 +43,57 @@ class Room:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        low, high = (-self.size_m[0] / 2, -self.size_m[1] / 2, 0.0), (*(s / 2 for s in self.size_m), self.height_m)
+        for number, box in enumerate(self.furniture, start=1):
+            for centre, size, least, most in zip(box.centre_m, box.size_m, low, high, strict=True):
+                if centre - size / 2 < least - 1e-9 or centre + size / 2 > most + 1e-9:
+                    raise BadInput(f"Box {number} of room.furniture passes a wall.", "Make it smaller, or move it.")
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedRoom:
+    """A room in the world, and the tracker's frame in it."""
+
+    room: Room
+    centre_m: Floats
+    """(2,) world x and y of the middle of the room [m]."""
+    world_from_tracker: Floats
+    """(4,) unit quaternion."""
+    origin_m: Floats
+    """(3,) origin of the tracker's frame in the world [m]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, centre_m=(2,), world_from_tracker=(4,), origin_m=(3,))
+
+    def to_world(self, position_m: Floats) -> Floats:
+        """Points (..., 3) of the tracker's frame in world axes [m]."""
+        out: Floats = rotations.rotate(self.world_from_tracker, position_m) + self.origin_m
+        return out
+
+    def planes(self) -> Floats:
+        """(6, 4) floor, ceiling and walls in the tracker's frame: outward unit normal and distance along it [m]."""
+        (x, y), (length, width) = self.centre_m, self.room.size_m
+        normal = np.array([[0, 0, -1], [0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0]], dtype=float)
+        distance_m = np.array([0.0, self.room.height_m, length / 2 - x, length / 2 + x, width / 2 - y, width / 2 + y])
+        own = rotations.rotate(rotations.inverse(self.world_from_tracker), normal)
+        return np.concatenate([own, (distance_m - np.sum(normal * self.origin_m, axis=1))[:, None]], axis=1)
+
+
+def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> None:
+    """BadInput if a point of a path (N, 3), in world axes, lies outside the walls or above the ceiling [m].
+
+    `name` is what moves on that path, for the message; `centre_m` is the middle of the room, world x and y.
+    """
+    low = np.array([*(np.asarray(centre_m) - np.array(room.size_m) / 2), -np.inf])
+    high = np.array([*(np.asarray(centre_m) + np.array(room.size_m) / 2), room.height_m])
+    outside = (position_m < low) | (position_m > high)
+    if not np.any(outside):
+        return
+    row, axis = (int(at[0]) for at in np.nonzero(outside))
+    at_m = float(position_m[row, axis])
+    limit_m = float(low[axis] if at_m < low[axis] else high[axis])
+    surface = "ceiling" if axis == 2 else "wall"
+    raise BadInput(
+        f"The room is too small: {name} reaches {'xyz'[axis]} = {at_m:.2f} m, and the {surface} is at {limit_m:.2f} m.",
+        f"Make physics.room.{'height_m' if axis == 2 else 'size_m'} larger, or move constellation.centre_m.",
+    )

@@ -1,0 +1,61 @@
+"""Line of sight: which straight paths of sound the performer's body and the furniture block."""
+
+import mujoco
+import numpy as np
+
+from harness.body.humanoid import Body, body_spec
+from harness.core.arrays import Bools, Floats
+from harness.simulate.physics.room import PlacedRoom
+
+_TOLERANCE_M = 1e-3
+"""A surface closer to the end of a path than this does not block it [m]."""
+
+
+class Sight:
+    """Casts rays in a room with one performer, or with none. Paths are in the tracker's frame."""
+
+    def __init__(self, body: Body | None, placed: PlacedRoom) -> None:
+        spec = mujoco.MjSpec() if body is None else body_spec(body.skeleton)
+        self._placed = placed
+        self._model = sight_model(spec, placed)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+
+    def set(self, qpos: Floats) -> None:
+        """Put the performer into a configuration (55,)."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+
+    def blocked(self, from_m: Floats, to_m: Floats) -> Bools:
+        """(N,) whether something lies between a point (3,) and each of N points (N, 3) [m]."""
+        start_m = self._placed.to_world(from_m)
+        rays = self._placed.to_world(to_m) - start_m
+        count = len(rays)
+        # `mj_multiRay` returns distances in units of each ray's length, and -1 where nothing is hit.
+        geom, share = np.empty(count, dtype=np.int32), np.empty(count)
+        mujoco.mj_multiRay(
+            self._model, self._data, start_m, rays.ravel(), None, True, -1, geom, share, None, count, mujoco.mjMAXVAL
+        )
+        length_m = np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)
+        out: Bools = (share >= 0.0) & (share * length_m < length_m - _TOLERANCE_M)
+        return out
+
+
+def sight_model(spec: mujoco.MjSpec, placed: PlacedRoom) -> mujoco.MjModel:
+    """Compile a body and the furniture for rays; the spec is changed.
+
+    The floor is taken out. `mj_multiRay` looks only at geoms that may collide, so that every geom gets a contact flag.
+    """
+    if (floor := spec.geom("floor")) is not None:
+        spec.delete(floor)
+    for geom in spec.geoms:
+        geom.contype = 1
+    for box in placed.room.furniture:
+        x, y, z = box.centre_m
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[placed.centre_m[0] + x, placed.centre_m[1] + y, z],
+            size=[length_m / 2 for length_m in box.size_m],
+            contype=1,
+        )
+    return spec.compile()
