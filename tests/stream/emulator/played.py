@@ -50,11 +50,16 @@ FILTER_EMITTERS = (
 
 
 def with_filter(
-    samples: DeviceSamples, prediction_ms: Sequence[int] = (), enhancement: Sequence[int] = (), seed: int = 1
+    samples: DeviceSamples,
+    prediction_ms: Sequence[int] = (),
+    enhancement: Sequence[int] = (),
+    *,
+    quality: Floats | None = None,
+    seed: int = 1,
 ) -> DeviceSamples:
     """Return the samples with a filter of random values: no two instants, stations or modes have the same.
 
-    Stations that the settings do not reach have 0.
+    Stations that the settings do not reach have 0. `quality` replaces that of the samples.
     """
     rng = np.random.default_rng(seed)
     instants, stations = samples.taken_s.shape
@@ -72,7 +77,7 @@ def with_filter(
         prediction_ms=settings[0],
         enhancement=settings[1],
     )
-    return replace(samples, filter=made)
+    return replace(samples, filter=made, quality=samples.quality if quality is None else quality)
 
 
 class DeviceSession:
