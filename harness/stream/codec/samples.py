@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 from harness.core.arrays import Floats, freeze
+from harness.errors import ShapeError
+from harness.stream.codec.filter_samples import FilterSamples
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,16 +27,21 @@ class DeviceSamples:
     device_s: Floats
     """(E, S) the device's clock at that time, in the loop in which it was set to zero [s]."""
     position_m: Floats
-    """(E, S, 3) position as the device estimates it [m]."""
+    """(E, S, 3) position as the device estimates it, without prediction and enhancement [m]."""
     tracker_from_station: Floats
-    """(E, S, 4) unit quaternions."""
+    """(E, S, 4) unit quaternions, likewise."""
     quality: Floats
     """(E, S) tracking quality, 0 (lost) to 1 (best)."""
+    filter: FilterSamples | None = None
+    """What the filter knows besides; None where errors are drawn from distributions. The device then stores prediction,
+    enhancement and emitters without effect, and reports as many ranges as the quality suggests."""
 
     def __post_init__(self) -> None:
         freeze(self, taken_s=("E", "S"))
         shape = self.taken_s.shape
         freeze(self, device_s=shape, quality=shape, position_m=(*shape, 3), tracker_from_station=(*shape, 4))
+        if self.filter is not None and (filtered := self.filter.ranges_received.shape) != shape:
+            raise ShapeError("DeviceSamples", "filter", filtered, str(shape))
 
     def __len__(self) -> int:
         return len(self.taken_s)

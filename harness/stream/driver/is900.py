@@ -16,6 +16,7 @@ from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.configurator import DeviceConfigurator
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
+from harness.stream.driver.emitter_reach import emitter_reach_m
 from harness.stream.driver.health import describe_health
 from harness.stream.driver.host import Host
 from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
@@ -192,14 +193,12 @@ class Is900:
             self._report("settings", f"{'put back' if is_back else 'not put back, the device is gone'}: {text}")
 
     def _report_room(self, wire: WireFormat) -> None:
-        """Report emitters that are farther away than the list can carry: stations below them will be, too."""
+        """Report emitters whose stations are farther away than the list can carry."""
         range_m = position_range_m(wire.items)
         if range_m is None:
             return
         replies = self._line.collect(commands.EMITTERS, MAX_EMITTERS)
-        reach_m = max(
-            (abs(x) for reply in replies if isinstance(reply, Emitter) for x in reply.position_m), default=0.0
-        )
+        reach_m = emitter_reach_m(reply for reply in replies if isinstance(reply, Emitter))
         if reach_m >= range_m:
             items = ",".join(map(str, STANDARD_LIST))
             text = f"emitters are up to {reach_m:.2f} m from the tracker's origin, the list carries {range_m:g} m"

@@ -4,17 +4,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from harness.stream.codec.replies import StatusRecord, TrackingStatus, UnknownReply
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import CommandArgument
 from harness.stream.emulator.device_state import DeviceState
 from harness.stream.emulator.queries import QUERIES
 from harness.stream.emulator.settings import STATION_NAMES
-
-_MAX_RANGES = 12
-"""Ranges per cycle: two microphones, six emitters (docs/is900.md 7)."""
 
 
 def _report_status(device: DeviceState, now_s: float) -> None:
@@ -43,7 +38,8 @@ def _switch_station(device: DeviceState, argument: CommandArgument, now_s: float
 def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
     if name in device.rounds.plugged:
-        station = geometry.boresight(device.settings.station(name), device.rounds.orientation(now_s, name), full)
+        present = device.rounds.orientation(now_s, name, device.settings)
+        station = geometry.boresight(device.settings.station(name), present, full)
         device.settings = device.settings.with_station(name, station)
 
 
@@ -57,14 +53,15 @@ def _zero_clock(device: DeviceState, argument: CommandArgument, now_s: float) ->
 
 
 def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    """Report as many ranges as the quality suggests; none is ever rejected."""
+    """Report the state of each station and its ranges."""
     argument.require_empty()
     quality = {name: device.rounds.quality(now_s, name) for name in device.active}
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
     )
-    received = tuple(int(np.ceil(_MAX_RANGES * quality.get(name, 0.0))) for name in STATION_NAMES)
-    device.reply(now_s, TrackingStatus(states, received, (0,) * len(STATION_NAMES), device.samples.rate_hz))
+    ranges = [device.rounds.ranges(now_s, name) if name in quality else (0, 0) for name in STATION_NAMES]
+    received, rejected = zip(*ranges, strict=True)
+    device.reply(now_s, TrackingStatus(states, received, rejected, device.samples.rate_hz))
 
 
 def _read_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:

@@ -36,10 +36,7 @@ class DeviceState:
         self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while the command log is open."""
-        stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
-        self._factory = DeviceSettings(
-            stations, baud=self.config.baud, udp=self.config.udp, udp_port=self.config.udp_port
-        )
+        self._factory = _factory_settings(samples, self.config)
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0
@@ -141,3 +138,16 @@ class DeviceState:
             if self.settings.stations[row].active and not self.suspended:
                 data = self.rounds.records(number, self.settings)[STATION_NAMES[row]]
                 self._out.append(Message(taken_s + self.samples.ready_s, data, STATION_NAMES[row]))
+
+
+def _factory_settings(samples: DeviceSamples, config: EmulatorConfig) -> DeviceSettings:
+    """Return the settings after power-on: the stations of the samples are on, and a filter brings its settings."""
+    stations = [StationSettings(active=row < len(samples.stations)) for row in range(len(STATION_NAMES))]
+    settings = DeviceSettings(tuple(stations), baud=config.baud, udp=config.udp, udp_port=config.udp_port)
+    if (filtered := samples.filter) is None:
+        return settings
+    initial = zip(filtered.prediction_ms.tolist(), filtered.enhancement.tolist(), strict=True)
+    for row, (prediction_ms, enhancement) in enumerate(initial):
+        stations[row] = replace(stations[row], prediction_ms=prediction_ms, enhancement=enhancement)
+    emitters = filtered.emitters
+    return replace(settings, stations=tuple(stations), emitters=emitters, draft_emitters=emitters)

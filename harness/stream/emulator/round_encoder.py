@@ -1,10 +1,11 @@
-"""Encoding of readings as records of a device with given settings: geometry applied, numbers in its format."""
+"""Encoding of readings as records of a device with given settings: prediction and geometry applied, in its format."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.stream.codec.filter_samples import MAX_RANGES
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.emulator import geometry
 from harness.stream.emulator.controls import CONTROL_PATTERNS
@@ -39,13 +40,24 @@ class RoundEncoder:
         instant = self.player.instant_of(self.player.latest(now_s, row))
         return 0.0 if station in self._lost else float(np.clip(self.player.samples.quality[instant, row], 0.0, 1.0))
 
-    def orientation(self, now_s: float, station: str) -> Floats:
-        """Return the quaternion (4,) of the station's latest reading, as it was taken."""
+    def orientation(self, now_s: float, station: str, settings: DeviceSettings) -> Floats:
+        """Return the quaternion (4,) of the station's latest reading, before its geometry is applied."""
         row = STATION_NAMES.index(station)
-        out: Floats = self.player.samples.tracker_from_station[
-            self.player.instant_of(self.player.latest(now_s, row)), row
-        ]
+        out: Floats = self._poses(self.player.instant_of(self.player.latest(now_s, row)), settings)[1][row]
         return out
+
+    def ranges(self, now_s: float, station: str) -> tuple[int, int]:
+        """Return how many ranges the station received and rejected at its latest reading; none when it is lost here.
+
+        Samples without a filter give as many as the quality suggests, and none is ever rejected.
+        """
+        filtered, row = self.player.samples.filter, STATION_NAMES.index(station)
+        if filtered is None:
+            return int(np.ceil(MAX_RANGES * self.quality(now_s, station))), 0
+        if station in self._lost:
+            return 0, 0
+        instant = self.player.instant_of(self.player.latest(now_s, row))
+        return int(filtered.ranges_received[instant, row]), int(filtered.ranges_rejected[instant, row])
 
     def records(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
         """Return the records of a round by station."""
@@ -57,7 +69,7 @@ class RoundEncoder:
     def values(self, number: int, settings: DeviceSettings) -> RecordValues:
         """Return what the stations that are plugged in report in a round, with the geometry of these settings."""
         samples, instant, stamps_s = self.player.samples, self.player.instant_of(number), self.player.stamps_s(number)
-        position_m, orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
+        position_m, orientation = self._poses(instant, settings)
         quality = samples.quality[instant].copy()
         # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
         buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
@@ -69,6 +81,17 @@ class RoundEncoder:
             if name in self._lost:
                 quality[row] = 0.0
         return RecordValues(stamps_s, position_m, orientation, quality, buttons, joystick)
+
+    def _poses(self, instant: int, settings: DeviceSettings) -> tuple[Floats, Floats]:
+        """Return new positions (S, 3) and quaternions (S, 4) with prediction and enhancement, but without geometry."""
+        samples = self.player.samples
+        position_m, orientation = samples.position_m[instant], samples.tracker_from_station[instant]
+        if samples.filter is None:
+            return position_m.copy(), orientation.copy()
+        stations = settings.stations[: len(samples.stations)]
+        prediction_ms = np.array([station.prediction_ms for station in stations])
+        enhancement = np.array([station.enhancement for station in stations])
+        return samples.filter.report_poses(position_m, orientation, prediction_ms, enhancement, instant)
 
     def _encode(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
         values = self.values(number, settings)

@@ -1,9 +1,14 @@
 """Samples with known values, and a device to talk to without a line."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.stream.codec.filter_samples import MAX_RANGES, FilterSamples
+from harness.stream.codec.replies import Emitter
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
@@ -36,13 +41,56 @@ def make_samples(
     )
 
 
+FILTER_EMITTERS = (
+    Emitter(1, (3.0, -2.5, -1.0), (0.0, 0.6, 0.8), 7001),
+    Emitter(2, (3.5, -2.5, -1.0), (0.0, 0.0, 1.0), 7002),
+    Emitter(4, (3.0, -3.5, -1.5), (0.0, 0.0, 1.0), 7004),
+)
+"""A constellation beside the origin."""
+
+
+def with_filter(
+    samples: DeviceSamples,
+    prediction_ms: Sequence[int] = (),
+    enhancement: Sequence[int] = (),
+    *,
+    quality: Floats | None = None,
+    seed: int = 1,
+) -> DeviceSamples:
+    """Return the samples with a filter of random values: no two instants, stations or modes have the same.
+
+    Stations that the settings do not reach have 0. `quality` replaces that of the samples.
+    """
+    rng = np.random.default_rng(seed)
+    instants, stations = samples.taken_s.shape
+    settings = np.zeros((2, stations), np.int64)
+    settings[0, : len(prediction_ms)], settings[1, : len(enhancement)] = prediction_ms, enhancement
+    turn = rotations.multiply(rotations.exp(rng.normal(size=(2, instants, stations, 3))), samples.tracker_from_station)
+    made = FilterSamples(
+        velocity_m_s=rng.normal(size=(instants, stations, 3)),
+        turn_rad_s=rng.normal(size=(instants, stations, 3)),
+        enhanced_position_m=samples.position_m + 0.1 * rng.normal(size=(2, instants, stations, 3)),
+        enhanced_tracker_from_station=turn,
+        ranges_received=rng.integers(0, MAX_RANGES + 1, (instants, stations)),
+        ranges_rejected=rng.integers(0, MAX_RANGES + 1, (instants, stations)),
+        emitters=FILTER_EMITTERS,
+        prediction_ms=settings[0],
+        enhancement=settings[1],
+    )
+    return replace(samples, filter=made, quality=samples.quality if quality is None else quality)
+
+
 class DeviceSession:
     """A device and its clock."""
 
     def __init__(
-        self, config: EmulatorConfig | None = None, stations: int = 4, quaternion: Floats | None = None
+        self,
+        config: EmulatorConfig | None = None,
+        stations: int = 4,
+        quaternion: Floats | None = None,
+        samples: DeviceSamples | None = None,
     ) -> None:
-        self.device = Device(make_samples(stations, quaternion=quaternion), config, 0.0)
+        self.device = Device(samples or make_samples(stations, quaternion=quaternion), config, 0.0)
         self.now_s = 0.0
 
     def send(self, data: bytes, after_s: float = 0.0) -> bytes:
