@@ -1,5 +1,6 @@
 """Ultrasonic ranges: level, time of flight and the errors of its measurement."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -49,3 +50,8 @@ class Sound:
             raise BadInput(
                 f"sound.microphones_m has {len(self.microphones_m)} positions.", f"A station has {MICROPHONES}."
             )
+
+
+def speed_of_sound_m_s(temperature_c: float) -> float:
+    """Speed of sound in dry air at a temperature [deg C]: 331.3 m/s at 0 deg C, as the root of the absolute one."""
+    return 331.3 * math.sqrt(1.0 + temperature_c / 273.15)
