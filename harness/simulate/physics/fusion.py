@@ -1,10 +1,42 @@
-"""Fusion of inertia and ranges: the error-state filter of a station."""
+"""Fusion of inertia and ranges: the error-state filter of a station.
 
+The filter sees what a device would: increments of angle and velocity, ranges, and the emitters as surveyed. It starts
+from a fix, never from the truth.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
+import numpy as np
+
+from harness.core.arrays import Floats, Ints
 from harness.core.names import Name
 from harness.core.ranges import Range, check_fields
+from harness.errors import ShapeError
+from harness.simulate.physics.acquisition import (
+    FIRST_TILT_VARIANCE,
+    HEARD,
+    LEAST_WINDOW_SLOTS,
+    LONGEST_WINDOW_SLOTS,
+    Search,
+)
+from harness.simulate.physics.enhancement import MODES
+from harness.simulate.physics.error_state import ERRORS
+from harness.simulate.physics.filter import (
+    CONFIRMING_SLOTS,
+    FilterModel,
+    FilterState,
+    Outputs,
+    advance,
+    freeze,
+    set_bias_covariance,
+)
+from harness.simulate.physics.inertial import Inertial, InertialErrors
+from harness.simulate.physics.ranging_model import RangingModel
+from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
+from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
+from harness.simulate.physics.strapdown import STATE
 
 
 @dataclass(frozen=True)
@@ -39,3 +71,129 @@ class Fusion:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+class FusionFilter:
+    """The filters of S stations, which advance over blocks of slots; results do not depend on the blocks' size.
+
+    A station's results depend on its own measurements alone, and not on how many others there are.
+    """
+
+    def __init__(
+        self,
+        fusion: Fusion,
+        sound: Sound,
+        inertial: Inertial,
+        emitter_m: Floats,
+        normal: Floats,
+        schedule: Schedule,
+        stations: Sequence[str],
+    ) -> None:
+        """Emitters (J, 3) and their unit normals (J, 3) as the device knows them, in the tracker's frame [m]."""
+        lever = np.array(inertial.lever_m)
+        slot_s, emitters = schedule.slot_s, schedule.emitters
+        window = min(max(emitters, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
+        second = max(round(1.0 / slot_s), 1)
+        self.stations = tuple(stations)
+        self.ranging = RangingModel(
+            np.array(emitter_m, dtype=float),
+            np.array(normal, dtype=float),
+            np.array(sound.microphones_m) - lever,
+            speed_of_sound_m_s(sound.assumed_c),
+            sound.absorption_db_per_m,
+            fusion.range_noise_m,
+            fusion.range_scale,
+            fusion.survey_m,
+        )
+        gyroscope, accelerometer = inertial.gyroscope, inertial.accelerometer
+        self.model = FilterModel(
+            tick_s=1.0 / schedule.tick_hz,
+            lever_m=lever,
+            gate=fusion.gate,
+            noise=np.array(
+                [gyroscope.white**2, accelerometer.white**2, _bias_density(gyroscope), _bias_density(accelerometer)]
+            ),
+            bias_variance=np.array([_bias_variance(gyroscope), _bias_variance(accelerometer)]),
+            inertial_scale=fusion.inertial_scale,
+            sigma_limit_m=fusion.sigma_limit_m,
+            reject_share=fusion.reject_share,
+            coast_slots=int(fusion.coast_s / slot_s),
+            judged_slots=second,
+            confirm_slots=min(max(emitters, CONFIRMING_SLOTS), LONGEST_WINDOW_SLOTS),
+            window_s=(window + 0.5) * slot_s,
+            best_sigma_m=fusion.quality_sigma_m,
+        )
+        self.state = _initial_state(len(self.stations), max(second, LEAST_WINDOW_SLOTS))
+        self.search = _initial_search(len(self.stations), MICROPHONES * (window + 1))
+        for s in range(len(self.stations)):
+            set_bias_covariance(self.model, self.state.covariance[s])
+            freeze(self.state, s)
+
+    def advance(
+        self, first_slot: int, angle_rad: Floats, velocity_m_s: Floats, range_m: Floats, outputs: Outputs
+    ) -> None:
+        """Advance over F slots, and fill those outputs whose ticks lie in them; the others stay as they are.
+
+        `angle_rad` and `velocity_m_s` (5 F, S, 3) are increments, see `strapdown`; `range_m` (F, S, 2) is NaN where
+        nothing was heard. A record shows what the filter knows at the beginning of its slot, and the inertia since.
+        """
+        slots, count = len(range_m), len(self.stations)
+        for name, array, shape in (
+            ("angle_rad", angle_rad, (TICKS_PER_SLOT * slots, count, 3)),
+            ("velocity_m_s", velocity_m_s, (TICKS_PER_SLOT * slots, count, 3)),
+            ("range_m", range_m, (slots, count, MICROPHONES)),
+        ):
+            if array.shape != shape:
+                raise ShapeError("FusionFilter", name, array.shape, str(shape))
+        arrays = (np.ascontiguousarray(array, dtype=float) for array in (angle_rad, velocity_m_s, range_m))
+        advance(self.model, self.ranging, self.state, self.search, first_slot, *arrays, outputs)
+
+
+def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
+    """Outputs of records at ticks (E, S) and parts of a tick (E, S), to be filled by `FusionFilter.advance`."""
+    shape = tick.shape
+    return Outputs(
+        np.ascontiguousarray(tick, dtype=np.int64),
+        np.ascontiguousarray(fraction, dtype=float),
+        np.full((*shape, MODES, 3), np.nan),
+        np.full((*shape, MODES, 4), np.nan),
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, 4), np.nan),
+    )
+
+
+def _bias_density(errors: InertialErrors) -> float:
+    """Density of a random walk [x^2/s] that grows as the Gauss-Markov bias at first, and the walk of the bias."""
+    return 2.0 * errors.bias_instability**2 / errors.correlation_s + errors.random_walk**2
+
+
+def _bias_variance(errors: InertialErrors) -> float:
+    return errors.turn_on**2 + errors.bias_instability**2
+
+
+def _initial_state(stations: int, slots: int) -> FilterState:
+    motion = np.zeros((stations, TICKS_PER_SLOT + 1, STATE))
+    motion[:, :, 6] = 1.0
+    return FilterState(
+        motion=motion,
+        bias=np.zeros((stations, 6)),
+        covariance=np.zeros((stations, ERRORS, ERRORS)),
+        turn_rad_s=np.zeros((stations, 3)),
+        acceleration_m_s2=np.zeros((stations, 3)),
+        offset=np.zeros((stations, MODES - 1, 6)),
+        status=np.zeros((stations, 6), dtype=np.int64),
+        counts=np.zeros((2, stations, slots), dtype=np.int64),
+        report=np.zeros((stations, 4)),
+        nis=np.zeros((stations, 2)),
+    )
+
+
+def _initial_search(stations: int, ranges: int) -> Search:
+    return Search(
+        heard=np.zeros((stations, ranges, HEARD)),
+        count=np.zeros(stations, dtype=np.int64),
+        path=np.zeros((stations, 7)),
+        gravity=np.zeros((stations, 5)),
+        tilt_variance=np.full(stations, FIRST_TILT_VARIANCE),
+    )

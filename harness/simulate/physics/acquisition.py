@@ -1,0 +1,360 @@
+"""The fix: position, velocity and attitude of a lost station, out of the ranges of the last turn of emitters.
+
+A lost station keeps its attitude by the gyroscopes, and gravity levels it slowly. Its specific force is integrated
+twice in that attitude, so the path between two ranges is known but for a velocity, a heading and a small tilt. A fix
+solves for them by Gauss-Newton, from four headings and from a place below the emitters. It leaves out a few ranges that
+do not fit. It is refused if the residuals stay large, if too few ranges remain, or if two different places fit as well.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats, Ints
+from harness.core.compiled import compiled
+from harness.simulate.physics.error_state import MOTION_ERRORS
+from harness.simulate.physics.ranging_model import RangingModel, range_variance
+from harness.simulate.physics.strapdown import STATE, attitude, exponential, logarithm, product, rotated, set_attitude
+from harness.simulate.readings import GRAVITY_M_S2
+
+HEARD = 12
+"""Numbers of a stored range: time [s] 0, range [m] 1, path of the inertial unit at its arrival [m] 2:5, microphone from
+that unit [m] 5:8, the station's z axis 8:11, and the emitter's index 11."""
+LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS = 40, 80
+_LEAST_RANGES, _LEAST_EMITTERS = 10, 4
+_LARGEST_MISFIT = 1.5
+"""Root mean square of the residuals, in their standard deviations [choice]."""
+_LARGEST_RESIDUAL = 3.0
+_SPARED_SHARE = 0.75
+"""Share of the ranges that a fix must keep [choice]."""
+_HEADINGS = 4
+_ITERATIONS = 25
+_DISTANCE_BELOW_M = 1.5
+_SPEED_SIGMA_M_S = 5.0
+_OTHER_PLACE_M, _OTHER_HEADING_RAD = 0.05, 0.5
+_CLEAR_MARGIN = 9.0
+"""Least difference of the sums of squared residuals of two places: 3 standard deviations."""
+_GRAVITY_S = 0.5
+_LEVEL_SIGMA_RAD = 0.01
+_INFLATION = 2.0
+"""Factor on the covariance of a fix, for what its model leaves out [choice]."""
+FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE = 1.0, 0.1
+
+
+class Search(NamedTuple):
+    """What S lost stations have collected."""
+
+    heard: Floats
+    """(S, N, 12) ranges in a ring, the latest of one turn of emitters."""
+    count: Ints
+    """(S,) ranges stored since the loss."""
+    path: Floats
+    """(S, 7) double and single integral of the specific force since the loss [m], [m/s], and its duration [s]."""
+    gravity: Floats
+    """(S, 5) running mean of the specific force [m/s^2], its variance, and the number of slots in them."""
+    tilt_variance: Floats
+    """(S,) variance of the attitude's tilt about each horizontal axis [rad^2]."""
+
+
+@compiled
+def begin_search(search: Search, s: int, tilt_variance: float) -> None:
+    """Forget what station s has collected."""
+    search.count[s] = 0
+    search.path[s] = 0.0
+    search.gravity[s] = 0.0
+    search.tilt_variance[s] = tilt_variance
+
+
+@compiled
+def add_force(path: Floats, x: float, y: float, z: float, duration_s: float) -> None:
+    """Integrate a velocity increment without gravity, in the tracker's axes [m/s], into the path (7,)."""
+    half = 0.5 * duration_s
+    path[0] += half * (2.0 * path[3] + x)
+    path[1] += half * (2.0 * path[4] + y)
+    path[2] += half * (2.0 * path[5] + z)
+    path[3] += x
+    path[4] += y
+    path[5] += z
+    path[6] += duration_s
+
+
+@compiled
+def level_attitude(search: Search, s: int, motion: Floats, x: float, y: float, z: float, slot_s: float) -> None:
+    """Turn the attitude in `motion` (10,) towards level by the specific force (x, y, z) of a slot [m/s^2].
+
+    The direction of the mean force is a measurement of the tilt, whose variance grows with that of the force. What
+    station s has collected turns along.
+    """
+    gravity = search.gravity[s]
+    gravity[4] += 1.0
+    share = max(1.0 / gravity[4], slot_s / _GRAVITY_S)
+    dx, dy, dz = x - gravity[0], y - gravity[1], z - gravity[2]
+    if gravity[4] > 1.0:
+        gravity[3] = (1.0 - share) * (gravity[3] + share * (dx * dx + dy * dy + dz * dz))
+    gravity[0] += share * dx
+    gravity[1] += share * dy
+    gravity[2] += share * dz
+    noise = (gravity[3] / GRAVITY_M_S2**2 + _LEVEL_SIGMA_RAD**2) * 0.5 * _GRAVITY_S / slot_s
+    gain = search.tilt_variance[s] / (search.tilt_variance[s] + noise)
+    search.tilt_variance[s] *= 1.0 - gain
+    across = np.sqrt(gravity[0] ** 2 + gravity[1] ** 2)
+    angle = gain * np.arctan2(across, -gravity[2])
+    turn = exponential(angle, 0.0, 0.0)
+    if across > 1e-9:
+        turn = exponential(-angle * gravity[1] / across, angle * gravity[0] / across, 0.0)
+    set_attitude(motion, product(turn, attitude(motion)))
+    gravity[0], gravity[1], gravity[2] = rotated(turn, gravity[0], gravity[1], gravity[2])
+    path = search.path[s]
+    path[0], path[1], path[2] = rotated(turn, path[0], path[1], path[2])
+    path[3], path[4], path[5] = rotated(turn, path[3], path[4], path[5])
+    for i in range(min(search.count[s], search.heard.shape[1])):
+        heard = search.heard[s, i]
+        for k in range(2, 11, 3):
+            heard[k], heard[k + 1], heard[k + 2] = rotated(turn, heard[k], heard[k + 1], heard[k + 2])
+
+
+@compiled
+def gather(search: Search, s: int, window_s: float, heard: Floats) -> int:
+    """Copy the ranges of the window into `heard` (N, 12), with times and paths from the present; their number."""
+    path, kept = search.path[s], 0
+    for i in range(min(search.count[s], search.heard.shape[1])):
+        row = search.heard[s, i]
+        since = row[0] - path[6]
+        if since < -window_s:
+            continue
+        heard[kept] = row
+        heard[kept, 0] = since
+        for k in range(3):
+            heard[kept, 2 + k] = row[2 + k] - path[k] - path[3 + k] * since
+        kept += 1
+    return kept
+
+
+@compiled
+def emitters_in(heard: Floats, used: Bools, emitters: int) -> int:
+    """Number of different emitters among the ranges used (N,)."""
+    present = np.zeros(emitters, dtype=np.bool_)
+    total = 0
+    for i in range(len(used)):
+        j = int(heard[i, 11])
+        if used[i] and not present[j]:
+            present[j] = True
+            total += 1
+    return total
+
+
+@compiled
+def normal_equations(
+    model: RangingModel, heard: Floats, used: Bools, motion: Floats, tilt_variance: float, matrix: Floats, side: Floats
+) -> float:
+    """Set the normal equations (9, 9), (9,) of a fix at `motion` (10,), whose attitude turns the kept one.
+
+    Returns the sum of squared residuals in units of their variances, priors included.
+    """
+    matrix[:] = 0.0
+    side[:] = 0.0
+    total = 0.0
+    slope = np.empty(MOTION_ERRORS)
+    for i in range(len(used)):
+        if not used[i]:
+            continue
+        residual, variance = predict(model, heard[i], motion, slope)
+        weight = 1.0 / variance
+        total += residual * residual * weight
+        for a in range(MOTION_ERRORS):
+            side[a] += weight * slope[a] * residual
+            for b in range(a + 1):
+                matrix[a, b] += weight * slope[a] * slope[b]
+    for k in range(3):
+        weight = 1.0 / _SPEED_SIGMA_M_S**2
+        matrix[3 + k, 3 + k] += weight
+        side[3 + k] -= weight * motion[3 + k]
+        total += weight * motion[3 + k] ** 2
+    x, y, _ = rotated(attitude(motion), 0.0, 0.0, 1.0)
+    matrix[6, 6] += 1.0 / tilt_variance
+    matrix[7, 7] += 1.0 / tilt_variance
+    side[6] += y / tilt_variance
+    side[7] -= x / tilt_variance
+    return total + (x * x + y * y) / tilt_variance
+
+
+@compiled
+def predict(model: RangingModel, heard: Floats, motion: Floats, slope: Floats) -> tuple[float, float]:
+    """Residual [m] and variance [m^2] of a range (12,) at `motion` (10,); sets its `slope` (9,)."""
+    turn, since, emitter = attitude(motion), heard[0], int(heard[11])
+    ax, ay, az = rotated(turn, heard[2] + heard[5], heard[3] + heard[6], heard[4] + heard[7])
+    x = motion[0] + motion[3] * since + ax - model.emitter_m[emitter, 0]
+    y = motion[1] + motion[4] * since + ay - model.emitter_m[emitter, 1]
+    z = motion[2] + motion[5] * since + az + 0.5 * GRAVITY_M_S2 * since * since - model.emitter_m[emitter, 2]
+    distance = np.sqrt(x * x + y * y + z * z) + 1e-9
+    x, y, z = x / distance, y / distance, z / distance
+    zx, zy, zz = rotated(turn, heard[8], heard[9], heard[10])
+    variance = range_variance(model, emitter, distance, x, y, z, -(zx * x + zy * y + zz * z))
+    slope[0], slope[1], slope[2] = x, y, z
+    slope[3], slope[4], slope[5] = since * x, since * y, since * z
+    slope[6], slope[7], slope[8] = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    return heard[1] - distance, max(variance, 1e-12)
+
+
+@compiled
+def invert(matrix: Floats, inverse: Floats) -> bool:
+    """Invert a symmetric positive definite matrix (N, N) given by its lower triangle; False if it is not definite."""
+    n = len(matrix)
+    factor = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+            elif total > 1e-12 * matrix[i, i] and total > 0.0:
+                factor[i, i] = np.sqrt(total)
+            else:
+                return False
+    column = np.empty(n)
+    for c in range(n):
+        for i in range(n):
+            total = 1.0 * (i == c)
+            for k in range(i):
+                total -= factor[i, k] * column[k]
+            column[i] = total / factor[i, i]
+        for i in range(n - 1, -1, -1):
+            total = column[i]
+            for k in range(i + 1, n):
+                total -= factor[k, i] * column[k]
+            column[i] = total / factor[i, i]
+        inverse[:, c] = column
+    return True
+
+
+@compiled
+def minimise(
+    model: RangingModel, heard: Floats, used: Bools, motion: Floats, tilt_variance: float, inverse: Floats
+) -> float:
+    """Gauss-Newton from `motion` (10,), in place; the sum of squared residuals, or infinity where it fails.
+
+    `inverse` (9, 9) becomes the covariance.
+    """
+    matrix, side = np.empty((MOTION_ERRORS, MOTION_ERRORS)), np.empty(MOTION_ERRORS)
+    step = np.empty(MOTION_ERRORS)
+    for _ in range(_ITERATIONS):
+        total = normal_equations(model, heard, used, motion, tilt_variance, matrix, side)
+        if not np.isfinite(total) or not invert(matrix, inverse):
+            return np.inf
+        for a in range(MOTION_ERRORS):
+            step[a] = 0.0
+            for b in range(MOTION_ERRORS):
+                step[a] += inverse[a, b] * side[b]
+        length = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+        turned = np.sqrt(step[6] ** 2 + step[7] ** 2 + step[8] ** 2)
+        scale = 1.0 / max(1.0, length / 2.0, turned)  # at most 2 m and 1 rad at once
+        for a in range(6):
+            motion[a] += scale * step[a]
+        turn = exponential(scale * step[6], scale * step[7], scale * step[8])
+        set_attitude(motion, product(turn, attitude(motion)))
+        if length < 1e-5 and turned < 1e-5:
+            return normal_equations(model, heard, used, motion, tilt_variance, matrix, side)
+    return np.inf
+
+
+@compiled
+def worst(model: RangingModel, heard: Floats, used: Bools, motion: Floats) -> tuple[int, float]:
+    """Index of the range that fits worst, and its residual in standard deviations."""
+    slope = np.empty(MOTION_ERRORS)
+    index, largest = -1, 0.0
+    for i in range(len(used)):
+        if used[i]:
+            residual, variance = predict(model, heard[i], motion, slope)
+            size = abs(residual) / np.sqrt(variance)
+            if size > largest:
+                index, largest = i, size
+    return index, largest
+
+
+@compiled
+def solve(
+    model: RangingModel, heard: Floats, motion: Floats, tilt_variance: float, inverse: Floats
+) -> tuple[float, float]:
+    """Fit `motion` (10,) to the ranges (N, 12), without the few that do not fit.
+
+    Returns the sum of squared residuals and their number; infinity where the fit is refused.
+    """
+    used = np.ones(len(heard), dtype=np.bool_)
+    left = len(heard)
+    least = max(_LEAST_RANGES, int(np.ceil(_SPARED_SHARE * len(heard))))
+    while True:
+        total = minimise(model, heard, used, motion, tilt_variance, inverse)
+        if not np.isfinite(total):
+            return np.inf, 0.0
+        index, largest = worst(model, heard, used, motion)
+        if total <= _LARGEST_MISFIT**2 * (left - 7) and largest <= _LARGEST_RESIDUAL:
+            break
+        if left <= least or index < 0:
+            return np.inf, 0.0
+        used[index] = False
+        left -= 1
+    if emitters_in(heard, used, len(model.emitter_m)) < _LEAST_EMITTERS:
+        return np.inf, 0.0
+    for i in range(len(heard)):
+        j = int(heard[i, 11])
+        side = 0.0
+        for k in range(3):
+            side += model.normal[j, k] * (motion[k] - model.emitter_m[j, k])
+        if used[i] and side <= 0.0:
+            return np.inf, 0.0
+    return total, float(left)
+
+
+@compiled
+def fix(model: RangingModel, search: Search, s: int, window_s: float, motion: Floats, covariance: Floats) -> bool:
+    """Try a fix of station s: True, with `motion` (10,) and the motion's part of P (15, 15) replaced, if it is clear.
+
+    The attitude in `motion` is the kept one before the call.
+    """
+    heard = np.empty((search.heard.shape[1], HEARD))
+    heard = heard[: gather(search, s, window_s, heard)]
+    everything = np.ones(len(heard), dtype=np.bool_)
+    if len(heard) < _LEAST_RANGES or emitters_in(heard, everything, len(model.emitter_m)) < _LEAST_EMITTERS:
+        return False
+    best, best_inverse = np.zeros(STATE), np.empty((MOTION_ERRORS, MOTION_ERRORS))
+    least, next_least = np.inf, np.inf
+    motions, totals = np.zeros((_HEADINGS, STATE)), np.empty(_HEADINGS)
+    inverse = np.empty((MOTION_ERRORS, MOTION_ERRORS))
+    tilt_variance = max(search.tilt_variance[s], 1e-6)
+    for heading in range(_HEADINGS):
+        trial = motions[heading]
+        for i in range(len(heard)):
+            j = int(heard[i, 11])
+            for k in range(3):
+                trial[k] += (model.emitter_m[j, k] + _DISTANCE_BELOW_M * model.normal[j, k]) / len(heard)
+        set_attitude(trial, exponential(0.0, 0.0, 2.0 * np.pi * heading / _HEADINGS))
+        total, count = solve(model, heard, trial, tilt_variance, inverse)
+        # Residuals that were left out count as much as those at the limit, so that attempts compare.
+        totals[heading] = total + _LARGEST_RESIDUAL**2 * (len(heard) - count)
+        if totals[heading] < least:
+            least = totals[heading]
+            best[:] = trial
+            best_inverse[:] = inverse
+    if not np.isfinite(least):
+        return False
+    for heading in range(_HEADINGS):
+        apart = 0.0
+        for k in range(3):
+            apart += (motions[heading, k] - best[k]) ** 2
+        q = attitude(motions[heading])
+        x, y, z = logarithm(product(attitude(best), (q[0], -q[1], -q[2], -q[3])))
+        if apart > _OTHER_PLACE_M**2 or np.sqrt(x * x + y * y + z * z) > _OTHER_HEADING_RAD:
+            next_least = min(next_least, totals[heading])
+    if next_least < least + _CLEAR_MARGIN:
+        return False
+    turn = attitude(best)
+    for k in range(6):
+        motion[k] = best[k]
+    set_attitude(motion, product(turn, attitude(motion)))
+    covariance[:MOTION_ERRORS, :] = 0.0
+    covariance[:, :MOTION_ERRORS] = 0.0
+    for a in range(MOTION_ERRORS):
+        for b in range(MOTION_ERRORS):
+            covariance[a, b] = _INFLATION * best_inverse[max(a, b), min(a, b)]
+    return True
