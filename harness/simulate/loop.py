@@ -13,8 +13,10 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
+from harness.simulate.filter_report import filter_samples
 from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
+from harness.simulate.physics.fusion import Fusion
 from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
@@ -39,6 +41,8 @@ def simulate_loop(
 
     `session` has the meaning that it has in `simulate_tracker`.
     """
+    if noise.physics is not None:
+        return _simulate_physical_loop(body, take, mounts, tracker, noise, noise.physics.fusion, seed, session)
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     first = len(time_s)
@@ -71,6 +75,45 @@ def simulate_loop(
         position_m=np.concatenate([part.position_m for part in parts]),
         tracker_from_station=np.concatenate([part.turn for part in parts]),
         quality=np.concatenate([part.quality for part in parts]),
+    )
+
+
+def _simulate_physical_loop(
+    body: Body,
+    take: BodyMotion,
+    mounts: Sequence[Mount],
+    tracker: TrackerConfig,
+    noise: Noise,
+    fusion: Fusion,
+    seed: int,
+    session: str,
+) -> DeviceSamples:
+    """Readings of one loop by a physical tracker, which does not stop between take and way back."""
+    trajectory, frames = looping_trajectory(body, take, tracker.rate_hz)
+    taken_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
+    time_s = np.arange(frames)[:, None] / tracker.rate_hz + taken_s[0]
+    readings = simulate_readings(
+        trajectory,
+        mounts,
+        tracker,
+        noise,
+        time_s,
+        seed=seed,
+        take=take.name,
+        ends_s=float(taken_s.max()),
+        session=session,
+    )
+    return DeviceSamples(
+        stations=readings.stations,
+        rate_hz=tracker.rate_hz,
+        take_frames=len(taken_s),
+        taken_s=readings.time_s,
+        ready_s=tracker.latency_s,
+        device_s=readings.device_s,
+        position_m=readings.position_m,
+        tracker_from_station=readings.turn,
+        quality=readings.quality,
+        filter=filter_samples(readings, fusion),
     )
 
 

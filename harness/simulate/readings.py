@@ -9,6 +9,8 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
 from harness.errors import UnknownName
+from harness.simulate.physics.filter_readings import FilterReadings
+from harness.stream.codec.replies import Emitter
 
 GRAVITY_M_S2 = 9.81
 
@@ -45,6 +47,10 @@ class SimulatedReadings:
     session: str = ""
     """Name of the session. Takes of one session share the errors that are constant for a session. With "" the take is
     a session of its own."""
+    filter: FilterReadings | None = None
+    """What the filter of a physical tracker reports; its poses and qualities are those above before the faults."""
+    emitters: tuple[Emitter, ...] = ()
+    """The constellation of a physical tracker."""
 
     def take_rng(self, component: str, station: str) -> np.random.Generator:
         """Random generator of one component at one station in this take, independent of all others."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
+from harness.simulate.filter_report import apply_device_settings
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
+from harness.simulate.physical_readings import simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.skin import skin_below, tissue_force_m_s2
 from harness.simulate.trajectory import Trajectory
@@ -85,6 +88,8 @@ def simulate_tracker(
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     calibration = exact_calibration(body, mounts, tracker)
     readings = simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
+    if noise.physics is not None:
+        apply_device_settings(readings, noise.physics.fusion)
     sent, wire = _transmit(readings, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
@@ -134,16 +139,16 @@ def simulate_readings(
     seed: int,
     take: str,
     begins_s: float = 0.0,
+    ends_s: float | None = None,
     session: str = "",
 ) -> SimulatedReadings:
     """Readings at sampling times (E, S) of a trajectory, with noise applied, before they are encoded.
 
     `begins_s` is added to the times: the trajectory's beginning by the device's clock and by the times of faults [s].
-    `take` and `session` are names that key the random draws.
+    `ends_s` is the last sampling time of the take, if a way back follows it in the same trajectory [s]; a physical
+    tracker then keeps what the device's settings need. `take` and `session` are names that key the random draws.
     """
     calibration = exact_calibration(trajectory.body, mounts, tracker)
-    motion = trajectory.station_motion(calibration, time_s)
-    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     skin = skin_below(trajectory.body.skeleton, mounts, calibration)
     readings = SimulatedReadings(
         seed=seed,
@@ -151,18 +156,52 @@ def simulate_readings(
         stations=calibration.stations,
         time_s=time_s + begins_s,
         rate_hz=tracker.rate_hz,
-        velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=skin.radius_m,
         tissue_m=skin.tissue_m,
-        force_m_s2=tissue_force_m_s2(motion, calibration),
-        position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
-        turn=rotations.multiply(tracker_from_world, motion.world_from_station),
-        quality=np.ones(time_s.shape),
         device_s=time_s + begins_s,
         session=session,
+        **_measure(trajectory, mounts, calibration, noise, time_s, seed, take, ends_s, session),
     )
     noise.apply(readings)
     return readings
+
+
+def _measure(
+    trajectory: Trajectory,
+    mounts: Sequence[Mount],
+    calibration: Calibration,
+    noise: Noise,
+    time_s: Floats,
+    seed: int,
+    take: str,
+    ends_s: float | None,
+    session: str,
+) -> dict[str, Any]:
+    """The fields of readings that depend on the motion: those of an ideal tracker, or of a physical one."""
+    if noise.physics is not None:
+        found, constellation = simulate_physical_readings(
+            trajectory, mounts, calibration, noise, noise.physics, time_s,
+            seed=seed, take=take, session=session, ends_s=ends_s,
+        )  # fmt: skip
+        unknown = np.broadcast_to(np.nan, (*time_s.shape, 3))  # only statistical components ask for these
+        return {
+            "velocity_m_s": unknown,
+            "force_m_s2": unknown,
+            "position_m": found.position_m,
+            "turn": found.tracker_from_station,
+            "quality": found.quality,
+            "filter": found,
+            "emitters": constellation.emitters,
+        }
+    motion = trajectory.station_motion(calibration, time_s)
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    return {
+        "velocity_m_s": rotations.rotate(tracker_from_world, motion.velocity_m_s),
+        "force_m_s2": tissue_force_m_s2(motion, calibration),
+        "position_m": rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
+        "turn": rotations.multiply(tracker_from_world, motion.world_from_station),
+        "quality": np.ones(time_s.shape),
+    }
 
 
 def _transmit(
@@ -202,6 +241,11 @@ def _health(
 ) -> dict[str, float]:
     delay_s = wire.received_s - readings.time_s.ravel()[sent]
     counts = {f"{name}_share": float(np.mean(hit)) for name, hit in readings.affected.items()}
+    if readings.filter is not None:
+        for station, hears, echoes in zip(
+            readings.stations, readings.filter.hearing_share, readings.filter.echo_share, strict=True
+        ):
+            counts |= {f"{station} hears 3 emitters": float(hears), f"{station} echoes": float(echoes)}
     return {
         "frames_sampled": float(len(readings.time_s)),
         "frames_received": float(len(frames)),

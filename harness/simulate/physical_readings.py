@@ -1,0 +1,100 @@
+"""Physical readings of the stations that a performer wears: the parts of a physical tracker put together."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.body.mounts import Mount
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.simulate.noise import Noise
+from harness.simulate.physics.body_motion import BodyMotionSource
+from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
+from harness.simulate.physics.physical_tracker import FilterReadings, PhysicalTracker, lead_in_s
+from harness.simulate.physics.room import PlacedRoom, check_room
+from harness.simulate.physics.settings import Physics
+from harness.simulate.physics.sight import Sight
+from harness.simulate.physics.worn import Worn
+from harness.simulate.skin import skin_below
+from harness.simulate.trajectory import Trajectory
+
+_LEAD_OUT_S = 0.5
+"""Motion after the take: the last slot may end later than it [s]."""
+_CHECKED_HZ = 10.0
+"""Rate at which the path is compared with the room and the constellation [Hz]."""
+
+
+def simulate_physical_readings(
+    trajectory: Trajectory,
+    mounts: Sequence[Mount],
+    calibration: Calibration,
+    noise: Noise,
+    physics: Physics,
+    time_s: Floats,
+    *,
+    seed: int,
+    take: str,
+    session: str = "",
+    ends_s: float | None = None,
+) -> tuple[FilterReadings, Constellation]:
+    """Readings at the times (E, S) of a trajectory, and the constellation that the device knows.
+
+    `calibration` is the exact one. `ends_s` is the last sampling time of the take, when a way back follows it [s].
+    `take` and `session` key the random draws. BadInput when the room is too small for the motion, and when no emitter
+    is within reach.
+    """
+    constellation, placed = place_constellation(trajectory, calibration, physics)
+    checked_s = np.arange(0.0, trajectory.duration_s, 1.0 / _CHECKED_HZ)
+    path = trajectory.station_motion(calibration, np.repeat(checked_s[:, None], len(mounts), axis=1))
+    for row, station in enumerate(calibration.stations):
+        check_room(physics.room, placed.centre_m, f"station {station}", path.position_m[:, row])
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    places_m = rotations.rotate(tracker_from_world, path.position_m - calibration.tracker_origin_m)
+    check_reach(constellation, places_m.reshape(-1, 3))
+    whole = trajectory.with_lead_in(lead_in_s(physics))
+    if whole.ends_s == trajectory.duration_s:
+        whole = whole.with_lead_out(_LEAD_OUT_S)
+    worn = Worn(
+        noise,
+        calibration.stations,
+        skin_below(trajectory.body.skeleton, mounts, calibration),
+        tick_hz=physics.inertial.rate_hz,
+        ends_s=float(time_s.max()) if ends_s is None else ends_s,
+        seed=seed,
+        take=take,
+        session=session,
+    )
+    tracker = PhysicalTracker(
+        BodyMotionSource(whole, calibration, worn),
+        physics,
+        constellation,
+        placed,
+        Sight(trajectory.body, placed) if physics.room.shadow else None,
+        seed=seed,
+        take=take,
+        session=session,
+    )
+    fusion = physics.fusion
+    with_motion = ends_s is not None or any((*fusion.prediction_ms.values(), *fusion.enhancement.values()))
+    return tracker.measure(time_s, with_motion=with_motion), constellation
+
+
+def place_constellation(
+    trajectory: Trajectory, calibration: Calibration, physics: Physics
+) -> tuple[Constellation, PlacedRoom]:
+    """The constellation in the tracker's frame, and the room around it.
+
+    Both lie above the middle of the take's path, unless `constellation.centre_m` says otherwise.
+    """
+    settings = physics.constellation
+    if settings.centre_m is None:
+        frames = max(round(trajectory.duration_s * _CHECKED_HZ), 1) + 1
+        path = trajectory.qpos(np.linspace(0.0, trajectory.duration_s, frames))
+        centre_m = np.round(middle_of_path_m(path[:, :3]), 2)
+    else:
+        centre_m = np.array(settings.centre_m)
+    placed = PlacedRoom(physics.room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
+    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    return load_constellation(settings).shifted(rotations.rotate(tracker_from_world, offset_m)), placed
