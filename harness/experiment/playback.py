@@ -96,7 +96,7 @@ class Playback:
     @cached_property
     def reach_m(self) -> float:
         """Largest coordinate of any station in the tracker's frame during the motion [m]."""
-        return float(np.abs(self.samples.position_m).max())
+        return self.samples.reach_m
 
     @cached_property
     def samples(self) -> DeviceSamples:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from harness.core.arrays import Floats, freeze
 from harness.errors import ShapeError
 from harness.stream.codec.filter_samples import FilterSamples
@@ -50,6 +52,18 @@ class DeviceSamples:
     def loop_s(self) -> float:
         """Duration of a loop [s]."""
         return len(self) / self.rate_hz
+
+    @property
+    def reach_m(self) -> float:
+        """Largest coordinate that a station reports after power-on [m].
+
+        With a filter, readings of lost stations are left out: its estimate may be anywhere.
+        """
+        if self.filter is None:
+            return float(np.abs(self.position_m).max())
+        settings = self.filter.prediction_ms, self.filter.enhancement
+        position_m, _ = self.filter.report_poses(self.position_m, self.tracker_from_station, *settings)
+        return float(np.abs(position_m[np.rint(255.0 * self.quality) > 0.0]).max(initial=0.0))
 
     @property
     def device_loop_s(self) -> float:

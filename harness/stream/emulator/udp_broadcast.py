@@ -3,6 +3,7 @@
 from harness.stream.codec.datagram import Datagram
 from harness.stream.codec.records import RecordValues, yaw_pitch_roll_deg
 from harness.stream.emulator.device_state import DeviceState
+from harness.stream.emulator.settings import DeviceSettings
 
 TRACKER_MODEL = 4
 """Number that InterSense's library takes for an IS-900 (docs/is900.md 9)."""
@@ -24,8 +25,8 @@ class UdpBroadcast:
         """Round and station row of the next reading; None while the device does not broadcast."""
         self._began_s = float("nan")
         """When the motion began in which that round is counted [s]."""
-        self._values: tuple[int, RecordValues] | None = None
-        """The latest round and its values."""
+        self._values: tuple[int, DeviceSettings, RecordValues] | None = None
+        """The latest round, the settings then and its values."""
         self._follow_device(now_s)
 
     @property
@@ -74,6 +75,7 @@ class UdpBroadcast:
         ).packet()
 
     def _round_values(self, number: int) -> RecordValues:
-        if self._values is None or self._values[0] != number:
-            self._values = number, self._device.rounds.values(number, self._device.settings)
-        return self._values[1]
+        settings, cached = self._device.settings, self._values
+        if cached is None or cached[0] != number or cached[1] is not settings:
+            self._values = cached = number, settings, self._device.rounds.values(number, settings)
+        return cached[2]

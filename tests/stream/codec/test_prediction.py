@@ -40,6 +40,13 @@ def test_a_prediction_is_a_rigid_motion_and_none_changes_nothing(
     np.testing.assert_allclose(back, turn, atol=1e-12)
 
 
+def test_without_prediction_not_even_the_sign_of_zero_changes() -> None:
+    zero = np.full((2, 3), -0.0)
+    position_m, turn = predict_poses(zero, np.array([[1.0, -0.0, 0.0, -0.0]]), -zero, zero, np.array([0, 1]))
+    assert np.signbit(position_m).tolist() == [[True] * 3, [False] * 3]
+    assert np.signbit(turn[0]).tolist() == [False, True, False, True]
+
+
 def test_the_bits_do_not_depend_on_the_number_of_instants(rng: np.random.Generator) -> None:
     """A simulation predicts a whole take, the emulator one round."""
     position_m, velocity_m_s, turn_rad_s = rng.normal(size=(3, 257, STATIONS, 3))

@@ -96,6 +96,22 @@ def test_polls_streams_and_packets_say_the_same() -> None:
         assert packet.yaw_pitch_roll_deg == pytest.approx(yaw_pitch_roll_deg(turn[at][None])[0], abs=1e-4)
 
 
+def test_a_setting_acts_within_a_round_in_packets_too() -> None:
+    """The reading of station 2 is taken at 5 ms and ready at 9 ms."""
+    samples = filtered_samples()
+    made, session = filter_of(samples), DeviceSession(EmulatorConfig(udp=True), samples=samples)
+    broadcast = UdpBroadcast(session.device, 0.0)
+    before = broadcast.packets(0.0045)
+    session.send(b"Mp1,50\rMp2,50\r", after_s=0.0046)
+    after = broadcast.packets(0.0095)
+    assert (len(before), len(after)) == (1, 1)
+    (first, second) = (parse_datagram(data) for data in (*before, *after))
+    assert first is not None
+    assert second is not None
+    assert first.position_m == pytest.approx(samples.position_m[0, 0], abs=1e-6)
+    assert second.position_m == pytest.approx(samples.position_m[0, 1] + 0.05 * made.velocity_m_s[0, 1], abs=1e-6)
+
+
 def test_geometry_is_applied_to_the_predicted_pose() -> None:
     """The tip lies along the predicted axes; a boresight makes the predicted orientation the reference."""
     samples = filtered_samples(prediction_ms=(50,))
