@@ -1,0 +1,168 @@
+"""Coverage: how many emitters are heard, and how well ranges to them fix a position, by place and by station."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.calibration import Calibration
+from harness.core.motion import BodyMotion
+from harness.simulate.physics.constellation import Constellation, middle_of_path_m
+from harness.simulate.physics.level import level_db, threshold_db
+from harness.simulate.physics.room import PlacedRoom, Room
+from harness.simulate.physics.sight import Sight
+from harness.simulate.physics.sound import Sound
+from harness.simulate.trajectory import Trajectory
+
+ENOUGH = 3
+"""Number of ranges that a position needs."""
+MOST_SAMPLES = 600
+"""Most instants of a clip that are looked at [choice]."""
+_SAMPLES_HZ = 10.0
+_NO_FIX = 1e-9
+"""Determinant of the normal matrix below which ranges fix no position: the emitters lie in a plane with the station."""
+
+
+def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
+    """Dilution of precision of a position from ranges: (...,) from unit vectors (..., J, 3) to emitters heard (..., J).
+
+    With the heard unit vectors as the rows of G it is sqrt(trace((G'G)^-1)): the standard deviation of the position
+    over that of a range (Langley 1999, "Dilution of Precision", GPS World 10). NaN where fewer than three emitters are
+    heard, and where these fix no position.
+    """
+    g = np.where(heard[..., None], unit, 0.0)
+    (xx, xy, xz), (yy, yz), (zz,) = ([np.sum(g[..., a] * g[..., b], axis=-1) for b in range(a, 3)] for a in range(3))
+    minors = xx * yy - xy**2 + xx * zz - xz**2 + yy * zz - yz**2
+    determinant = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    fixed = (np.sum(heard, axis=-1) >= ENOUGH) & (determinant > _NO_FIX)
+    out: Floats = np.sqrt(np.where(fixed, minors, np.nan) / np.where(fixed, determinant, 1.0))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceCoverage:
+    """Coverage at N places without a body; a station there faces each emitter."""
+
+    heard: Ints
+    """(N,) number of emitters heard."""
+    dilution: Floats
+    """(N,) dilution of precision; NaN without a fix."""
+
+    @property
+    def share(self) -> float:
+        """Share of the places where three emitters or more are heard."""
+        return float(np.mean(self.heard >= ENOUGH))
+
+    @property
+    def median_dilution(self) -> float:
+        """Median dilution of precision over the places with a fix; NaN without any."""
+        return _median(self.dilution)
+
+
+def place_coverage(constellation: Constellation, position_m: Floats) -> PlaceCoverage:
+    """Coverage at places (N, 3) in the tracker's frame [m]: emitters in whose range and cone a place lies."""
+    ray_m = position_m[:, None] - constellation.position_m
+    distance_m = np.sqrt(np.sum(ray_m**2, axis=-1))
+    in_cone = np.sum(ray_m * constellation.normal, axis=-1) >= np.cos(constellation.cone_rad) * distance_m
+    heard = (distance_m <= constellation.range_m) & in_cone & (distance_m > 0.0)
+    unit = ray_m / np.where(distance_m > 0.0, distance_m, 1.0)[..., None]
+    return PlaceCoverage(heard.sum(axis=-1), dilution_of_precision(unit, heard))
+
+
+@dataclass(frozen=True, eq=False)
+class StationCoverage:
+    """Coverage of S stations at N instants of a clip."""
+
+    stations: tuple[str, ...]
+    heard: Ints
+    """(N, S) number of emitters that one of the station's microphones hears."""
+    dilution: Floats
+    """(N, S) dilution of precision at the station's origin; NaN without a fix."""
+
+    def __post_init__(self) -> None:
+        freeze(self, np.int64, heard=("N", len(self.stations)))
+        freeze(self, dilution=(len(self.heard), len(self.stations)))
+
+    def shares(self, station: int) -> tuple[float, float, float, float]:
+        """Shares of the time in which a station hears no emitter, one, two, and three or more."""
+        counts = np.bincount(np.minimum(self.heard[:, station], ENOUGH), minlength=ENOUGH + 1) / len(self.heard)
+        none, one, two, enough = map(float, counts)
+        return none, one, two, enough
+
+    def median_dilution(self, station: int) -> float:
+        """Median dilution of precision of a station while it has a fix; NaN if it never has."""
+        return _median(self.dilution[:, station])
+
+
+def station_coverage(
+    constellation: Constellation,
+    body: Body,
+    motion: BodyMotion,
+    calibration: Calibration,
+    *,
+    room: Room | None = None,
+    sound: Sound | None = None,
+) -> StationCoverage:
+    """Coverage of the stations of a calibration on a performer who moves below a constellation.
+
+    The constellation stands above the middle of the motion's path. An emitter is heard when a microphone lies in its
+    range and cone, receives enough sound, and neither body nor furniture is between them. At most ten instants per
+    second are looked at, and at most `MOST_SAMPLES`.
+    """
+    room, sound = room or Room(), sound or Sound()
+    trajectory = Trajectory(body, motion)
+    count = min(int(trajectory.duration_s * _SAMPLES_HZ) + 1, MOST_SAMPLES)
+    time_s = np.linspace(0.0, trajectory.duration_s, count)
+    qpos = trajectory.qpos(time_s)
+    stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
+    centre_m = middle_of_path_m(motion.qpos)
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    placed = PlacedRoom(room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
+    centred = constellation.shifted(rotations.rotate(tracker_from_world, np.array([*centre_m, 0.0])))
+    position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
+    turned = rotations.multiply(tracker_from_world, stations.world_from_station)
+    sight = Sight(body, placed) if room.shadow or room.furniture else None
+    heard = np.empty((count, len(calibration.stations), len(constellation)), dtype=bool)
+    for n in range(count):
+        if sight is not None:
+            sight.set(qpos[n])
+        heard[n] = heard_emitters(centred, position_m[n], turned[n], sound, sight)
+    ray_m = position_m[:, :, None] - centred.position_m
+    unit = ray_m / np.sqrt(np.sum(ray_m**2, axis=-1, keepdims=True))
+    return StationCoverage(calibration.stations, heard.sum(axis=-1), dilution_of_precision(unit, heard))
+
+
+def heard_emitters(
+    constellation: Constellation, position_m: Floats, turned: Floats, sound: Sound, sight: Sight | None
+) -> Bools:
+    """(S, J) which emitters a microphone of each station hears.
+
+    Stations have positions (S, 3) and orientations (S, 4) in the tracker's frame. `sight` tells what is in the way.
+    """
+    out = np.zeros((len(position_m), len(constellation)), dtype=bool)
+    microphones_m = position_m[:, None] + rotations.rotate(turned[:, None], np.array(sound.microphones_m))
+    outward = rotations.rotate(turned, np.array([0.0, 0.0, 1.0]))
+    least_db = threshold_db(constellation.range_m, constellation.cone_rad, sound.absorption_db_per_m)
+    cone_cos = float(np.cos(constellation.cone_rad))
+    for emitter, (at_m, normal) in enumerate(zip(constellation.position_m, constellation.normal, strict=True)):
+        ray_m = microphones_m - at_m
+        distance_m = np.sqrt(np.sum(ray_m**2, axis=-1))
+        emitter_cos = np.sum(ray_m * normal, axis=-1) / distance_m
+        station_cos = -np.sum(ray_m * outward[:, None], axis=-1) / distance_m
+        near: Bools = (distance_m <= constellation.range_m) & (emitter_cos >= cone_cos)
+        for station, microphone in np.argwhere(near):
+            each = station, microphone
+            level = level_db(distance_m[each], emitter_cos[each], station_cos[each], sound.absorption_db_per_m)
+            near[each] = level >= least_db
+        if sight is not None and near.any():
+            near[near] = ~sight.blocked(at_m, microphones_m[near])
+        out[:, emitter] = near.any(axis=1)
+    return out
+
+
+def _median(values: Floats | Sequence[float]) -> float:
+    finite = np.asarray(values)[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else float("nan")
