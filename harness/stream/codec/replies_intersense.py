@@ -135,9 +135,12 @@ class Emitter:
 
     @classmethod
     def parse(cls, text: str) -> "Emitter | None":
-        """Parse by blanks, since some firmware widens the number."""
+        """Parse by blanks, since some firmware widens the number.
+
+        An identity of seven digits follows the normal's two decimals without one.
+        """
         number = r" *(-?\d+\.\d+)"
-        match = re.fullmatch(rf"31F *(\d+){number * 6} *(\d+)", text)
+        match = re.fullmatch(rf"31F *(\d+){number * 6}(?: +|(?<=\.\d\d))(\d+)", text)
         if match is None:
             return None
         x, y, z, a, b, c = map(float, match.groups()[1:7])

@@ -80,6 +80,13 @@ def test_an_emitter_with_a_wide_number_is_parsed_by_blanks() -> None:
     assert emitter == Emitter(1, (0.9144, -0.6096, 0.0), (0.0, 0.0, 1.0), 5001)
 
 
+def test_the_last_decimal_of_an_emitter_is_not_its_identity() -> None:
+    cut = b"31F      1    0.9144   -0.6096    0.0000   0.00   0.00   1.00"
+    assert parse_reply(cut) == UnknownReply(cut)
+    wide = Emitter(1, (0.9144, -0.6096, 0.0), (0.0, 0.0, 1.0), 1234567)
+    assert parse_reply(wide.line()) == wide
+
+
 def test_which_stations_are_active() -> None:
     one_station, all_stations = parse_reply(b"23l1010"), parse_reply(b"21l" + b"110000000001" + b"1" * 20)
     assert isinstance(one_station, StationStates)
