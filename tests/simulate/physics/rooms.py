@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.body.humanoid import Body
 from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
-from harness.body.humanoid import Body
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.room import PlacedRoom, Room
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
