@@ -36,9 +36,3 @@ def noise_factor(level: float, absorption_db_per_m: float) -> float:
     reference_db = level_db(NOISE_AT_M, 1.0, 1.0, absorption_db_per_m)
     factor: float = 10.0 ** ((reference_db - level) / 20.0)
     return min(max(factor, _LEAST_NOISE), _LARGEST_NOISE)
-
-
-@compiled
-def range_sigma_m(level: float, absorption_db_per_m: float, noise_m: float) -> float:
-    """Standard deviation of a range at a level [dB], from `noise_m` at 2 m on the axes [m]."""
-    return noise_m * noise_factor(level, absorption_db_per_m)

@@ -10,8 +10,8 @@ from harness.core.compiled import compiled
 from harness.simulate.physics.room import PlacedRoom
 
 _YIELD_M = 0.02
-"""A surface closer to the end of a path than this does not block it [m]. Skin gives way under a station that soft tissue
-or a misplaced mount brings below the rigid surface of the model [choice]."""
+"""A surface closer to the end of a path than this does not block it [m] [choice]. Soft tissue or a misplaced mount may
+bring a microphone below the rigid surface of the model, where real skin would give way."""
 
 
 class Sight:
@@ -20,7 +20,7 @@ class Sight:
     def __init__(self, body: Body | None, placed: PlacedRoom) -> None:
         spec = mujoco.MjSpec() if body is None else body_spec(body.skeleton)
         self._world_from_tracker = rotations.to_matrix(placed.world_from_tracker)
-        self._origin_m = placed.origin_m
+        self._origin_m = np.array(placed.origin_m)
         self._model = sight_model(spec, placed)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.simulate.physics.level import NOISE_AT_M, level_db, noise_factor, range_sigma_m, threshold_db
+from harness.simulate.physics.level import NOISE_AT_M, level_db, noise_factor, threshold_db
 
 ABSORPTION = 1.3
 distances = st.floats(0.05, 10.0)
@@ -43,6 +43,6 @@ def test_noise_is_inverse_to_the_amplitude_within_limits(distance_m: float, emit
 
 
 def test_the_noise_is_specified_at_two_metres() -> None:
-    assert range_sigma_m(level_db(2.0, 1.0, 1.0, ABSORPTION), ABSORPTION, 0.004) == pytest.approx(0.004)
-    assert range_sigma_m(0.0, ABSORPTION, 0.004) == pytest.approx(0.002)
-    assert range_sigma_m(-60.0, ABSORPTION, 0.004) == pytest.approx(0.016)
+    assert noise_factor(level_db(2.0, 1.0, 1.0, ABSORPTION), ABSORPTION) == pytest.approx(1.0)
+    assert noise_factor(0.0, ABSORPTION) == 0.5
+    assert noise_factor(-60.0, ABSORPTION) == 4.0

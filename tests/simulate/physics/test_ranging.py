@@ -10,16 +10,28 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.level import level_db, noise_factor
+from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.ranging import Ranges, Ranging
 from harness.simulate.physics.room import Box, Room
-from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
-from tests.simulate.physics.rooms import DOWN, UP, Emitters, Stations, grid, placed, still, worn
+from tests.simulate.physics.rooms import (
+    DOWN,
+    UP,
+    Emitters,
+    block_of,
+    grid,
+    moving,
+    placed,
+    some_stations,
+    still,
+    worn,
+)
 
 EXACT = Sound(temperature_sd_c=0.0, range_noise_m=0.0, wrong_cycle_share=0.0, air_speed_sd_m_s=0.0, bursts_per_min=0.0)
 CENTRED = replace(EXACT, microphones_m=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
 QUIET = Room(echoes=False)
+OPEN = Room(echoes=False, shadow=False)
 SIDEWAYS = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 """Orientation of a station whose z points along x."""
 BACKWARD = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
@@ -48,7 +60,7 @@ def ranging(
 
 def rest(sound: Sound, place_m: tuple[float, ...], slots: int, **options: object) -> Floats:
     """Ranges (slots,) of a station at rest that faces the ceiling, from one emitter above it."""
-    out = ranging(sound, one(), **options).measure(0, still(slots, place_m), None)  # type: ignore[arg-type]
+    out = ranging(sound, one(), OPEN, **options).measure(0, still(slots, place_m), None)  # type: ignore[arg-type]
     return np.ascontiguousarray(out.range_m[:, 0, 0])
 
 
@@ -93,10 +105,7 @@ def test_a_microphone_that_faces_away_hears_nothing() -> None:
 
 
 def test_the_range_is_that_at_the_arrival() -> None:
-    stations = still(1, (0.0, 0.0, 2.0))
-    ticks_s = np.arange(TICKS_PER_SLOT + 1) / 400.0
-    stations.velocity_m_s[..., 2] = 5.0
-    stations.position_m[..., 2] += 5.0 * ticks_s[:, None]
+    stations = moving(1, (0.0, 0.0, 2.0), turn=UP, velocity_m_s=(0.0, 0.0, 5.0))
     speed = speed_of_sound_m_s(20.0)
     out = ranging(CENTRED, one()).measure(0, stations, None)
     np.testing.assert_allclose(out.range_m, 2.0 * speed / (speed - 5.0), atol=1e-9)
@@ -164,13 +173,10 @@ def test_the_earliest_echo_counts() -> None:
 def test_an_echo_lasts_as_long_as_the_way_is_blocked() -> None:
     """A station slides along x at 1 m/s through the shadow of a box; the echo from the floor passes below the box."""
     slots = 100
-    stations = still(slots, (0.405, 0.0, 1.4), turn=BACKWARD)
-    ticks_s = np.arange(slots * TICKS_PER_SLOT + 1) / 400.0
-    stations.position_m[..., 0] += ticks_s[:, None]
-    stations.velocity_m_s[..., 0] = 1.0
+    stations = moving(slots, (0.405, 0.0, 1.4), turn=BACKWARD, velocity_m_s=(1.0, 0.0, 0.0))
     box = Box((0.5, 0.0, 1.8), (0.2, 0.2, 0.2))
     out = ranging(CENTRED, one(), Room(furniture=(box,))).measure(0, stations, None)
-    x_m = 0.405 + ticks_s[:-1:TICKS_PER_SLOT]
+    x_m = 0.405 + 0.0125 * np.arange(slots)
     # The box, 0.6 to 0.8 m below the emitter, hides what passes its lower near edge and its upper far edge.
     hidden = (x_m * 0.8 / 1.4 > 0.4) & (x_m * 0.6 / 1.4 < 0.6)
     assert 50 < hidden.sum() < 60
@@ -193,12 +199,12 @@ def test_a_warm_room_shortens_ranges_by_the_ratio_of_the_speeds() -> None:
 def test_the_temperature_belongs_to_the_session() -> None:
     sound = replace(CENTRED, temperature_sd_c=2.0)
     drawn = [
-        ranging(sound, one(), take=take, session=session).temperature_c
+        ranging(sound, one(), OPEN, take=take, session=session).temperature_c
         for session, take in [("x", "t"), ("x", "u"), ("y", "t"), ("", "t"), ("", "u")]
     ]
     assert drawn[0] == drawn[1]
     assert len(set(drawn)) == 4
-    many = [ranging(sound, one(), take=f"t{n}").temperature_c for n in range(400)]
+    many = [ranging(sound, one(), OPEN, take=f"t{n}").temperature_c for n in range(400)]
     assert np.std(many) == pytest.approx(2.0, rel=0.15)
 
 
@@ -227,7 +233,7 @@ def test_wrong_cycles_are_one_wavelength_too_long_and_as_frequent_as_set() -> No
 def test_air_drifts_with_its_own_correlation_along_each_path() -> None:
     windy = replace(CENTRED, air_speed_sd_m_s=0.5, air_correlation_s=0.5)
     two = Emitters(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.tile([0.0, 0.0, 1.0], (2, 1)))
-    out = ranging(windy, two, stations=("a", "b")).measure(0, still(40_000, (0.05, 0.0, 2.0), (0.05, 0.0, 2.0)), None)
+    out = ranging(windy, two, OPEN, ("a", "b")).measure(0, still(40_000, (0.05, 0.0, 2.0), (0.05, 0.0, 2.0)), None)
     np.testing.assert_array_equal(out.range_m[..., 0], out.range_m[..., 1])  # both microphones share the path
     speed, distance_m = speed_of_sound_m_s(20.0), math.hypot(0.05, 2.0)
     air = (speed * distance_m / out.range_m[..., 0] - speed).reshape(-1, 4)
@@ -243,7 +249,7 @@ def test_air_drifts_with_its_own_correlation_along_each_path() -> None:
 def test_a_burst_triggers_microphones_early_or_not_at_all() -> None:
     sound = replace(CENTRED, bursts_per_min=60.0, burst_s=(0.2, 0.6))
     slots, names = 8000, ("a", "b", "c", "d")
-    out = ranging(sound, one(), stations=names).measure(-800, still(slots, *[(0.0, 0.0, 2.0)] * 4), None)
+    out = ranging(sound, one(), OPEN, names).measure(-800, still(slots, *[(0.0, 0.0, 2.0)] * 4), None)
     struck = ~out.direct[:, 0, 0]
     assert not out.direct[struck].any()  # every station hears a burst
     assert not out.echo.any()
@@ -263,14 +269,14 @@ def test_a_burst_triggers_microphones_early_or_not_at_all() -> None:
 
 
 def measure_worn(
-    stations: Stations, qpos: Floats, names: tuple[str, ...], body: Body, blocks: tuple[int, ...]
+    stations: TrackerMotion, qpos: Floats, names: tuple[str, ...], body: Body, blocks: tuple[int, ...]
 ) -> Ranges:
     """The ranges of a performer with all errors, block after block."""
     room = Room(furniture=(Box((0.8, 0.0, 0.5), (0.3, 0.3, 0.2)),))
     device = ranging(Sound(bursts_per_min=60.0), grid(), room, names, body=body)
     parts, first = [], 0
     for slots in blocks:
-        parts.append(device.measure(first, stations.block(first, slots), qpos[first : first + slots]))
+        parts.append(device.measure(first, block_of(stations, first, slots), qpos[first : first + slots]))
         first += slots
     return Ranges(
         emitter=np.concatenate([part.emitter for part in parts]),
@@ -301,7 +307,7 @@ def test_one_station_more_changes_no_other(boxer: tuple[Body, BodyMotion]) -> No
     stations, qpos = worn(*boxer, 240, *names)
     whole = measure_worn(stations, qpos, names, boxer[0], (240,))
     for rows in ((0,), (2,), (3, 1)):
-        some = measure_worn(stations.only(*rows), qpos, tuple(names[row] for row in rows), boxer[0], (240,))
+        some = measure_worn(some_stations(stations, *rows), qpos, tuple(names[row] for row in rows), boxer[0], (240,))
         at = list(rows)
         own = Ranges(whole.emitter, whole.range_m[:, at], whole.direct[:, at], whole.echo[:, at])
         assert_same(some, own)
@@ -310,13 +316,13 @@ def test_one_station_more_changes_no_other(boxer: tuple[Body, BodyMotion]) -> No
 def test_each_slot_sees_the_body_of_its_own_instant(boxer: tuple[Body, BodyMotion]) -> None:
     body, names = boxer[0], ("left_hand", "left_foot")
     stations, qpos = worn(*boxer, 400, *names)
-    free = ranging(EXACT, grid(), replace(QUIET, shadow=False), names).measure(0, stations, None)
+    free = ranging(EXACT, grid(), OPEN, names).measure(0, stations, None)
     got = ranging(EXACT, grid(), QUIET, names, body=body).measure(0, stations, qpos)
     sight, expected = Sight(body, placed()), free.direct.copy()
     for slot in range(400):
         sight.set(qpos[slot])
         for m, offset_m in enumerate(EXACT.microphones_m):
-            at_m = stations.block(slot, 1).points(np.array(offset_m))[0][0]
+            at_m = block_of(stations, slot, 1).points(np.array(offset_m))[0][0]
             expected[slot, :, m] &= ~sight.blocked(grid().position_m[slot % 9], at_m)
     np.testing.assert_array_equal(got.direct, expected)
     assert 0.05 < np.mean(free.direct & ~got.direct) < 0.8
