@@ -168,3 +168,11 @@ def test_a_bone_without_length_still_makes_a_body() -> None:
     bone_m = np.array(standard.bone_m)
     bone_m[standard.index("lwrist")] = 0.0
     assert humanoid.build_body(standard.with_bones(bone_m)).model.nq == 55
+
+
+def test_a_changed_spec_leaves_the_shared_body_alone() -> None:
+    body = humanoid.build_body()
+    spec = humanoid.body_spec(body.skeleton, body.mounts)
+    np.testing.assert_array_equal(spec.compile().geom_size, body.model.geom_size)
+    spec.geom("lhand").size = [0.5, 0.5, 0.5]
+    assert humanoid.build_body().model.geom("lhand").size[0] < 0.2

@@ -7,19 +7,20 @@ import math
 
 from harness.core.compiled import compiled
 
-_LEAST_AMPLITUDE = 1e-6
+NOISE_AT_M = 2.0
+"""Distance on the axes for which the noise of a range is specified [m]."""
 _LEAST_NOISE, _LARGEST_NOISE = 0.5, 4.0
-_REFERENCE_M = 2.0
+_LEAST_AMPLITUDE = 1e-6
 
 
 @compiled
-def level_db(distance_m: float, emitter_cos: float, station_cos: float, absorption_db_per_m: float) -> float:
+def level_db(distance_m: float, cos_emitter: float, cos_station: float, absorption_db_per_m: float) -> float:
     """Level after a distance [dB]; the cosines are of the angles from the emitter's normal and the station's z.
 
     The amplitude falls with distance, with absorption in the air [dB/m], with the cosine at the emitter, and at the
     microphone with half of one plus the cosine (a choice).
     """
-    amplitude = max(emitter_cos, _LEAST_AMPLITUDE) * max(0.5 + 0.5 * station_cos, _LEAST_AMPLITUDE)
+    amplitude = max(cos_emitter, _LEAST_AMPLITUDE) * max(0.5 + 0.5 * cos_station, _LEAST_AMPLITUDE)
     return 20.0 * math.log10(amplitude / max(distance_m, _LEAST_AMPLITUDE)) - absorption_db_per_m * (distance_m - 1.0)
 
 
@@ -32,12 +33,6 @@ def threshold_db(range_m: float, cone_rad: float, absorption_db_per_m: float) ->
 @compiled
 def noise_factor(level: float, absorption_db_per_m: float) -> float:
     """Noise of a range at a level [dB], relative to that at 2 m on the axes: the inverse amplitude, from 0.5 to 4."""
-    reference_db = level_db(_REFERENCE_M, 1.0, 1.0, absorption_db_per_m)
+    reference_db = level_db(NOISE_AT_M, 1.0, 1.0, absorption_db_per_m)
     factor: float = 10.0 ** ((reference_db - level) / 20.0)
     return min(max(factor, _LEAST_NOISE), _LARGEST_NOISE)
-
-
-@compiled
-def range_sigma_m(level: float, range_noise_m: float, absorption_db_per_m: float) -> float:
-    """Standard deviation of a range at a level [dB], from that at 2 m on the axes [m]."""
-    return range_noise_m * noise_factor(level, absorption_db_per_m)

@@ -18,6 +18,7 @@ from harness.simulate.physics.bursts import Bursts
 from harness.simulate.physics.echoes import mirror_images, reflection_point
 from harness.simulate.physics.flight import time_of_flight_s
 from harness.simulate.physics.level import level_db, noise_factor, threshold_db
+from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sight import Sight
@@ -45,17 +46,6 @@ class EmitterGeometry(Protocol):
     @property
     def range_m(self) -> float:
         """Largest distance at which an emitter is heard [m]."""
-
-
-class MovingStations(Protocol):
-    """True motion of S stations at the T + 1 ticks of a block, in the tracker's frame."""
-
-    @property
-    def tracker_from_station(self) -> Floats:
-        """(T + 1, S, 4) orientations."""
-
-    def points(self, offset_m: Floats) -> tuple[Floats, Floats]:
-        """Positions and velocities (T + 1, S, 3) of a point that is fixed to each station [m, m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +91,8 @@ class Ranging:
     ) -> None:
         """Begin a take. Without `sight` nothing blocks sound; there are echoes if `placed.room` has them."""
         self._sound, self._schedule, self._sight = sound, schedule, sight
-        self._position_m = np.ascontiguousarray(constellation.position_m, dtype=float)
-        self._normal = np.ascontiguousarray(constellation.normal, dtype=float)
+        self._position_m = np.array(constellation.position_m)
+        self._normal = np.array(constellation.normal)
         reflection = placed.room.reflection
         self._planes = placed.planes() if placed.room.echoes and reflection > 0.0 else np.zeros((0, 4))
         self._images_m = mirror_images(self._planes, self._position_m)
@@ -125,7 +115,7 @@ class Ranging:
         self._chance = [generator(seed, "physics", take, "range faults", station) for station in stations]
         self._air_m_s = np.full((schedule.emitters, len(stations)), np.nan)
 
-    def measure(self, first_slot: int, motion: MovingStations, qpos: Floats | None) -> Ranges:
+    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
         """The ranges of the next block of F slots.
 
         `motion` covers the block's ticks. `qpos` (F, 55) is the body's configuration at the beginning of each slot, for

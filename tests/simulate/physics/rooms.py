@@ -1,16 +1,17 @@
 """Emitters, rooms and motions of stations for tests of the physics."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from harness.body.humanoid import Body
 from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
-from harness.body.humanoid import Body
 from harness.simulate.link import TrackerConfig
+from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom, Room
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
@@ -45,35 +46,21 @@ def placed(room: Room | None = None) -> PlacedRoom:
     return PlacedRoom(room or Room(), ORIGIN_M[:2], WORLD_FROM_TRACKER, ORIGIN_M)
 
 
-@dataclass
-class Stations:
-    """Motion of the origins of stations at the ticks of a block."""
+def block_of(motion: TrackerMotion, first: int, slots: int) -> TrackerMotion:
+    """Some slots of a motion."""
+    ticks = slice(first * TICKS_PER_SLOT, (first + slots) * TICKS_PER_SLOT + 1)
+    return TrackerMotion(*(part[ticks] for part in vars(motion).values()))
 
-    position_m: Floats
-    velocity_m_s: Floats
-    tracker_from_station: Floats
-    turn_rad_s: Floats
 
-    def points(self, offset_m: Floats) -> tuple[Floats, Floats]:
-        arm_m = rotations.rotate(self.tracker_from_station, offset_m)
-        return self.position_m + arm_m, self.velocity_m_s + np.cross(self.turn_rad_s, arm_m)
-
-    def block(self, first: int, slots: int) -> "Stations":
-        """Some of its slots."""
-        ticks = slice(first * TICKS_PER_SLOT, (first + slots) * TICKS_PER_SLOT + 1)
-        return Stations(
-            self.position_m[ticks], self.velocity_m_s[ticks], self.tracker_from_station[ticks], self.turn_rad_s[ticks]
-        )
-
-    def only(self, *rows: int) -> "Stations":
-        """Some of its stations."""
-        at = list(rows)
-        return Stations(
-            self.position_m[:, at],
-            self.velocity_m_s[:, at],
-            self.tracker_from_station[:, at],
-            self.turn_rad_s[:, at],
-        )
+def some_stations(motion: TrackerMotion, *rows: int) -> TrackerMotion:
+    """Some stations of a motion."""
+    return replace(
+        motion,
+        position_m=motion.position_m[:, list(rows)],
+        tracker_from_station=motion.tracker_from_station[:, list(rows)],
+        velocity_m_s=motion.velocity_m_s[:, list(rows)],
+        turn_rad_s=motion.turn_rad_s[:, list(rows)],
+    )
 
 
 UP = (0.0, 1.0, 0.0, 0.0)
@@ -81,14 +68,28 @@ UP = (0.0, 1.0, 0.0, 0.0)
 DOWN = (1.0, 0.0, 0.0, 0.0)
 
 
-def still(slots: int, *position_m: Sequence[float], turn: Sequence[float] = UP) -> Stations:
+def still(slots: int, *position_m: Sequence[float], turn: Sequence[float] = UP) -> TrackerMotion:
     """Stations at rest at these places of the tracker's frame."""
-    shape = (slots * TICKS_PER_SLOT + 1, len(position_m))
-    at_m, turns = np.broadcast_to(position_m, (*shape, 3)), np.broadcast_to(turn, (*shape, 4))
-    return Stations(np.array(at_m), np.zeros((*shape, 3)), np.array(turns), np.zeros((*shape, 3)))
+    return moving(slots, *position_m, turn=turn, velocity_m_s=(0.0, 0.0, 0.0))
 
 
-def worn(body: Body, take: BodyMotion, slots: int, *names: str) -> tuple[Stations, Floats]:
+def moving(
+    slots: int, *position_m: Sequence[float], turn: Sequence[float], velocity_m_s: Sequence[float]
+) -> TrackerMotion:
+    """Stations that begin at these places and move at a constant velocity."""
+    time_s = np.arange(slots * TICKS_PER_SLOT + 1) / TICK_HZ
+    shape = (len(time_s), len(position_m))
+    velocity: Floats = np.broadcast_to(np.array(velocity_m_s), (*shape, 3))
+    return TrackerMotion(
+        time_s=time_s,
+        position_m=np.array(position_m) + time_s[:, None, None] * velocity,
+        tracker_from_station=np.broadcast_to(turn, (*shape, 4)),
+        velocity_m_s=velocity,
+        turn_rad_s=np.zeros((*shape, 3)),
+    )
+
+
+def worn(body: Body, take: BodyMotion, slots: int, *names: str) -> tuple[TrackerMotion, Floats]:
     """Stations on a performer, by default all with a default mount, and the configuration at each slot's beginning."""
     trajectory = Trajectory(body, take)
     mounts = [DEFAULT_MOUNTS[name] for name in names or DEFAULT_MOUNTS]
@@ -96,10 +97,11 @@ def worn(body: Body, take: BodyMotion, slots: int, *names: str) -> tuple[Station
     time_s = np.arange(slots * TICKS_PER_SLOT + 1) / TICK_HZ
     motion = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(mounts), axis=1))
     into = rotations.inverse(WORLD_FROM_TRACKER)
-    stations = Stations(
-        rotations.rotate(into, motion.position_m - ORIGIN_M),
-        rotations.rotate(into, motion.velocity_m_s),
-        rotations.multiply(into, motion.world_from_station),
-        rotations.rotate(into, motion.turn_rad_s),
+    stations = TrackerMotion(
+        time_s=time_s,
+        position_m=rotations.rotate(into, motion.position_m - ORIGIN_M),
+        tracker_from_station=rotations.multiply(into, motion.world_from_station),
+        velocity_m_s=rotations.rotate(into, motion.velocity_m_s),
+        turn_rad_s=rotations.rotate(into, motion.turn_rad_s),
     )
     return stations, trajectory.qpos(time_s[:-1:TICKS_PER_SLOT])
