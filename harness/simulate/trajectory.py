@@ -72,6 +72,11 @@ class Trajectory:
         self._spline: PPoly = self._take
 
     @property
+    def spline(self) -> PPoly:
+        """Cubic pieces (4, P, 55) of configurations, whose root quaternions are not normalised."""
+        return self._spline
+
+    @property
     def begins_s(self) -> float:
         """First time [s]: 0, or the beginning of the lead-in."""
         return float(self._spline.x[0])

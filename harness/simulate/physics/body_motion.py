@@ -12,7 +12,7 @@ from harness.simulate.trajectory import Trajectory
 
 
 class BodyMotionSource:
-    """Motion of the stations of a calibration on a trajectory, with what `worn` does to them (`TrackerMotionSource`)."""
+    """A `TrackerMotionSource`: the stations of a calibration on a trajectory, with what `worn` does to them."""
 
     def __init__(self, trajectory: Trajectory, calibration: Calibration, worn: Worn) -> None:
         self.stations = calibration.stations
