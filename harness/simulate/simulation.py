@@ -154,7 +154,7 @@ def simulate_readings(
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=skin.radius_m,
         tissue_m=skin.tissue_m,
-        force_m_s2=tissue_force_m_s2(motion, calibration),
+        force_m_s2=tissue_force_m_s2(motion.world_from_station, motion.acceleration_m_s2, calibration),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
         quality=np.ones(time_s.shape),

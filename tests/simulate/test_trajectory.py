@@ -161,9 +161,9 @@ def test_the_take_itself_stays_as_it_is(boxer: tuple[Body, BodyMotion], trajecto
         assert one.tobytes() == other.tobytes()
     calibration = simulate_tracker(*boxer, worn(), TrackerConfig(), noise_preset("clean"), seed=1).calibration
     each_s = np.repeat(time_s[:, None], 6, axis=1)
-    one, other = (t.station_motion(calibration, each_s) for t in (trajectory, changed))
+    true, led = (t.station_motion(calibration, each_s) for t in (trajectory, changed))
     for name in ("position_m", "world_from_station", "velocity_m_s", "acceleration_m_s2", "turn_rad_s"):
-        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+        assert getattr(true, name).tobytes() == getattr(led, name).tobytes()
 
 
 def test_a_lead_out_comes_to_rest_in_the_last_pose(trajectory: Trajectory) -> None:

@@ -33,7 +33,7 @@ def test_it_goes_through_its_samples() -> None:
 
 def test_velocities_are_derivatives() -> None:
     _, source = tumbling()
-    motion = source.advance(np.arange(-5000, 45001) * 1e-4)
+    motion = source.advance(1e-4 * np.arange(-5000.0, 45001.0))
     slope, spin = central_differences(motion)
     assert np.abs(slope - motion.velocity_m_s[1:-1]).max() < 2e-3  # where acceleration jumps, at the ends
     assert np.median(np.abs(slope - motion.velocity_m_s[1:-1])) < 1e-7

@@ -51,7 +51,7 @@ def turning(stations: int, time_s: Floats) -> TrackerMotion:
 
 @pytest.mark.parametrize("name", COMPONENTS)
 def test_velocity_is_the_derivative_of_position(name: str) -> None:
-    stations, time_s = ("torso", "head", "left_wrist"), np.arange(20001) * STEP_S
+    stations, time_s = ("torso", "head", "left_wrist"), STEP_S * np.arange(20001.0)
     skin = Skin(np.array([0.12, 0.1, 0.04]), np.array([0.01, 0.005, 0.02]))
     components = Worn(COMPONENTS[name], stations, skin, tick_hz=1.0 / STEP_S, ends_s=1.0, seed=3, take="t")
     motion = turning(3, time_s)
