@@ -16,6 +16,7 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.skeleton import Skeleton
+from harness.simulate.physics.strapdown import product, quaternion, rotated
 
 
 class StationChain(NamedTuple):
@@ -134,7 +135,7 @@ def _follow(
                 out.acceleration_m_s2[k, s],
             )
             out.turn_rad_s[k, s] = omega[b]
-            w, x, y, z = _product(turn[b], chain.bone_from_station[s])
+            w, x, y, z = product(quaternion(turn[b]), quaternion(chain.bone_from_station[s]))
             if w * last[s, 0] + x * last[s, 1] + y * last[s, 2] + z * last[s, 3] < 0.0:
                 w, x, y, z = -w, -x, -y, -z
             last[s, 0], last[s, 1], last[s, 2], last[s, 3] = w, x, y, z
@@ -164,16 +165,16 @@ def _root_state(
         along += place[i] * rate[i]
     for i in range(4):
         change[i] -= 2.0 * along * rate[i]
-    turn[0], turn[1], turn[2], turn[3] = _product(tracker_from_world, place)
-    place[1], place[2], place[3] = -place[1], -place[2], -place[3]
-    _, x, y, z = _product(rate, place)
-    omega[0], omega[1], omega[2] = _rotated(tracker_from_world, 2.0 * x, 2.0 * y, 2.0 * z)
-    _, x, y, z = _product(change, place)
-    alpha[0], alpha[1], alpha[2] = _rotated(tracker_from_world, 2.0 * x, 2.0 * y, 2.0 * z)
+    to_tracker, root_from_world = quaternion(tracker_from_world), (place[0], -place[1], -place[2], -place[3])
+    turn[0], turn[1], turn[2], turn[3] = product(to_tracker, quaternion(place))
+    _, x, y, z = product(quaternion(rate), root_from_world)
+    omega[0], omega[1], omega[2] = rotated(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
+    _, x, y, z = product(quaternion(change), root_from_world)
+    alpha[0], alpha[1], alpha[2] = rotated(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
     for i in range(3):
         root[0, i] -= origin_m[i]
     for i in range(3):
-        root[i, 0], root[i, 1], root[i, 2] = _rotated(tracker_from_world, root[i, 0], root[i, 1], root[i, 2])
+        root[i, 0], root[i, 1], root[i, 2] = rotated(to_tracker, root[i, 0], root[i, 1], root[i, 2])
 
 
 @compiled
@@ -181,7 +182,7 @@ def _turn_hinge(
     axis: Floats, angle: float, rate: float, change: float, turn: Floats, omega: Floats, alpha: Floats
 ) -> None:
     """Add a hinge to the rotation, angular velocity and angular acceleration of what it carries."""
-    x, y, z = _rotated(turn, axis[0], axis[1], axis[2])
+    x, y, z = rotated(quaternion(turn), axis[0], axis[1], axis[2])
     alpha[0] += change * x + rate * (omega[1] * z - omega[2] * y)
     alpha[1] += change * y + rate * (omega[2] * x - omega[0] * z)
     alpha[2] += change * z + rate * (omega[0] * y - omega[1] * x)
@@ -212,30 +213,10 @@ def _at_offset(
     out_force: Floats,
 ) -> None:
     """Position, velocity and acceleration of a point of a rigid body, `reach_m` (3,) from another in its axes."""
-    x, y, z = _rotated(turn, reach_m[0], reach_m[1], reach_m[2])
+    x, y, z = rotated(quaternion(turn), reach_m[0], reach_m[1], reach_m[2])
     u, v, w = omega[1] * z - omega[2] * y, omega[2] * x - omega[0] * z, omega[0] * y - omega[1] * x
     out_place[0], out_place[1], out_place[2] = place[0] + x, place[1] + y, place[2] + z
     out_speed[0], out_speed[1], out_speed[2] = speed[0] + u, speed[1] + v, speed[2] + w
     out_force[0] = force[0] + (alpha[1] * z - alpha[2] * y) + (omega[1] * w - omega[2] * v)
     out_force[1] = force[1] + (alpha[2] * x - alpha[0] * z) + (omega[2] * u - omega[0] * w)
     out_force[2] = force[2] + (alpha[0] * y - alpha[1] * x) + (omega[0] * v - omega[1] * u)
-
-
-@compiled
-def _product(p: Floats, q: Floats) -> tuple[float, float, float, float]:
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
-
-
-@compiled
-def _rotated(q: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    a, b, c = 2.0 * (q[2] * z - q[3] * y), 2.0 * (q[3] * x - q[1] * z), 2.0 * (q[1] * y - q[2] * x)
-    return (
-        x + q[0] * a + q[2] * c - q[3] * b,
-        y + q[0] * b + q[3] * a - q[1] * c,
-        z + q[0] * c + q[1] * b - q[2] * a,
-    )
