@@ -197,7 +197,7 @@ def _measure(
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     return {
         "velocity_m_s": rotations.rotate(tracker_from_world, motion.velocity_m_s),
-        "force_m_s2": tissue_force_m_s2(motion, calibration),
+        "force_m_s2": tissue_force_m_s2(motion.world_from_station, motion.acceleration_m_s2, calibration),
         "position_m": rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         "turn": rotations.multiply(tracker_from_world, motion.world_from_station),
         "quality": np.ones(time_s.shape),

@@ -12,7 +12,6 @@ from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.skeleton import Skeleton
 from harness.simulate.readings import GRAVITY_M_S2
-from harness.simulate.trajectory import StationMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +36,16 @@ def skin_below(skeleton: Skeleton, mounts: Sequence[Mount], calibration: Calibra
     )
 
 
-def tissue_force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
-    """(N, S, 3) specific force at each station minus that in the rest pose, in the station's axes [m/s^2]."""
+def tissue_force_m_s2(
+    turn: Floats, acceleration_m_s2: Floats, calibration: Calibration, frame_from_world: Floats = rotations.IDENTITY
+) -> Floats:
+    """(N, S, 3) specific force at each station minus that in the rest pose, in the station's axes [m/s^2].
+
+    Orientations (N, S, 4) and accelerations (N, S, 3) are those of the stations in a frame; the world's by default.
+    """
     up = np.array([0.0, 0.0, GRAVITY_M_S2])
-    specific_force = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
+    specific_force = rotations.rotate(
+        rotations.inverse(turn), acceleration_m_s2 + rotations.rotate(frame_from_world, up)
+    )
     out: Floats = specific_force - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
     return out

@@ -72,6 +72,11 @@ class Trajectory:
         self._spline: PPoly = self._take
 
     @property
+    def spline(self) -> PPoly:
+        """Cubic pieces (4, P, 55) of configurations, whose root quaternions are not normalised."""
+        return self._spline
+
+    @property
     def begins_s(self) -> float:
         """First time [s]: 0, or the beginning of the lead-in."""
         return float(self._spline.x[0])
@@ -134,6 +139,14 @@ class Trajectory:
         """(N, 54) time derivative of `qvel`."""
         return self._derivatives(time_s, 2)[2]
 
+    def require_inside(self, time_s: Floats) -> None:
+        """Raise BadInput unless all times lie between `begins_s` and `ends_s` [s]."""
+        if time_s.size and not (time_s.min() >= self.begins_s - 1e-9 and time_s.max() <= self.ends_s + 1e-9):
+            raise BadInput(
+                f"A time between {time_s.min():.3f} and {time_s.max():.3f} s lies outside the take.",
+                f"It runs from {self.begins_s:g} to {self.ends_s:.3f} s.",
+            )
+
     def station_motion(self, calibration: Calibration, time_s: Floats) -> StationMotion:
         """True motion of S stations with the mounts of a calibration, station s at the N times `time_s[:, s]` [s]."""
         rows = [self._station_row(calibration, s, time_s[:, s]) for s in range(len(calibration.stations))]
@@ -143,11 +156,7 @@ class Trajectory:
     def _derivatives(self, time_s: Floats, order: int, spline: PPoly | None = None) -> list[Floats]:
         """`qpos`, `qvel` and `qacc`, up to the given order; with `spline`, of the root and of its hinges alone."""
         t = np.asarray(time_s, dtype=float)
-        if t.size and not (t.min() >= self.begins_s - 1e-9 and t.max() <= self.ends_s + 1e-9):
-            raise BadInput(
-                f"A time between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
-                f"It runs from {self.begins_s:g} to {self.ends_s:.3f} s.",
-            )
+        self.require_inside(t)
         splined: list[Floats] = [(spline or self._spline)(t, k) for k in range(order + 1)]
         # Let p be the splined quaternion, n its length, q = p/n. Components of q' and q'' along q do not change the
         # angular velocity 2 conj(q) q' and its derivative 2 conj(q) q'': conj(q) q and conj(q') q' are scalars.

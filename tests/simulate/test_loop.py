@@ -8,7 +8,7 @@ import pytest
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.motion import BodyMotion
-from harness.simulate.loop import simulate_loop
+from harness.simulate.loop import looping_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.codec.capture import ByteCapture
@@ -79,3 +79,16 @@ def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, BodyMotion]) -> No
     np.testing.assert_allclose(pace_s, (1.0 + 20e-6) / TRACKER.rate_hz, rtol=1e-9)
     assert played.device_loop_s == pytest.approx((1.0 + 20e-6) * played.loop_s)
     assert played.device_s[0, 0] == 0.0
+
+
+def test_a_round_of_the_looping_trajectory_is_a_whole_number_of_frames(boxer: tuple[Body, BodyMotion]) -> None:
+    """It leaves the time for stop, way back and start, and comes back to the first position and velocity."""
+    body, take = boxer
+    trajectory, frames = looping_trajectory(body, take, 40.0)
+    loop_s = frames / 40.0
+    assert trajectory.duration_s + 1.7 <= loop_s < trajectory.duration_s + 1.7 + 1.0 + 1.0 / 40.0
+    assert trajectory.ends_s > loop_s + 0.03
+    moments_s = np.array([0.0, loop_s])
+    qpos, qvel = trajectory.qpos(moments_s), trajectory.qvel(moments_s)
+    np.testing.assert_allclose(qpos[1], qpos[0], atol=1e-9)
+    np.testing.assert_allclose(qvel[1], qvel[0], atol=1e-9)

@@ -119,3 +119,94 @@ def test_one_frame_is_no_motion(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
     with pytest.raises(BadInput, match="at least two"):
         Trajectory(body, BodyMotion("short", "p1", "test", "", 120.0, take.qpos[:1]))
+
+
+def jump(trajectory: Trajectory, moment_s: float) -> tuple[float, float]:
+    """Steps of position and velocity over a moment, less what the motion itself makes of 2 ns."""
+    around = moment_s + np.array([-1e-9, 1e-9])
+    place, speed = trajectory.qpos(around), trajectory.qvel(around)
+    return np.abs(place[1] - place[0]).max(), np.abs(speed[1] - speed[0]).max()
+
+
+def motions(trajectory: Trajectory, time_s: Floats) -> list[Floats]:
+    return [trajectory.qpos(time_s), trajectory.qvel(time_s), trajectory.qacc(time_s)]
+
+
+def test_a_lead_in_rests_in_the_first_pose_and_joins_the_take(
+    boxer: tuple[Body, BodyMotion], trajectory: Trajectory
+) -> None:
+    led = trajectory.with_lead_in(3.0)
+    assert (led.begins_s, led.ends_s) == (-3.0, trajectory.duration_s)
+    still = led.qpos(np.array([-3.0, -1.7, -0.4]))
+    np.testing.assert_allclose(still, np.tile(trajectory.qpos(np.zeros(1)), (3, 1)), atol=1e-12)
+    assert np.array_equal(led.qvel(np.array([-3.0, -1.7, -0.4])), np.zeros((3, 54)))
+    assert np.abs(trajectory.qvel(np.zeros(1))).max() > 0.1
+    for moment_s in (-0.4, 0.0):
+        place, speed = jump(led, moment_s)
+        assert place < 1e-7
+        assert speed < 1e-6
+
+
+@pytest.mark.parametrize("change", ["lead_in", "lead_out", "return", "all"])
+def test_the_take_itself_stays_as_it_is(boxer: tuple[Body, BodyMotion], trajectory: Trajectory, change: str) -> None:
+    """To the bit, with whatever is added around it."""
+    changed = {
+        "lead_in": lambda: trajectory.with_lead_in(2.0),
+        "lead_out": lambda: trajectory.with_lead_out(1.0),
+        "return": lambda: trajectory.with_return(trajectory.duration_s + 2.0),
+        "all": lambda: trajectory.with_return(trajectory.duration_s + 2.0).with_lead_in(2.0),
+    }[change]()
+    time_s = np.linspace(0.0, trajectory.duration_s - 1e-9, 3001)
+    for one, other in zip(motions(trajectory, time_s), motions(changed, time_s), strict=True):
+        assert one.tobytes() == other.tobytes()
+    calibration = simulate_tracker(*boxer, worn(), TrackerConfig(), noise_preset("clean"), seed=1).calibration
+    each_s = np.repeat(time_s[:, None], 6, axis=1)
+    true, led = (t.station_motion(calibration, each_s) for t in (trajectory, changed))
+    for name in ("position_m", "world_from_station", "velocity_m_s", "acceleration_m_s2", "turn_rad_s"):
+        assert getattr(true, name).tobytes() == getattr(led, name).tobytes()
+
+
+def test_a_lead_out_comes_to_rest_in_the_last_pose(trajectory: Trajectory) -> None:
+    out = trajectory.with_lead_out(1.0)
+    end_s = trajectory.duration_s
+    assert out.ends_s == pytest.approx(end_s + 1.0)
+    for moment_s in (end_s, end_s + 0.3):
+        place, speed = jump(out, moment_s)
+        assert place < 1e-7
+        assert speed < 1e-6
+    np.testing.assert_allclose(out.qpos(end_s + np.array([0.3, 1.0])), out.qpos(np.array([end_s] * 2)), atol=1e-12)
+
+
+def test_a_return_joins_end_and_beginning(trajectory: Trajectory) -> None:
+    loop_s = trajectory.duration_s + 2.0
+    back = trajectory.with_return(loop_s)
+    for moment_s in (trajectory.duration_s, trajectory.duration_s + 0.3, loop_s - 0.4, loop_s):
+        place, speed = jump(back, moment_s)
+        assert place < 1e-7
+        assert speed < 1e-6
+    first_s = np.linspace(0.0, 0.04, 9)
+    for one, other in zip(motions(back, first_s), motions(back, loop_s + first_s), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(one).max())
+
+
+def test_a_performer_who_has_turned_goes_back_without_a_jump(boxer: tuple[Body, BodyMotion]) -> None:
+    """After a whole turn the root's quaternion has the other sign, which its spline must carry to the end."""
+    body, take = boxer
+    qpos = np.array(take.qpos)
+    yaw = np.linspace(0.0, 2.0 * np.pi, len(take))
+    qpos[:, 3:7] = rotations.multiply(rotations.about_z(yaw), qpos[:, 3:7])
+    trajectory = Trajectory(body, BodyMotion("turn", "p1", "test", "", take.rate_hz, qpos))
+    loop_s = trajectory.duration_s + 2.0
+    time_s = np.arange(trajectory.duration_s, loop_s + 0.04, 1e-3)
+    speed = np.abs(trajectory.with_return(loop_s).qvel(time_s)[:, 3:6]).max()
+    assert speed < 10.0
+
+
+@pytest.mark.parametrize("make", ["lead_in", "lead_out", "return"])
+def test_too_short_rests_are_refused(trajectory: Trajectory, make: str) -> None:
+    with pytest.raises(BadInput, match="too short"):
+        {
+            "lead_in": lambda: trajectory.with_lead_in(0.4),
+            "lead_out": lambda: trajectory.with_lead_out(0.3),
+            "return": lambda: trajectory.with_return(trajectory.duration_s + 0.7),
+        }[make]()

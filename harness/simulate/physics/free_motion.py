@@ -60,7 +60,7 @@ class FreeMotionSource:
         spin = 2.0 * rotations.multiply(speed[..., 3:] / length, rotations.inverse(place[..., 3:] / length))
         return TrackerMotion(time_s, place[..., :3], turn, speed[..., :3], spin[..., 1:])
 
-    def qpos(self, time_s: Floats) -> None:
+    def qpos(self, time_s: Floats) -> Floats | None:
         """None: no body is in the room."""
         return None
 

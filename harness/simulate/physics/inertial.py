@@ -12,6 +12,7 @@ from harness.core.compiled import compiled
 from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.simulate.physics.motion import TrackerMotion
+from harness.simulate.physics.strapdown import logarithm, product, quaternion, rotated
 from harness.simulate.readings import GRAVITY_M_S2
 
 Spread = Annotated[float, Range(0.0, 10.0)]
@@ -106,26 +107,17 @@ def _difference(time_s: Floats, turn: Floats, velocity_m_s: Floats, angle_rad: F
     for k in range(len(time_s) - 1):
         fall_m_s = GRAVITY_M_S2 * (time_s[k + 1] - time_s[k])
         for s in range(turn.shape[1]):
-            w, x, y, z = turn[k, s]
-            p, q, r, t = turn[k + 1, s]
-            # conjugate of the first times the second
-            real = w * p + x * q + y * r + z * t
-            i = w * q - x * p - y * t + z * r
-            j = w * r + x * t - y * p - z * q
-            m = w * t - x * r + y * q - z * p
-            if real < 0.0:
-                real, i, j, m = -real, -i, -j, -m
-            sine = math.sqrt(i * i + j * j + m * m)
-            scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, real) / sine
-            angle_rad[k, s, 0], angle_rad[k, s, 1], angle_rad[k, s, 2] = scale * i, scale * j, scale * m
-            a = velocity_m_s[k + 1, s, 0] - velocity_m_s[k, s, 0]
-            b = velocity_m_s[k + 1, s, 1] - velocity_m_s[k, s, 1]
-            c = velocity_m_s[k + 1, s, 2] - velocity_m_s[k, s, 2] - fall_m_s
-            # rotation by the conjugate: v - w (2 u x v) + u x (2 u x v)
-            d, e, f = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-            gain_m_s[k, s, 0] = a - w * d + y * f - z * e
-            gain_m_s[k, s, 1] = b - w * e + z * d - x * f
-            gain_m_s[k, s, 2] = c - w * f + x * e - y * d
+            w, x, y, z = quaternion(turn[k, s])
+            station_from_tracker = (w, -x, -y, -z)
+            change = logarithm(product(station_from_tracker, quaternion(turn[k + 1, s])))
+            gain = rotated(
+                station_from_tracker,
+                velocity_m_s[k + 1, s, 0] - velocity_m_s[k, s, 0],
+                velocity_m_s[k + 1, s, 1] - velocity_m_s[k, s, 1],
+                velocity_m_s[k + 1, s, 2] - velocity_m_s[k, s, 2] - fall_m_s,
+            )
+            for i in range(3):
+                angle_rad[k, s, i], gain_m_s[k, s, i] = change[i], gain[i]
 
 
 class InertialUnit:

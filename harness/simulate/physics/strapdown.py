@@ -59,6 +59,12 @@ def logarithm(q: Quaternion) -> Vector:
 
 
 @compiled
+def quaternion(row: Floats) -> Quaternion:
+    """The quaternion in a row (4,)."""
+    return row[0], row[1], row[2], row[3]
+
+
+@compiled
 def attitude(state: Floats) -> Quaternion:
     """The quaternion in a motion state (10,)."""
     return state[6], state[7], state[8], state[9]
