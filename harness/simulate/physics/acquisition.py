@@ -25,6 +25,7 @@ _LEAST_RANGES, _LEAST_EMITTERS = 10, 4
 _LARGEST_MISFIT = 1.5
 """Root mean square of the residuals, in their standard deviations [choice]."""
 _LARGEST_RESIDUAL = 3.0
+_NEAR_THE_WORST = 0.7
 _SPARED_SHARE = 0.75
 """Share of the ranges that a fix must keep [choice]."""
 _HEADINGS = 4
@@ -36,9 +37,11 @@ _CLEAR_MARGIN = 9.0
 """Least difference of the sums of squared residuals of two places: 3 standard deviations."""
 _GRAVITY_S = 0.5
 _LEVEL_SIGMA_RAD = 0.01
+_MOTION_M_S2 = 5.0
+"""Acceleration that a motion may have whose variance is not yet known [choice]."""
 _INFLATION = 2.0
 """Factor on the covariance of a fix, for what its model leaves out [choice]."""
-FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE = 1.0, 0.1
+FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE, _LEAST_TILT_VARIANCE = 1.0, 0.1, 1e-6
 
 
 class Search(NamedTuple):
@@ -94,7 +97,9 @@ def level_attitude(search: Search, s: int, motion: Floats, x: float, y: float, z
     gravity[0] += share * dx
     gravity[1] += share * dy
     gravity[2] += share * dz
-    noise = (gravity[3] / GRAVITY_M_S2**2 + _LEVEL_SIGMA_RAD**2) * 0.5 * _GRAVITY_S / slot_s
+    length = np.sqrt(gravity[0] ** 2 + gravity[1] ** 2 + gravity[2] ** 2)
+    variance = gravity[3] + (length - GRAVITY_M_S2) ** 2 + (_MOTION_M_S2 / gravity[4]) ** 2
+    noise = (variance / GRAVITY_M_S2**2 + _LEVEL_SIGMA_RAD**2) * 0.5 * _GRAVITY_S / slot_s
     gain = search.tilt_variance[s] / (search.tilt_variance[s] + noise)
     search.tilt_variance[s] *= 1.0 - gain
     across = np.sqrt(gravity[0] ** 2 + gravity[1] ** 2)
@@ -259,51 +264,62 @@ def minimise(
 
 
 @compiled
-def worst(model: RangingModel, heard: Floats, used: Bools, motion: Floats) -> tuple[int, float]:
-    """Index of the range that fits worst, and its residual in standard deviations."""
-    slope = np.empty(MOTION_ERRORS)
-    index, largest = -1, 0.0
+def drop_worst(model: RangingModel, heard: Floats, used: Bools, motion: Floats, most: int) -> int:
+    """Leave out the ranges that fit worst, at most some: those beyond the limit and near the largest; their number."""
+    slope, size = np.empty(MOTION_ERRORS), np.zeros(len(used))
     for i in range(len(used)):
         if used[i]:
             residual, variance = predict(model, heard[i], motion, slope)
-            size = abs(residual) / np.sqrt(variance)
-            if size > largest:
-                index, largest = i, size
-    return index, largest
+            size[i] = abs(residual) / np.sqrt(variance)
+    limit = max(_LARGEST_RESIDUAL, _NEAR_THE_WORST * np.max(size))
+    dropped = 0
+    for i in range(len(used)):
+        if size[i] > limit and dropped < most:
+            used[i] = False
+            dropped += 1
+    return dropped
 
 
 @compiled
-def solve(
-    model: RangingModel, heard: Floats, motion: Floats, tilt_variance: float, inverse: Floats
-) -> tuple[float, float]:
-    """Fit `motion` (10,) to the ranges (N, 12), without the few that do not fit.
+def refine(
+    model: RangingModel, heard: Floats, motion: Floats, total: float, tilt_variance: float, inverse: Floats
+) -> float:
+    """Leave out the few ranges that do not fit `motion` (10,), the minimum of all N, and minimise again.
 
-    Returns the sum of squared residuals and their number; infinity where the fit is refused.
+    Returns the sum of squared residuals, or infinity where the fit is refused. Each range left out counts as much as
+    one at the limit, so that sums compare. `inverse` (9, 9) is the covariance.
     """
     used = np.ones(len(heard), dtype=np.bool_)
-    left = len(heard)
-    least = max(_LEAST_RANGES, int(np.ceil(_SPARED_SHARE * len(heard))))
+    left, least = len(heard), max(_LEAST_RANGES, int(np.ceil(_SPARED_SHARE * len(heard))))
     while True:
+        dropped = drop_worst(model, heard, used, motion, left - least + 1)
+        left -= dropped
+        if left < least:
+            return np.inf
+        if dropped == 0:
+            break
         total = minimise(model, heard, used, motion, tilt_variance, inverse)
         if not np.isfinite(total):
-            return np.inf, 0.0
-        index, largest = worst(model, heard, used, motion)
-        if total <= _LARGEST_MISFIT**2 * (left - 7) and largest <= _LARGEST_RESIDUAL:
-            break
-        if left <= least or index < 0:
-            return np.inf, 0.0
-        used[index] = False
-        left -= 1
-    if emitters_in(heard, used, len(model.emitter_m)) < _LEAST_EMITTERS:
-        return np.inf, 0.0
+            return np.inf
+    if total > _LARGEST_MISFIT**2 * (left - 7) or emitters_in(heard, used, len(model.emitter_m)) < _LEAST_EMITTERS:
+        return np.inf
     for i in range(len(heard)):
         j = int(heard[i, 11])
         side = 0.0
         for k in range(3):
             side += model.normal[j, k] * (motion[k] - model.emitter_m[j, k])
         if used[i] and side <= 0.0:
-            return np.inf, 0.0
-    return total, float(left)
+            return np.inf
+    return total + _LARGEST_RESIDUAL**2 * (len(heard) - left)
+
+
+@compiled
+def differ(motion: Floats, other: Floats) -> bool:
+    """Whether two motions (10,) are different places or headings."""
+    apart = (motion[0] - other[0]) ** 2 + (motion[1] - other[1]) ** 2 + (motion[2] - other[2]) ** 2
+    q = attitude(other)
+    x, y, z = logarithm(product(attitude(motion), (q[0], -q[1], -q[2], -q[3])))
+    return apart > _OTHER_PLACE_M**2 or np.sqrt(x * x + y * y + z * z) > _OTHER_HEADING_RAD
 
 
 @compiled
@@ -319,32 +335,32 @@ def fix(model: RangingModel, search: Search, s: int, window_s: float, motion: Fl
         return False
     best, best_inverse = np.zeros(STATE), np.empty((MOTION_ERRORS, MOTION_ERRORS))
     least, next_least = np.inf, np.inf
-    motions, totals = np.zeros((_HEADINGS, STATE)), np.empty(_HEADINGS)
+    minima, refined, totals = np.zeros((_HEADINGS, STATE)), np.zeros((_HEADINGS, STATE)), np.full(_HEADINGS, np.inf)
     inverse = np.empty((MOTION_ERRORS, MOTION_ERRORS))
-    tilt_variance = max(search.tilt_variance[s], 1e-6)
+    tilt_variance = max(search.tilt_variance[s], _LEAST_TILT_VARIANCE)
     for heading in range(_HEADINGS):
-        trial = motions[heading]
+        trial = minima[heading]
         for i in range(len(heard)):
             j = int(heard[i, 11])
             for k in range(3):
                 trial[k] += (model.emitter_m[j, k] + _DISTANCE_BELOW_M * model.normal[j, k]) / len(heard)
         set_attitude(trial, exponential(0.0, 0.0, 2.0 * np.pi * heading / _HEADINGS))
-        total, count = solve(model, heard, trial, tilt_variance, inverse)
-        # Residuals that were left out count as much as those at the limit, so that attempts compare.
-        totals[heading] = total + _LARGEST_RESIDUAL**2 * (len(heard) - count)
+        total = minimise(model, heard, everything, trial, tilt_variance, inverse)
+        fresh = np.isfinite(total)
+        for other in range(heading):
+            fresh = fresh and differ(trial, minima[other])
+        if not fresh:
+            continue
+        refined[heading] = trial
+        totals[heading] = refine(model, heard, refined[heading], total, tilt_variance, inverse)
         if totals[heading] < least:
             least = totals[heading]
-            best[:] = trial
+            best[:] = refined[heading]
             best_inverse[:] = inverse
     if not np.isfinite(least):
         return False
     for heading in range(_HEADINGS):
-        apart = 0.0
-        for k in range(3):
-            apart += (motions[heading, k] - best[k]) ** 2
-        q = attitude(motions[heading])
-        x, y, z = logarithm(product(attitude(best), (q[0], -q[1], -q[2], -q[3])))
-        if apart > _OTHER_PLACE_M**2 or np.sqrt(x * x + y * y + z * z) > _OTHER_HEADING_RAD:
+        if np.isfinite(totals[heading]) and differ(best, refined[heading]):
             next_least = min(next_least, totals[heading])
     if next_least < least + _CLEAR_MARGIN:
         return False

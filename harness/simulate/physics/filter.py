@@ -58,7 +58,7 @@ _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.15, 0.1
 """Largest standard deviation of the attitude of a fix, and of a confirmed one [choice]."""
 _CONFIRMED_NIS = 2.0
 """Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
-_ATTEMPT_SLOTS = 2
+_ATTEMPT_SLOTS = 8
 
 
 class FilterModel(NamedTuple):
@@ -385,7 +385,7 @@ def search_slot(
     covariance = state.covariance[s]
     drift = covariance[9, 9] + covariance[10, 10] + covariance[11, 11]
     search.tilt_variance[s] += slot_s * (model.noise[0] + drift * slot_s * search.gravity[s, 4])
-    if received == 0 or search.count[s] < CONFIRMING_RANGES or slot % _ATTEMPT_SLOTS != 0:
+    if received == 0 or slot % _ATTEMPT_SLOTS != 0:
         return
     now = motion[TICKS_PER_SLOT].copy()
     trial = covariance.copy()

@@ -13,6 +13,7 @@ from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
 from harness.simulate.physics.level import level_db, noise_factor
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
+from harness.simulate.physics.status import TRACKING
 from harness.simulate.readings import GRAVITY_M_S2
 
 TICK_HZ = 400.0
@@ -152,3 +153,32 @@ def run(fusion_filter: FusionFilter, *measured: FreeStation, block: int = 10**6,
         span = slice(first * TICKS_PER_SLOT, (first + block) * TICKS_PER_SLOT)
         fusion_filter.advance(first, angle[span], gain[span], heard[first : first + block], outputs)
     return outputs
+
+
+FIRST_SIGMA: Floats = np.repeat([0.005, 0.02, 0.01, *(bias.turn_on for bias in (Gyroscope(), Accelerometer()))], 3)
+"""(15,) standard deviations of the error with which `start` begins."""
+
+
+def start(fusion_filter: FusionFilter, station: FreeStation, error: Floats) -> None:
+    """Let the only station track from the truth less an error (15,), with the covariance of `FIRST_SIGMA`."""
+    state = fusion_filter.state
+    turn = rotations.multiply(rotations.exp(-error[6:9]), station.tracker_from_station[0])
+    place = station.unit_position_m[0] - error[:3], station.unit_velocity_m_s[0] - error[3:6]
+    state.motion[0, -1] = np.concatenate([*place, turn])
+    state.bias[0] = 0.0
+    state.covariance[0] = np.diag(FIRST_SIGMA**2)
+    state.status[0] = [TRACKING, 0, 0, 0, 0, 0]
+
+
+def true_error(fusion_filter: FusionFilter, station: FreeStation, biases: Floats, slots: int) -> Floats:
+    """(15,) error of the only station's estimate after some slots."""
+    motion, tick = fusion_filter.state.motion[0, -1], slots * TICKS_PER_SLOT
+    turn = rotations.multiply(station.tracker_from_station[tick], rotations.inverse(motion[6:]))
+    return np.concatenate(
+        [
+            station.unit_position_m[tick] - motion[:3],
+            station.unit_velocity_m_s[tick] - motion[3:6],
+            rotations.log(turn),
+            biases[tick] - fusion_filter.state.bias[0],
+        ]
+    )
