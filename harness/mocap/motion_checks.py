@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Floats, Ints
 from harness.core.hinges import equivalent_euler_angles
 from harness.core.humanoid24 import BONES, limits_rad, standard_skeleton
 from harness.core.rotations import wrap_angle
+from harness.core.runs import find_runs
 from harness.core.skeleton import Skeleton, local_rotation
 
 JUMP_M_S = 12.0
@@ -56,8 +57,8 @@ def find_spikes(names: tuple[str, ...], position_m: Floats, rate_hz: float) -> t
     twitch[:-1] = np.nan_to_num(_norm(np.diff(step, axis=0)))
     excess = np.maximum(jump / JUMP_M_S, twitch / TWITCH_M_S)
     spikes = []
-    for first, last in find_runs(excess.max(axis=1) > 1.0):
-        t = first - 1 + int(jump[first - 1 : last].max(axis=1).argmax())
+    for first, end in find_runs(excess.max(axis=1) > 1.0):
+        t = int(first + jump[first:end].max(axis=1).argmax())
         joint = int(excess[t].argmax())
         spikes.append(Spike(t + 2, names[joint], float(max(jump[t, joint], twitch[t, joint]))))
     return tuple(spikes)
@@ -92,14 +93,7 @@ def find_turns(skeleton: Skeleton, angles_rad: Floats, rate_hz: float) -> tuple[
 def find_frozen_frames(position_m: Floats) -> tuple[tuple[int, int], ...]:
     """First and last frame, counted from 1, of each run of at least FROZEN_FRAMES equal frames."""
     still = np.nan_to_num(_norm(np.diff(position_m, axis=0))).max(axis=1, initial=0.0) < FROZEN_TOLERANCE_M
-    return tuple((first, last + 1) for first, last in find_runs(still) if last + 2 - first >= FROZEN_FRAMES)
-
-
-def find_runs(condition: Bools) -> list[tuple[int, int]]:
-    """First and last index, counted from 1, of each run of True in an array (T,)."""
-    edges = np.diff(np.concatenate([[False], condition, [False]]).astype(int))
-    firsts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-    return [(int(first) + 1, int(end)) for first, end in zip(firsts, ends, strict=True)]
+    return tuple((int(first) + 1, int(end) + 1) for first, end in find_runs(still) if end + 1 - first >= FROZEN_FRAMES)
 
 
 def estimate_floor(position_m: Floats, feet: Ints) -> tuple[float, float]:
