@@ -54,7 +54,7 @@ _FEWEST_JUDGED = 10
 _COAST_SIGMA_M = 0.5
 _CORRELATION_S = 0.2
 """Time over which a motion keeps its direction, and so the error of scale and misalignment its sign [s] [choice]."""
-_FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.15, 0.1
+_FIX_SIGMA_M, _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.1, 0.3, 0.1
 """Largest standard deviation of the attitude of a fix, and of a confirmed one [choice]."""
 _CONFIRMED_NIS = 2.0
 """Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
@@ -391,7 +391,7 @@ def search_slot(
     trial = covariance.copy()
     if not fix(ranging, search, s, model.window_s, now, trial):
         return
-    if position_sigma_m(trial) > model.sigma_limit_m or attitude_sigma_rad(trial) > _FIX_SIGMA_RAD:
+    if position_sigma_m(trial) > _FIX_SIGMA_M or attitude_sigma_rad(trial) > _FIX_SIGMA_RAD:
         return
     motion[TICKS_PER_SLOT] = now
     covariance[:] = trial

@@ -92,7 +92,7 @@ class FusionFilter:
         """Emitters (J, 3) and their unit normals (J, 3) as the device knows them, in the tracker's frame [m]."""
         lever = np.array(inertial.lever_m)
         slot_s, emitters = schedule.slot_s, schedule.emitters
-        window = min(max(emitters, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
+        window = min(max(3 * emitters, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
         second = max(round(1.0 / slot_s), 1)
         self.stations = tuple(stations)
         self.ranging = RangingModel(

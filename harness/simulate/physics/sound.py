@@ -40,7 +40,7 @@ class Sound:
     """Mean number of bursts of noise in the band, such as jingling keys (docs/is900.md 13.3) [choice]."""
     burst_s: Annotated[tuple[float, float], Range(0.0, 60.0, ascending=True)] = (0.05, 0.3)
     """Shortest and longest burst [s] [choice]."""
-    microphones_m: tuple[Point, ...] = ((0.03, 0.0, 0.01), (-0.03, 0.0, 0.01))
+    microphones_m: tuple[Point, ...] = ((0.0, 0.03, 0.01), (0.0, -0.03, 0.01))
     """Positions of the two microphones in the station's axes [m]. Two are the manual's (docs/is900.md 7); their places
     are a choice."""
 
