@@ -31,7 +31,7 @@ _SPARED_SHARE = 0.75
 _HEADINGS = 4
 _ITERATIONS = 25
 _DISTANCE_BELOW_M = 1.5
-_SPEED_SIGMA_M_S = 5.0
+_SPEED_SIGMA_M_S, _LARGEST_SPEED_M_S = 5.0, 15.0
 _OTHER_PLACE_M, _OTHER_HEADING_RAD = 0.05, 0.5
 _CLEAR_MARGIN = 9.0
 """Least difference of the sums of squared residuals of two places: 3 standard deviations."""
@@ -49,7 +49,7 @@ class Search(NamedTuple):
 
     heard: Floats
     """(S, N, 12) ranges in a ring, the latest of one turn of emitters."""
-    count: Ints
+    stored: Ints
     """(S,) ranges stored since the loss."""
     path: Floats
     """(S, 7) double and single integral of the specific force since the loss [m], [m/s], and its duration [s]."""
@@ -62,7 +62,7 @@ class Search(NamedTuple):
 @compiled
 def begin_search(search: Search, s: int, tilt_variance: float) -> None:
     """Forget what station s has collected."""
-    search.count[s] = 0
+    search.stored[s] = 0
     search.path[s] = 0.0
     search.gravity[s] = 0.0
     search.tilt_variance[s] = tilt_variance
@@ -112,7 +112,7 @@ def level_attitude(search: Search, s: int, motion: Floats, x: float, y: float, z
     path = search.path[s]
     path[0], path[1], path[2] = rotated(turn, path[0], path[1], path[2])
     path[3], path[4], path[5] = rotated(turn, path[3], path[4], path[5])
-    for i in range(min(search.count[s], search.heard.shape[1])):
+    for i in range(min(search.stored[s], search.heard.shape[1])):
         heard = search.heard[s, i]
         for k in range(2, 11, 3):
             heard[k], heard[k + 1], heard[k + 2] = rotated(turn, heard[k], heard[k + 1], heard[k + 2])
@@ -122,7 +122,7 @@ def level_attitude(search: Search, s: int, motion: Floats, x: float, y: float, z
 def gather(search: Search, s: int, window_s: float, heard: Floats) -> int:
     """Copy the ranges of the window into `heard` (N, 12), with times and paths from the present; their number."""
     path, kept = search.path[s], 0
-    for i in range(min(search.count[s], search.heard.shape[1])):
+    for i in range(min(search.stored[s], search.heard.shape[1])):
         row = search.heard[s, i]
         since = row[0] - path[6]
         if since < -window_s:
@@ -319,7 +319,7 @@ def differ(motion: Floats, other: Floats) -> bool:
     apart = (motion[0] - other[0]) ** 2 + (motion[1] - other[1]) ** 2 + (motion[2] - other[2]) ** 2
     q = attitude(other)
     x, y, z = logarithm(product(attitude(motion), (q[0], -q[1], -q[2], -q[3])))
-    return apart > _OTHER_PLACE_M**2 or np.sqrt(x * x + y * y + z * z) > _OTHER_HEADING_RAD
+    return bool(apart > _OTHER_PLACE_M**2 or x * x + y * y + z * z > _OTHER_HEADING_RAD**2)
 
 
 @compiled
@@ -362,7 +362,8 @@ def fix(model: RangingModel, search: Search, s: int, window_s: float, motion: Fl
     for heading in range(_HEADINGS):
         if np.isfinite(totals[heading]) and differ(best, refined[heading]):
             next_least = min(next_least, totals[heading])
-    if next_least < least + _CLEAR_MARGIN:
+    speed = np.sqrt(best[3] ** 2 + best[4] ** 2 + best[5] ** 2)
+    if next_least < least + _CLEAR_MARGIN or speed > _LARGEST_SPEED_M_S:
         return False
     turn = attitude(best)
     for k in range(6):

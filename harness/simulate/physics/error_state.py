@@ -6,7 +6,7 @@ the estimate. Then the transition over several ticks is a sum, and white noise o
 Source: J. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), chapter 7.
 """
 
-import numpy as np
+import math
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
@@ -152,10 +152,10 @@ def reset_attitude(covariance: Floats, x: float, y: float, z: float) -> None:
 @compiled
 def position_sigma_m(covariance: Floats) -> float:
     """Standard deviation of the position in three dimensions: the root of the trace [m]."""
-    return np.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))
+    return math.sqrt(max(covariance[0, 0] + covariance[1, 1] + covariance[2, 2], 0.0))
 
 
 @compiled
 def attitude_sigma_rad(covariance: Floats) -> float:
     """Standard deviation of the attitude about three axes: the root of the trace [rad]."""
-    return np.sqrt(max(covariance[6, 6] + covariance[7, 7] + covariance[8, 8], 0.0))
+    return math.sqrt(max(covariance[6, 6] + covariance[7, 7] + covariance[8, 8], 0.0))

@@ -373,13 +373,13 @@ def search_slot(
             continue
         received += 1
         lag = arrival(model, ranging, motion, angles, range_m[m], ranging.arm_m[m], at)
-        row = search.heard[s, search.count[s] % search.heard.shape[1]]
+        row = search.heard[s, search.stored[s] % search.heard.shape[1]]
         row[0], row[1], row[11] = path[6] - lag, range_m[m], emitter
         for k in range(3):
             # The path at the arrival, back from the slot's end by the slot's mean force.
             row[2 + k] = path[k] - path[3 + k] * lag + 0.5 * force[k] * lag * lag
         row[5:11] = at[3:9]
-        search.count[s] += 1
+        search.stored[s] += 1
     count(state, s, slot, received, 0)
     level_attitude(search, s, motion[TICKS_PER_SLOT], force[0], force[1], force[2], slot_s)
     covariance = state.covariance[s]
@@ -453,8 +453,9 @@ def lose(state: FilterState, search: Search, s: int, tilt_variance: float) -> No
 
 @compiled
 def distrust(model: FilterModel, state: FilterState, search: Search, s: int) -> None:
-    """Declare a station lost whose ranges contradict it: its tilt and its biases are then worth nothing either."""
+    """Declare a station lost whose ranges contradict it: velocity, tilt and biases are then worth nothing either."""
     lose(state, search, s, LOST_TILT_VARIANCE)
+    freeze(state, s)
     state.bias[s] = 0.0
     set_bias_covariance(model, state.covariance[s])
 
@@ -470,7 +471,7 @@ def set_bias_covariance(model: FilterModel, covariance: Floats) -> None:
 
 @compiled
 def freeze(state: FilterState, s: int) -> None:
-    """Stop the position of a station that has coasted too long; its covariance stays bounded, too."""
+    """Stop the position of a station that knows its motion no longer; its covariance stays bounded, too."""
     state.status[s, 1] = 1
     state.motion[s, TICKS_PER_SLOT, 3:6] = 0.0
     covariance = state.covariance[s]

@@ -145,8 +145,8 @@ class FusionFilter:
         ):
             if array.shape != shape:
                 raise ShapeError("FusionFilter", name, array.shape, str(shape))
-        arrays = (np.ascontiguousarray(array, dtype=float) for array in (angle_rad, velocity_m_s, range_m))
-        advance(self.model, self.ranging, self.state, self.search, first_slot, *arrays, outputs)
+        angle, velocity, ranges = (np.ascontiguousarray(a, dtype=float) for a in (angle_rad, velocity_m_s, range_m))
+        advance(self.model, self.ranging, self.state, self.search, first_slot, angle, velocity, ranges, outputs)
 
 
 def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
@@ -192,7 +192,7 @@ def _initial_state(stations: int, slots: int) -> FilterState:
 def _initial_search(stations: int, ranges: int) -> Search:
     return Search(
         heard=np.zeros((stations, ranges, HEARD)),
-        count=np.zeros(stations, dtype=np.int64),
+        stored=np.zeros(stations, dtype=np.int64),
         path=np.zeros((stations, 7)),
         gravity=np.zeros((stations, 5)),
         tilt_variance=np.full(stations, FIRST_TILT_VARIANCE),

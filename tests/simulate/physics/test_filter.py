@@ -71,7 +71,7 @@ def test_equals_a_plain_filter_written_apart(fusion: Fusion, rng: np.random.Gene
     assert rejected > 0
 
 
-def matched_runs(change: Callable[[FreeStation], FreeStation] = lambda station: station) -> Floats:
+def matched_runs(change: Callable[[FreeStation], FreeStation] = lambda station: station) -> tuple[float, float, float]:
     """Mean over 50 matched runs of NEES (15 numbers), NEES of the position, and NIS."""
     totals = np.zeros(3)
     inertial = exact_inertial()
@@ -81,14 +81,13 @@ def matched_runs(change: Callable[[FreeStation], FreeStation] = lambda station: 
         fusion_filter = new_filter(inertial=inertial)
         start(fusion_filter, station, FIRST_SIGMA * np.random.default_rng(seed).standard_normal(15))
         run(fusion_filter, change(station))
-        # The first bias is part of the error at the start.
         error = true_error(fusion_filter, station, biases, len(station.range_m))
         covariance = fusion_filter.state.covariance[0]
         totals[0] += error @ np.linalg.solve(covariance, error)
         totals[1] += error[:3] @ np.linalg.solve(covariance[:3, :3], error[:3])
         totals[2] += fusion_filter.state.nis[0, 0] / fusion_filter.state.nis[0, 1]
         assert fusion_filter.state.status[0, 0] == 2
-    return totals / RUNS
+    return float(totals[0] / RUNS), float(totals[1] / RUNS), float(totals[2] / RUNS)
 
 
 @pytest.mark.long
