@@ -24,8 +24,8 @@ _UNIT_TOLERANCE = 1e-9
 class ConstellationSettings:
     """The emitters of a scenario."""
 
-    name: Text = "hall"
-    """A shipped constellation: `hall` for performers who walk, `cave` for performers on the spot."""
+    name: Text = "cave"
+    """A shipped constellation: `cave` for performers on the spot, `hall` for performers who walk."""
     file: Text = ""
     """Path of a file of `MCF` lines in the folder of the scenario's, or below it; it replaces `name`."""
     emitters: tuple[Emitter, ...] = ()

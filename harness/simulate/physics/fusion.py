@@ -46,7 +46,7 @@ class Fusion:
     gate: Annotated[float, Range(0.5, 100.0)] = 4.0
     """Largest innovation of an accepted range, in its standard deviations. InterSense's header gives a factor of 4
     (docs/is900.md 13.2)."""
-    range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.004
+    range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.002
     """Assumed standard deviation of a range at 2 m on the axis [m]; it grows with distance and angle as in `sound`."""
     range_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
     """Assumed standard deviation of the scale of a range, from temperature and air [choice]."""

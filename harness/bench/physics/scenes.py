@@ -1,0 +1,244 @@
+"""Scenes for `harness bench physics --truth`: free stations and a performer under the default constellation."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from harness.body.humanoid import build_body, tpose
+from harness.body.mounts import DEFAULT_MOUNTS
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import QPOS_OF_DOF
+from harness.core.motion import BodyMotion
+from harness.core.seeds import generator
+from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.physics.constellation import load_constellation
+from harness.simulate.physics.filter_readings import FilterReadings
+from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
+from harness.simulate.physics.motion import TrackerMotion
+from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
+from harness.simulate.physics.ranging import Ranges
+from harness.simulate.physics.ranging_model import RangingModel, range_variance
+from harness.simulate.physics.room import Box, PlacedRoom
+from harness.simulate.physics.settings import Physics
+from harness.simulate.physics.sight import Sight
+from harness.simulate.simulation import (
+    WORLD_FROM_TRACKER,
+    TrackerConfig,
+    sampling_times_s,
+    simulate_readings,
+)
+from harness.simulate.trajectory import Trajectory
+
+RATE_HZ = 40.0
+"""Records per second of each station."""
+HEIGHT_M = 1.2
+"""Height of the middle of the free motion above the floor [m]."""
+BYSTANDER = Box(centre_m=(0.0, 0.7, 0.875), size_m=(0.5, 0.3, 1.75))
+"""A person who stands beside the free motion and shades a part of it."""
+_TRACKER = TrackerConfig(rate_hz=RATE_HZ)
+_ORIGIN_M = np.array(_TRACKER.origin_m)
+_MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
+"""The middle of the free motion in the tracker's frame [m]."""
+STATION = "station"
+
+
+@dataclass(frozen=True, eq=False)
+class StationErrors:
+    """Errors of one station at E records."""
+
+    time_s: Floats
+    """(E,) times [s]."""
+    error_m: Floats
+    """(E, 3) reported minus true position, in the tracker's axes [m]."""
+    tilt_rad: Floats
+    """(E,) angle between the reported and the true vertical [rad]."""
+    quality: Floats
+    """(E,) 0 lost to 1 best."""
+
+    @property
+    def size_m(self) -> Floats:
+        """(E,) size of the position error [m]; NaN where the station is lost."""
+        size_m: Floats = np.sqrt(np.sum(self.error_m**2, axis=1))
+        return np.where(self.quality > 0.0, size_m, np.nan)
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square of the position error of tracked records [m]; NaN without any."""
+        found = self.size_m[np.isfinite(self.size_m)]
+        return float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
+
+
+def rest_source(seconds: float, physics: Physics, *, pitch_rad: float = 0.0) -> FreeMotionSource:
+    """A station that rests below the middle of the constellation, its z axis at an angle to the vertical [rad]."""
+    time_s = np.array([0.0, seconds / 2.0, seconds])
+    turn = rotations.multiply(FACING_UP, rotations.exp(np.array([0.0, pitch_rad, 0.0])))
+    place = np.array(_MIDDLE_M)
+    return FreeMotionSource(
+        (STATION,),
+        time_s,
+        np.broadcast_to(place, (3, 1, 3)),
+        np.broadcast_to(turn, (3, 1, 4)),
+        warm_up_s=lead_in_s(physics),
+    )
+
+
+def free_source(seed: int, seconds: float, speed_m_s: float, physics: Physics) -> FreeMotionSource:
+    """Random motion in a cube of 1 m below the middle of the constellation."""
+    return random_motion(
+        seed,
+        STATION,
+        seconds=seconds,
+        size_m=1.0,
+        speed_m_s=speed_m_s,
+        warm_up_s=lead_in_s(physics),
+        centre_m=_MIDDLE_M,
+    )
+
+
+def with_bystander(physics: Physics) -> Physics:
+    """The physics with a person who stands beside the motion."""
+    return replace(physics, room=replace(physics.room, furniture=(BYSTANDER,)))
+
+
+def without_shadow(physics: Physics) -> Physics:
+    """The physics without shadow and echoes."""
+    return replace(physics, room=replace(physics.room, shadow=False, echoes=False))
+
+
+def track_free_station(
+    source: FreeMotionSource,
+    truth: FreeMotionSource,
+    seconds: float,
+    physics: Physics,
+    seed: int,
+    *,
+    covered_s: tuple[float, float] | None = None,
+) -> StationErrors:
+    """Errors of a free station. `truth` is an equal source; all emitters are covered in `covered_s` [s]."""
+    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, _ORIGIN_M)
+    shade = physics.room.shadow and bool(physics.room.furniture)
+    tracker = PhysicalTracker(
+        source,
+        physics,
+        load_constellation(physics.constellation),
+        placed,
+        Sight(None, placed) if shade else None,
+        seed=seed,
+        take=STATION,
+    )
+    if covered_s is not None:
+        _cover(tracker, covered_s)
+    time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
+    readings = tracker.measure(time_s[:, None])
+    return _errors(time_s, readings, truth.advance(time_s))
+
+
+def _cover(tracker: PhysicalTracker, covered_s: tuple[float, float]) -> None:
+    """Let no sound through from the first to the second time [s]."""
+    measure, schedule = tracker.ranging.measure, tracker.schedule
+
+    def measure_covered(first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        ranges = measure(first_slot, motion, qpos)
+        time_s = (first_slot + np.arange(len(ranges.emitter))) * schedule.slot_s
+        covered = (time_s >= covered_s[0]) & (time_s < covered_s[1])
+        return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))
+
+    tracker.ranging.measure = measure_covered  # type: ignore[method-assign,assignment]
+
+
+def _errors(time_s: Floats, readings: FilterReadings, true: TrackerMotion) -> StationErrors:
+    error_m = readings.position_m[:, 0] - true.position_m[:, 0]
+    return StationErrors(
+        time_s,
+        error_m,
+        _tilt_rad(readings.tracker_from_station[:, 0], true.tracker_from_station[:, 0]),
+        readings.quality[:, 0],
+    )
+
+
+def _tilt_rad(reported: Floats, true: Floats) -> Floats:
+    """(E,) angle between the vertical as two orientations (E, 4) have it [rad]."""
+    down = np.array([0.0, 0.0, 1.0])
+    one, other = (rotations.rotate(rotations.inverse(turn), down) for turn in (reported, true))
+    out: Floats = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
+    return out
+
+
+def track_hand(seed: int, seconds: float, physics: Physics, *, behind: bool) -> StationErrors:
+    """Errors of a station on the back of the right hand, in front of the belly or behind the back of a performer.
+
+    The performer stands and sways a little.
+    """
+    body = build_body()
+    skeleton = body.skeleton
+    angles_deg = _BEHIND_BACK if behind else _IN_FRONT
+    qpos = tpose(skeleton).copy()
+    for name, angle_deg in angles_deg.items():
+        qpos[QPOS_OF_DOF[skeleton.dof_names.index(name)] + 7] = np.deg2rad(angle_deg)
+    rate_hz = 30.0
+    frames = int(seconds * rate_hz) + 1
+    sway = generator(seed, "physics", "sway").normal(size=(6, 2))
+    time_s = np.arange(frames) / rate_hz
+    poses = np.tile(qpos, (frames, 1))
+    for k in range(2):
+        for n in range(3):
+            poses[:, k] += 0.01 * sway[n, k] * np.sin(2.0 * np.pi * (0.15 + 0.1 * n) * time_s + sway[3 + n, k])
+    take = BodyMotion(f"hand {behind}", "standard", "scene", "standing", rate_hz, poses)
+    trajectory, mounts = Trajectory(body, take), [DEFAULT_MOUNTS["right_hand"]]
+    at_s = sampling_times_s(trajectory.duration_s, _TRACKER, 1)
+    found, true = (
+        simulate_readings(trajectory, mounts, _TRACKER, noise, at_s, seed=seed, take="hand")
+        for noise in (Noise(physics=physics), noise_preset("clean"))
+    )
+    return StationErrors(
+        at_s[:, 0],
+        found.position_m[:, 0] - true.position_m[:, 0],
+        _tilt_rad(found.turn[:, 0], true.turn[:, 0]),
+        found.quality[:, 0],
+    )
+
+
+_IN_FRONT = {"rclavicle.rz": 11.0, "rhumerus.rx": -13.0, "rhumerus.ry": 66.0, "rhumerus.rz": -77.0, "rradius.rx": 76.0}
+_BEHIND_BACK = {
+    "rclavicle.rz": 11.0,
+    "rhumerus.rx": -121.0,
+    "rhumerus.ry": 27.0,
+    "rhumerus.rz": 176.0,
+    "rradius.rx": 91.0,
+}
+"""Angles of the right arm that put the hand 0.27 m in front of the spine and 0.24 m behind it [deg]."""
+
+
+def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats:
+    """(3,) where least squares put a station at `place_m` (3,) when every range is too long by a factor [m].
+
+    The ranges are those to all emitters within cone and reach, with the weights that the filter gives them.
+    """
+    constellation = load_constellation(physics.constellation)
+    sound = physics.sound
+    ray_m = place_m - constellation.position_m
+    distance_m = np.sqrt(np.sum(ray_m**2, axis=1))
+    cosine = np.sum(ray_m * constellation.normal, axis=1) / distance_m
+    heard = (distance_m <= constellation.range_m) & (cosine >= np.cos(constellation.cone_rad))
+    model = RangingModel(
+        constellation.position_m,
+        constellation.normal,
+        np.zeros((1, 3)),
+        1.0,
+        sound.absorption_db_per_m,
+        physics.fusion.range_noise_m,
+        physics.fusion.range_scale,
+        physics.fusion.survey_m,
+    )
+    rays = enumerate(zip(distance_m, ray_m / distance_m[:, None], strict=True))
+    sigma_m = np.sqrt([range_variance(model, j, r, x, y, z, z) for j, (r, (x, y, z)) in rays])[heard]
+    emitters_m, measured_m = constellation.position_m[heard], scale * distance_m[heard]
+
+    def residuals(at_m: Floats) -> Floats:
+        out: Floats = (np.sqrt(np.sum((at_m - emitters_m) ** 2, axis=1)) - measured_m) / sigma_m
+        return out
+
+    found: Floats = least_squares(residuals, place_m).x
+    return found

@@ -1,0 +1,142 @@
+"""Speed and memory of the physical simulation, beside the statistical one and bare kinematics.
+
+Stations with noise preset `default` on a synthetic take of boxing, at the tracker's default rate. Motion and body are
+made in advance; bytes and frames are included. Times are CPU times of this one thread, and the parts take turns, so
+that load on the machine affects all equally. Memory is the peak of a process of its own.
+"""
+
+import hashlib
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from harness.bench.peak_memory import peak_bytes
+from harness.bench.rows import BenchmarkRow
+from harness.body import mounts, retargeting
+from harness.body.humanoid import Body
+from harness.body.kinematics import Kinematics
+from harness.body.mounts import Mount
+from harness.core.motion import BodyMotion
+from harness.core.python_process import python_command, python_environment
+from harness.mocap import synthetic
+from harness.simulate.components.clock import Clock
+from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.physics import physical_tracker
+from harness.simulate.physics.settings import Physics
+from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
+from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
+
+STATIONS = (
+    *("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head"),
+    *("left_hand", "right_hand", "left_foot", "right_foot", "pelvis"),
+)
+MOUNTS = (
+    *(mounts.DEFAULT_MOUNTS[name] for name in STATIONS),
+    Mount("left_upper_arm", "lhumerus", 0.5, math.pi / 2.0),
+)
+"""Twelve stations; the first six are those of `bench stream`."""
+SECONDS = 20.0
+_LENGTHS_S = 60.0, 240.0
+"""Lengths of the takes whose memory is measured [s]."""
+_BAUD = 2 * len(MOUNTS) * 40 * record_size(STANDARD_LIST) * BITS_PER_BYTE
+"""Speed of a line that carries twelve stations at 40 Hz twice [bit/s]."""
+_BLOCKS = 1, 7, 80, 400
+"""Sizes of a block whose bytes are compared [slots]."""
+PHYSICAL = Noise(clock=Clock(), physics=Physics())
+
+
+def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
+    """Medians over `repeats` turns; each turn is one take of 20 s for each contender."""
+    body, take = _boxing(seed, SECONDS)
+    rows = []
+    for count, target in ((6, ">= 20"), (12, ">= 10")):
+        parts: tuple[Callable[[], object], ...] = (
+            lambda count=count: simulate(body, take, count, PHYSICAL, seed),  # type: ignore[misc]
+            lambda count=count: simulate(body, take, count, noise_preset("default"), seed),  # type: ignore[misc]
+            lambda: _pose_all(Kinematics(body), np.asarray(take.qpos)),
+        )
+        parts[0]()
+        seconds = np.array([[_time_call(part) for part in parts] for _ in range(repeats)])
+        physical_s, statistical_s, kinematics_s = np.median(seconds, axis=0).tolist()
+        rows.append(
+            BenchmarkRow(
+                f"{count} stations, 40 Hz",
+                SECONDS / physical_s,
+                "x real time",
+                f"statistical errors {SECONDS / statistical_s:.0f} x; bare kinematics of {len(take)} poses "
+                f"{SECONDS / kinematics_s:.0f} x",
+                target,
+            )
+        )
+    return [*rows, *_memory_rows(seed), _block_row(body, take, seed)]
+
+
+def simulate(body: Body, take: BodyMotion, count: int, noise: Noise, seed: int) -> Simulation:
+    """Simulate the first `count` stations on a line that is fast enough for twelve."""
+    return simulate_tracker(body, take, MOUNTS[:count], TrackerConfig(baud=_BAUD), noise, seed=seed)
+
+
+@cache
+def _boxing(seed: int, seconds: float) -> tuple[Body, BodyMotion]:
+    clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=seed, duration_s=seconds)
+    return retargeting.retarget_to_own_body(clip)
+
+
+def _memory_rows(seed: int) -> list[BenchmarkRow]:
+    rows = []
+    for seconds in _LENGTHS_S:
+        physical, statistical = (_measure_peak(kind, seconds, seed) for kind in ("physics", "default"))
+        rows.append(
+            BenchmarkRow(
+                f"peak memory above statistical errors, {seconds:.0f} s",
+                (physical - statistical) / 2**20,
+                "MB",
+                f"statistical errors {statistical / 2**20:.0f} MB",
+                "<= 64",
+            )
+        )
+    return rows
+
+
+def _block_row(body: Body, take: BodyMotion, seed: int) -> BenchmarkRow:
+    digests = set()
+    default = physical_tracker.BLOCK_SLOTS
+    try:
+        for slots in _BLOCKS:
+            physical_tracker.BLOCK_SLOTS = slots
+            digests.add(hashlib.sha256(simulate(body, take, 6, PHYSICAL, seed).wire.data).hexdigest())
+    finally:
+        physical_tracker.BLOCK_SLOTS = default
+    sizes = ", ".join(map(str, _BLOCKS))
+    return BenchmarkRow("different bytes among block sizes", len(digests) - 1.0, "", f"blocks of {sizes} slots", "0")
+
+
+def _measure_peak(kind: str, seconds: float, seed: int) -> int:
+    command = python_command("-m", "harness.bench.physics.speed", kind, str(seconds), str(seed))
+    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{kind} in its own process: {done.stderr.strip()[-2000:]}")
+    return int(done.stdout)
+
+
+def _time_call(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def _pose_all(kinematics: Kinematics, poses: np.ndarray) -> None:
+    for qpos in poses:
+        kinematics.set(qpos)
+
+
+if __name__ == "__main__":
+    _kind, _seconds, _seed = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+    _noise = PHYSICAL if _kind == "physics" else noise_preset(_kind)
+    simulate(*_boxing(_seed, _seconds), 6, _noise, _seed)
+    print(peak_bytes())
