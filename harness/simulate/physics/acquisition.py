@@ -29,7 +29,9 @@ _NEAR_THE_WORST = 0.7
 _SPARED_SHARE = 0.75
 """Share of the ranges that a fix must keep [choice]."""
 _HEADINGS = 4
-_ITERATIONS = 25
+_ITERATIONS = 15
+_SMALL_STEP = 1e-5
+"""Length of a step that ends the search [m], [rad]."""
 _DISTANCE_BELOW_M = 1.5
 _SPEED_SIGMA_M_S, _LARGEST_SPEED_M_S = 5.0, 15.0
 _OTHER_PLACE_M, _OTHER_HEADING_RAD = 0.05, 0.5
@@ -236,17 +238,18 @@ def invert(matrix: Floats, inverse: Floats) -> bool:
 @compiled
 def minimise(
     model: RangingModel, heard: Floats, used: Bools, motion: Floats, tilt_variance: float, inverse: Floats
-) -> float:
-    """Gauss-Newton from `motion` (10,), in place; the sum of squared residuals, or infinity where it fails.
+) -> tuple[float, bool]:
+    """Gauss-Newton from `motion` (10,), in place.
 
-    `inverse` (9, 9) becomes the covariance.
+    Returns the sum of squared residuals, infinity where the unknowns are not determined, and whether the last step was
+    small. It is not where wrong ranges pull far. `inverse` (9, 9) becomes the covariance.
     """
     matrix, side = np.empty((MOTION_ERRORS, MOTION_ERRORS)), np.empty(MOTION_ERRORS)
-    step = np.empty(MOTION_ERRORS)
+    step, converged = np.empty(MOTION_ERRORS), False
     for _ in range(_ITERATIONS):
         total = normal_equations(model, heard, used, motion, tilt_variance, matrix, side)
         if not np.isfinite(total) or not invert(matrix, inverse):
-            return np.inf
+            return np.inf, False
         for a in range(MOTION_ERRORS):
             step[a] = 0.0
             for b in range(MOTION_ERRORS):
@@ -258,9 +261,10 @@ def minimise(
             motion[a] += scale * step[a]
         turn = exponential(scale * step[6], scale * step[7], scale * step[8])
         set_attitude(motion, product(turn, attitude(motion)))
-        if length < 1e-5 and turned < 1e-5:
-            return normal_equations(model, heard, used, motion, tilt_variance, matrix, side)
-    return np.inf
+        converged = length < _SMALL_STEP and turned < _SMALL_STEP
+        if converged:
+            break
+    return normal_equations(model, heard, used, motion, tilt_variance, matrix, side), converged
 
 
 @compiled
@@ -282,12 +286,19 @@ def drop_worst(model: RangingModel, heard: Floats, used: Bools, motion: Floats, 
 
 @compiled
 def refine(
-    model: RangingModel, heard: Floats, motion: Floats, total: float, tilt_variance: float, inverse: Floats
+    model: RangingModel,
+    heard: Floats,
+    motion: Floats,
+    total: float,
+    converged: bool,
+    tilt_variance: float,
+    inverse: Floats,
 ) -> float:
     """Leave out the few ranges that do not fit `motion` (10,), the minimum of all N, and minimise again.
 
-    Returns the sum of squared residuals, or infinity where the fit is refused. Each range left out counts as much as
-    one at the limit, so that sums compare. `inverse` (9, 9) is the covariance.
+    `total` and `converged` are those of `minimise`. Returns the sum of squared residuals, or infinity where the fit is
+    refused. Each range left out counts as much as one at the limit, so that sums compare. `inverse` (9, 9) becomes the
+    covariance.
     """
     used = np.ones(len(heard), dtype=np.bool_)
     left, least = len(heard), max(_LEAST_RANGES, int(np.ceil(_SPARED_SHARE * len(heard))))
@@ -298,10 +309,14 @@ def refine(
             return np.inf
         if dropped == 0:
             break
-        total = minimise(model, heard, used, motion, tilt_variance, inverse)
+        total, converged = minimise(model, heard, used, motion, tilt_variance, inverse)
         if not np.isfinite(total):
             return np.inf
-    if total > _LARGEST_MISFIT**2 * (left - 7) or emitters_in(heard, used, len(model.emitter_m)) < _LEAST_EMITTERS:
+    if (
+        not converged
+        or total > _LARGEST_MISFIT**2 * (left - 7)
+        or emitters_in(heard, used, len(model.emitter_m)) < _LEAST_EMITTERS
+    ):
         return np.inf
     for i in range(len(heard)):
         j = int(heard[i, 11])
@@ -345,14 +360,14 @@ def fix(model: RangingModel, search: Search, s: int, window_s: float, motion: Fl
             for k in range(3):
                 trial[k] += (model.emitter_m[j, k] + _DISTANCE_BELOW_M * model.normal[j, k]) / len(heard)
         set_attitude(trial, exponential(0.0, 0.0, 2.0 * np.pi * heading / _HEADINGS))
-        total = minimise(model, heard, everything, trial, tilt_variance, inverse)
+        total, converged = minimise(model, heard, everything, trial, tilt_variance, inverse)
         fresh = np.isfinite(total)
         for other in range(heading):
             fresh = fresh and differ(trial, minima[other])
         if not fresh:
             continue
         refined[heading] = trial
-        totals[heading] = refine(model, heard, refined[heading], total, tilt_variance, inverse)
+        totals[heading] = refine(model, heard, refined[heading], total, converged, tilt_variance, inverse)
         if totals[heading] < least:
             least = totals[heading]
             best[:] = refined[heading]

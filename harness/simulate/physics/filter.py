@@ -55,7 +55,7 @@ _COAST_SIGMA_M = 0.5
 _CORRELATION_S = 0.2
 """Time over which a motion keeps its direction, and so the error of scale and misalignment its sign [s] [choice]."""
 _FIX_SIGMA_M, _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.1, 0.3, 0.1
-"""Largest standard deviation of the attitude of a fix, and of a confirmed one [choice]."""
+"""Largest standard deviations of a fix: position [m], attitude and attitude once confirmed [rad] [choice]."""
 _CONFIRMED_NIS = 2.0
 """Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
 _ATTEMPT_SLOTS = 8

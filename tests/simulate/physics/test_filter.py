@@ -90,7 +90,6 @@ def matched_runs(change: Callable[[FreeStation], FreeStation] = lambda station: 
     return float(totals[0] / RUNS), float(totals[1] / RUNS), float(totals[2] / RUNS)
 
 
-@pytest.mark.long
 def test_errors_are_as_large_as_the_covariance_says() -> None:
     """Mean NEES and NIS lie in the 95 % interval of chi-square over 50 matched runs (Bar-Shalom 2001, 5.4.2)."""
     nees, nees_of_position, nis = matched_runs()
@@ -101,7 +100,6 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
         assert low < value < high, (freedom, value, low, high)
 
 
-@pytest.mark.long
 def test_wrong_noise_is_seen_in_the_normalised_errors() -> None:
     """Ranges with half as much noise again fall outside."""
     noisier = matched_runs(lambda s: replace(s, range_m=s.range_m + 1.1 * s.sigma_m * _normal(s)))

@@ -1,0 +1,107 @@
+"""The fix and the level of a lost station."""
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.simulate.physics.acquisition import Search, add_force, begin_search, fix, invert, level_attitude
+from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.inertial import Inertial
+from harness.simulate.readings import GRAVITY_M_S2
+from tests.simulate.physics.free_station import (
+    FreeStation,
+    exact_inertial,
+    free_station,
+    new_filter,
+    noisy,
+    records_every,
+)
+
+SLOTS = 40
+
+
+def searching(station: FreeStation, slots: int = SLOTS) -> FusionFilter:
+    """A filter that has collected the ranges of some slots, and may not fix."""
+    fusion_filter = new_filter(fusion=Fusion(), inertial=exact_inertial())
+    fusion_filter.model = fusion_filter.model._replace(window_s=0.0)
+    measured = station.angle_rad[: 5 * slots, None], station.gain_m_s[: 5 * slots, None], station.range_m[:slots, None]
+    fusion_filter.advance(0, *measured, records_every(5, 0))
+    return fusion_filter
+
+
+def try_fix(fusion_filter: FusionFilter, window_s: float = 1.0) -> tuple[bool, Floats, Floats]:
+    """Whether a fix was found, the motion, and P."""
+    motion, covariance = fusion_filter.state.motion[0, -1].copy(), np.zeros((15, 15))
+    return fix(fusion_filter.ranging, fusion_filter.search, 0, window_s, motion, covariance), motion, covariance
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_fix_is_as_good_as_it_says(seed: int, speed: float) -> None:
+    station, _ = noisy(free_station(2.0, seed, speed=speed), seed, Inertial())
+    found, motion, covariance = try_fix(searching(station))
+    assert found
+    end = 5 * SLOTS
+    turn = rotations.log(rotations.multiply(station.tracker_from_station[end], rotations.inverse(motion[6:])))
+    error = np.concatenate(
+        [station.unit_position_m[end] - motion[:3], station.unit_velocity_m_s[end] - motion[3:6], turn]
+    )
+    assert error @ np.linalg.solve(covariance[:9, :9], error) < 30.0  # chi-square of 9: 0.04 % are larger
+    assert np.sqrt(np.trace(covariance[:3, :3])) < 0.03
+
+
+def test_a_fix_leaves_out_a_few_wrong_ranges() -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    station.range_m[[5, 17, 30], 0] += np.array([0.5, 0.3, 1.0])
+    found, motion, _ = try_fix(searching(station))
+    assert found
+    assert np.linalg.norm(motion[:3] - station.unit_position_m[5 * SLOTS]) < 0.03
+
+
+def test_a_fix_is_refused_when_most_ranges_are_wrong(rng: np.random.Generator) -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    station.range_m[:] += rng.uniform(0.0, 0.5, station.range_m.shape)
+    assert not try_fix(searching(station))[0]
+
+
+def test_a_fix_needs_four_emitters() -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    emitter = np.arange(len(station.range_m)) % 9
+    station.range_m[emitter > 2] = np.nan
+    assert not try_fix(searching(station))[0]
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    station.range_m[(emitter == 1) | (emitter > 4)] = np.nan
+    assert try_fix(searching(station))[0]
+
+
+def test_a_fix_uses_the_window_only() -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    station.range_m[:20] += 0.7
+    fusion_filter = searching(station)
+    assert not try_fix(fusion_filter)[0]
+    assert try_fix(fusion_filter, window_s=0.25)[0]
+
+
+def test_gravity_levels_a_station_at_rest(rng: np.random.Generator) -> None:
+    turn = rotations.exp(rng.standard_normal(3))  # of the true attitude; the kept one is the identity
+    force = rotations.rotate(rotations.inverse(turn), np.array([0.0, 0.0, -GRAVITY_M_S2]))
+    search = Search(np.zeros((1, 4, 12)), np.zeros(1, dtype=np.int64), np.zeros((1, 7)), np.zeros((1, 5)), np.zeros(1))
+    begin_search(search, 0, 1.0)
+    motion = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    add_force(search.path[0], *force, 1.0)
+    for _ in range(80):
+        level_attitude(search, 0, motion, *rotations.rotate(motion[6:], force), 0.0125)
+    kept = rotations.rotate(motion[6:], force)
+    assert np.arctan2(np.hypot(kept[0], kept[1]), -kept[2]) < 0.01
+    assert np.sqrt(search.tilt_variance[0]) < 0.02
+    np.testing.assert_allclose(search.path[0, 3:6], kept, atol=1e-9)  # what was collected turns along
+
+
+def test_invert_knows_matrices_that_are_not_definite(rng: np.random.Generator) -> None:
+    root = rng.standard_normal((9, 9))
+    matrix, inverse = root @ root.T, np.empty((9, 9))
+    assert invert(matrix, inverse)
+    np.testing.assert_allclose(inverse @ matrix, np.eye(9), atol=1e-8)
+    assert not invert(matrix - 3.0 * np.trace(matrix) * np.eye(9), inverse)
+    assert not invert(np.zeros((9, 9)), inverse)
