@@ -6,7 +6,7 @@ of flight from the microphone's motion until the sound arrives.
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.simulate.physics.bursts import Bursts
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.echoes import mirror_images, reflection_point
 from harness.simulate.physics.flight import time_of_flight_s
 from harness.simulate.physics.level import level_db, noise_factor, threshold_db
@@ -26,26 +27,6 @@ from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_
 
 _EARLY_SHARE = 0.5
 """Share of the microphones that a burst triggers early; the others hear nothing [choice]."""
-
-
-class EmitterGeometry(Protocol):
-    """J emitters in the tracker's frame."""
-
-    @property
-    def position_m(self) -> Floats:
-        """(J, 3) true positions [m]."""
-
-    @property
-    def normal(self) -> Floats:
-        """(J, 3) unit normals."""
-
-    @property
-    def cone_rad(self) -> float:
-        """Largest angle between the normal and the sound [rad]."""
-
-    @property
-    def range_m(self) -> float:
-        """Largest distance at which an emitter is heard [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +60,7 @@ class Ranging:
     def __init__(
         self,
         sound: Sound,
-        constellation: EmitterGeometry,
+        constellation: Constellation,
         schedule: Schedule,
         placed: PlacedRoom,
         sight: Sight | None,
@@ -89,7 +70,10 @@ class Ranging:
         take: str,
         session: str = "",
     ) -> None:
-        """Begin a take. Without `sight` nothing blocks sound; there are echoes if `placed.room` has them."""
+        """Begin a take with the emitters at their true positions.
+
+        Without `sight` nothing blocks sound; there are echoes if `placed.room` has them.
+        """
         self._sound, self._schedule, self._sight = sound, schedule, sight
         self._position_m = np.array(constellation.position_m)
         self._normal = np.array(constellation.normal)
@@ -128,7 +112,7 @@ class Ranging:
         facing = rotations.rotate(motion.tracker_from_station[begins], np.array([0.0, 0.0, 1.0]))
         emitter = self._schedule.emitter_of(first_slot, slots)
         normals = np.stack([rng.standard_normal((slots, MICROPHONES + 1)) for rng in self._noise], axis=1)
-        uniforms = np.stack([rng.random((slots, MICROPHONES, 3)) for rng in self._chance], axis=1)
+        uniforms = np.stack([rng.random((slots, MICROPHONES, 2)) for rng in self._chance], axis=1)
         turn = self._schedule.emitters * self._schedule.slot_s
         _drift(
             self._air_m_s,
@@ -329,13 +313,13 @@ def _measure(
                 at_s = time_s[slot, s, m]
                 if np.isnan(at_s):
                     continue
-                wrong, kind, moment = uniforms[slot, s, m]
+                chance, moment = uniforms[slot, s, m]
                 if burst[slot]:
-                    if kind < _EARLY_SHARE:
+                    if chance < _EARLY_SHARE:
                         out[slot, s, m] = assumed_m_s * at_s * moment
                     continue
                 factor = noise_factor(level[slot, s, m], absorption)
-                if wrong < wrong_share * factor:
+                if chance < wrong_share * factor:
                     at_s += 1.0 / frequency_hz
                 out[slot, s, m] = assumed_m_s * at_s + noise_m * factor * normals[slot, s, m]
     return out

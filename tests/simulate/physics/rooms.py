@@ -1,7 +1,8 @@
 """Emitters, rooms and motions of stations for tests of the physics."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.link import TrackerConfig
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom, Room
-from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
+from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
@@ -22,28 +24,27 @@ TICK_HZ = 400.0
 ORIGIN_M = np.array(TrackerConfig().origin_m)
 
 
-@dataclass
-class Emitters:
-    """Emitters in the tracker's frame."""
+def emitters_at(*position_m: Sequence[float], cone_deg: float = 70.0) -> Constellation:
+    """Emitters that face down and reach 4 m."""
+    count = len(position_m)
+    return Constellation(
+        number=np.arange(count),
+        position_m=np.array(position_m),
+        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+        identity=np.arange(count),
+        cone_rad=math.radians(cone_deg),
+        range_m=4.0,
+    )
 
-    position_m: Floats
-    normal: Floats
-    cone_rad: float = float(np.deg2rad(70.0))
-    range_m: float = 4.0
 
-    @property
-    def schedule(self) -> Schedule:
-        return Schedule(TICK_HZ, len(self.position_m))
-
-
-def grid() -> Emitters:
+def grid() -> Constellation:
     """The emulator's nine emitters, which face down 2.5 m above the floor."""
-    return Emitters(np.array([e.position_m for e in DEFAULT_EMITTERS]), np.tile([0.0, 0.0, 1.0], (9, 1)))
+    return emitters_at(*(emitter.position_m for emitter in DEFAULT_EMITTERS))
 
 
-def placed(room: Room | None = None) -> PlacedRoom:
-    """A room around the tracker's frame."""
-    return PlacedRoom(room or Room(), ORIGIN_M[:2], WORLD_FROM_TRACKER, ORIGIN_M)
+def placed(room: Room | None = None, centre_m: Floats = ORIGIN_M[:2]) -> PlacedRoom:
+    """A room in the world, by default around the tracker's origin."""
+    return PlacedRoom(room or Room(), centre_m, WORLD_FROM_TRACKER, ORIGIN_M)
 
 
 def block_of(motion: TrackerMotion, first: int, slots: int) -> TrackerMotion:

@@ -34,6 +34,15 @@ def test_a_burst_touches_the_intervals_that_it_overlaps() -> None:
     assert bursts.touch(np.array([ends_s - 0.01]), np.array([ends_s + 5.0])).all()
 
 
+def test_a_burst_goes_on_over_the_minute() -> None:
+    bursts = Bursts(30.0, (0.5, 2.0), seed=3, take="t")
+    over = [(b, e) for b, e in bursts.intervals_s(0.0, 3600.0) if b // 60.0 != e // 60.0]
+    assert over
+    for _, ends_s in over:
+        begin_s = np.array([ends_s // 60.0 * 60.0])
+        assert Bursts(30.0, (0.5, 2.0), seed=3, take="t").touch(begin_s, begin_s + 1e-6).all()
+
+
 def test_takes_and_seeds_differ() -> None:
     first = Bursts(2.0, (0.05, 0.3), seed=1, take="t").intervals_s(0.0, 600.0)
     for other in (Bursts(2.0, (0.05, 0.3), seed=2, take="t"), Bursts(2.0, (0.05, 0.3), seed=1, take="u")):

@@ -11,8 +11,8 @@ CENTRE_M = np.array([1.0, -2.0])
 
 
 def test_planes_pass_the_middles_of_walls_floor_and_ceiling_and_point_outward() -> None:
-    room = placed(Room(size_m=(6.0, 4.0), height_m=2.6))
-    x, y = ORIGIN_M[:2]
+    room = placed(Room(size_m=(6.0, 4.0), height_m=2.6), CENTRE_M)
+    x, y = CENTRE_M
     middles = np.array([[x, y, 0], [x, y, 2.6], [x - 3, y, 1], [x + 3, y, 1], [x, y - 2, 1], [x, y + 2, 1]])
     inside_m = np.array([x, y, 1.3])
     planes = room.planes()

@@ -81,6 +81,14 @@ def test_furniture_blocks_what_lies_behind_it_and_nothing_else() -> None:
     np.testing.assert_array_equal(sight.blocked(emitter_m, ends_m), [True, True, False, False])
 
 
+def test_furniture_stands_where_the_middle_of_the_room_says() -> None:
+    room = Room(furniture=(Box((0.0, 0.0, 1.0), (0.4, 0.4, 0.2)),))
+    ends_m = np.array([[0.3, -0.2, 2.0], [0.0, 0.15, 2.0]])
+    for end_m, hidden in zip(ends_m, (True, False), strict=True):
+        sight = Sight(None, placed(room, np.array([0.3, 0.2])))
+        assert sight.blocked(end_m * [1.0, 1.0, 0.0], end_m[None]).all() == hidden
+
+
 def test_a_surface_less_than_two_centimetres_before_the_end_does_not_block() -> None:
     sight = Sight(None, placed(Room(furniture=(Box((0.0, 0.0, 0.5), (1.0, 1.0, 1.0)),))))
     ends_m = np.array([[0.0, 0.0, 1.519], [0.0, 0.0, 1.521]])
