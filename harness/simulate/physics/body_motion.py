@@ -20,12 +20,11 @@ class BodyMotionSource:
         self._chain = station_chain(trajectory.body.skeleton, calibration)
         self._pieces: Floats = np.ascontiguousarray(trajectory.spline.c)
         self._knots_s: Floats = np.ascontiguousarray(trajectory.spline.x)
-        self._last_turn = np.zeros((len(self.stations), 4))
 
     def advance(self, time_s: Floats) -> TrackerMotion:
         """Motion at the ticks (T+1,) of the next block [s]; BadInput outside the trajectory."""
         self._trajectory.require_inside(time_s)
-        true = station_states(self._chain, self._pieces, self._knots_s, time_s, self._last_turn)
+        true = station_states(self._chain, self._pieces, self._knots_s, time_s)
         motion = TrackerMotion(time_s, true.position_m, true.tracker_from_station, true.velocity_m_s, true.turn_rad_s)
         force_m_s2 = None
         if self._worn.on_tissue:

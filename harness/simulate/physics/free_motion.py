@@ -9,7 +9,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.simulate.physics.motion import TrackerMotion, continued
+from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.resting_ends import STOP_S, with_rest_after, with_rest_before
 
 FACING_UP: Floats = np.array([0.0, 1.0, 0.0, 0.0])
@@ -42,7 +42,6 @@ class FreeMotionSource:
         taken: PPoly = CubicSpline(time_s, knots)
         self._spline = with_rest_after(with_rest_before(taken, warm_up_s), _REST_S)
         self.begins_s, self.ends_s = float(self._spline.x[0]), float(self._spline.x[-1])
-        self._last_turn: Floats | None = None
 
     def advance(self, time_s: Floats) -> TrackerMotion:
         """Motion at the ticks (T+1,) of the next block [s]; BadInput outside `begins_s` to `ends_s`."""
@@ -55,9 +54,8 @@ class FreeMotionSource:
         # With p the splined quaternion, n its length and q = p/n: 2 conj(q) p'/n has the angular velocity as its
         # vector; the change of n adds to its scalar alone. 2 p' conj(q)/n is the same in the tracker's axes.
         length = np.sqrt(np.sum(place[..., 3:] ** 2, axis=-1, keepdims=True))
-        turn = continued(place[..., 3:] / length, self._last_turn)
-        self._last_turn = turn[-1].copy()
-        spin = 2.0 * rotations.multiply(speed[..., 3:] / length, rotations.inverse(place[..., 3:] / length))
+        turn = place[..., 3:] / length
+        spin = 2.0 * rotations.multiply(speed[..., 3:] / length, rotations.inverse(turn))
         return TrackerMotion(time_s, place[..., :3], turn, speed[..., :3], spin[..., 1:])
 
     def qpos(self, time_s: Floats) -> Floats | None:

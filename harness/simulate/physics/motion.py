@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from harness.core import rotations
 from harness.core.arrays import Floats
 
@@ -46,11 +44,3 @@ class TrackerMotionSource(Protocol):
     def qpos(self, time_s: Floats) -> Floats | None:
         """(F, 55) configurations of the body at F times [s]; None when no body is in the room."""
         ...
-
-
-def continued(tracker_from_station: Floats, before: Floats | None) -> Floats:
-    """Quaternions (T+1, S, 4) with continuous signs, of which the first follow (S, 4) `before`."""
-    out = rotations.continuous(tracker_from_station)
-    if before is not None:
-        out *= np.where(np.sum(out[0] * before, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    return out

@@ -79,24 +79,20 @@ class KinematicStates(NamedTuple):
     acceleration_m_s2: Floats
 
 
-def station_states(
-    chain: StationChain, pieces: Floats, knots_s: Floats, time_s: Floats, last: Floats
-) -> KinematicStates:
+def station_states(chain: StationChain, pieces: Floats, knots_s: Floats, time_s: Floats) -> KinematicStates:
     """States at increasing times (T,) [s] on a cubic spline of configurations: `pieces` (4, P, 55), `knots_s` (P + 1,).
 
-    Signs of quaternions are continuous from `last` (S, 4), which is set to the last ones; at zeros they are free.
+    Signs of quaternions are continuous in time, as they are in the spline.
     """
     shape = len(time_s), len(chain.station_bone)
     vectors = [np.empty((*shape, 3)) for _ in range(4)]
     out = KinematicStates(vectors[0], np.empty((*shape, 4)), *vectors[1:])
-    _follow(chain, pieces, knots_s, time_s, last, out)
+    _follow(chain, pieces, knots_s, time_s, out)
     return out
 
 
 @compiled
-def _follow(
-    chain: StationChain, pieces: Floats, knots_s: Floats, time_s: Floats, last: Floats, out: KinematicStates
-) -> None:
+def _follow(chain: StationChain, pieces: Floats, knots_s: Floats, time_s: Floats, out: KinematicStates) -> None:
     bones, stations, final = len(chain.parent), len(chain.station_bone), pieces.shape[1] - 1
     # Rows are bones, and the root last, where -1 finds it.
     turn, omega, alpha = np.empty((bones + 1, 4)), np.empty((bones + 1, 3)), np.empty((bones + 1, 3))
@@ -135,11 +131,9 @@ def _follow(
                 out.acceleration_m_s2[k, s],
             )
             out.turn_rad_s[k, s] = omega[b]
-            w, x, y, z = product(quaternion(turn[b]), quaternion(chain.bone_from_station[s]))
-            if w * last[s, 0] + x * last[s, 1] + y * last[s, 2] + z * last[s, 3] < 0.0:
-                w, x, y, z = -w, -x, -y, -z
-            last[s, 0], last[s, 1], last[s, 2], last[s, 3] = w, x, y, z
-            out.tracker_from_station[k, s] = last[s]
+            q = product(quaternion(turn[b]), quaternion(chain.bone_from_station[s]))
+            for i in range(4):
+                out.tracker_from_station[k, s, i] = q[i]
 
 
 @compiled

@@ -24,7 +24,7 @@ from harness.simulate.readings import SimulatedReadings
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import Still
-from tests.simulate.test_components import ODDS, assert_sd, errors
+from tests.simulate.test_components import ODDS, assert_sd, assert_uniform, errors
 
 THIGH = Mount("thigh", "rfemur", 0.5, np.pi / 2)
 SHIN = Mount("shin", "rtibia", 0.9, np.pi / 2)
@@ -229,3 +229,9 @@ def test_a_strap_slips_alike_whatever_else_is_worn(still: Still) -> None:
         StrapSlip(share=0.7).apply(readings)
     np.testing.assert_array_equal(few.position_m, many.position_m[:, :2])
     np.testing.assert_array_equal(few.turn, many.turn[:, :2])
+
+
+def test_straps_slip_at_any_moment_of_the_take() -> None:
+    slips = [StrapSlip(share=1.0).draw(np.random.default_rng(n), "torso", 2.0, 9.0) for n in range(2000)]
+    assert all(slip is not None for slip in slips)
+    assert_uniform(np.array([slip.from_s for slip in slips if slip is not None]), 2.0, 9.0)

@@ -179,6 +179,14 @@ def test_constant_errors_have_their_standard_deviations() -> None:
     assert abs(np.mean(bias)) < 0.03
 
 
+def test_misaligned_axes_keep_their_scale() -> None:
+    """The axes of a triad are unit vectors, however oblique: they differ from the scale error."""
+    unit_vectors = np.broadcast_to(np.eye(3)[:, None], (3, 5, 3)) / 400
+    matrix = 400 * measured(with_errors(misalignment_rad=0.2), unit_vectors, 5)
+    np.testing.assert_allclose(np.sum(matrix**2, axis=1), 1.0, atol=1e-12)
+    assert np.abs(matrix[:, 0, :, 1]).min() > 1e-3
+
+
 def test_constant_errors_belong_to_the_session() -> None:
     settings = with_errors(scale=2e-3, misalignment_rad=5e-3, turn_on=0.3)
     true = np.full((1, 2, 3), 0.01)

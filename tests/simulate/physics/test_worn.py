@@ -120,6 +120,18 @@ def test_it_ends_where_the_statistical_component_does(boxer: tuple[Body, BodyMot
     assert rotations.angle_between_rad(motion.tracker_from_station, read.turn)[clear].max() < 1e-7
 
 
+def test_a_mount_belongs_to_the_session() -> None:
+    def mounted(take: str, session: str) -> Floats:
+        motion, skin = turning(2, np.zeros(1)), Skin(np.ones(2), np.ones(2))
+        noise = COMPONENTS["mount"]
+        Worn(noise, "ab", skin, tick_hz=400.0, ends_s=1.0, seed=1, take=take, session=session).apply(motion, None)
+        return motion.position_m
+
+    assert np.array_equal(mounted("one", "day"), mounted("two", "day"))
+    assert np.array_equal(mounted("day", ""), mounted("two", "day"))
+    assert not np.isclose(mounted("one", "day"), mounted("one", "night")).any(axis=-1).all()
+
+
 def test_a_slip_is_a_minimum_jerk_motion() -> None:
     share, pace = minimum_jerk_share(np.array([-1.0, 0.0, 1.0, 2.0, 3.0]), 2.0)
     np.testing.assert_allclose(share, [0.0, 0.0, 0.5, 1.0, 1.0])
