@@ -94,7 +94,7 @@ def _content(args: argparse.Namespace, constellation: Constellation) -> Coverage
     stations = _station_rows(args, constellation) if args.clip is not None else ("", ())
     return CoverageContent(
         name=args.file.stem,
-        emitters=f"{len(constellation)} emitters on {extent_m[0]:.2f} m x {extent_m[1]:.2f} m x {extent_m[2]:.2f} m",
+        emitters=f"{len(constellation)} emitters on {' x '.join(f'{each:.2f}' for each in extent_m)} m",
         reach=f"{constellation.range_m:g} m within {np.rad2deg(constellation.cone_rad):.0f} deg of each axis",
         turn=f"{turn_s:.3f} s for a turn of all emitters",
         emitter_m=constellation.position_m,

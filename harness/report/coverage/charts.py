@@ -20,7 +20,7 @@ _HEARD_EDGES = (0, 1, 2, 3, 4, 6, 9, 13)
 """Lowest number of emitters of each colour."""
 _HEARD_COLOURS = ("#d55e00", "#eb9a5c", "#f8d4b4", "#cfe3f2", "#94c1e2", "#5698cb", "#1f6fae", "#0b4a7c")
 """Orange for fewer than three emitters, which fix no position; blue for three and more."""
-_DILUTION_EDGES = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+_DILUTION_EDGES = (0.0, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 _SHARE_COLOURS = (COLOURS[0], "#eb9a5c", "#f8d4b4", COLOURS[1])
 _ROW_IN, _FRAME_IN = 0.3, 0.95
 
@@ -44,12 +44,10 @@ def dilution_chart(content: CoverageContent) -> Chart:
     count = len(_DILUTION_EDGES)
     colours = ListedColormap(colormaps["viridis_r"](np.linspace(0.0, 1.0, count)))
     norm = BoundaryNorm((*_DILUTION_EDGES, 1e9), count)
-    labels = [f"{low:g} to {high:g}" for low, high in _neighbours(_DILUTION_EDGES)]
+    labels = [f"{low:g} to {high:g}" if low else f"below {high:g}" for low, high in _neighbours(_DILUTION_EDGES)]
     ticks = _Ticks([*labels, f"{_DILUTION_EDGES[-1]:g} or more"], "dilution of precision; no colour: no fix")
     style = {"cmap": colours, "norm": norm}
-    return _plan_chart(
-        content, "dilution", "Dilution of precision by place", style, ticks, lambda v: np.maximum(v.dilution, 1.0)
-    )
+    return _plan_chart(content, "dilution", "Dilution of precision by place", style, ticks, lambda view: view.dilution)
 
 
 def station_chart(content: CoverageContent) -> Chart:
@@ -112,7 +110,7 @@ def _plan_chart(
     return draw_chart(
         name,
         title,
-        "Seen from above, without a body; a station faces every emitter. Dots: emitters. Square: the volume of the table.",
+        "Seen from above, without a body; a station faces each emitter. Dots: emitters. Square: the cube of the table.",
         f"{title} at {heights} above the floor.",
         draw,
         height_in,

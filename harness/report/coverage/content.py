@@ -29,7 +29,7 @@ class PlanView:
 
 @dataclass(frozen=True)
 class CoverageRow:
-    """Coverage of a volume, or of one height of it."""
+    """Coverage of a cube on the floor, or of one height of it."""
 
     place: str
     share: float
@@ -69,10 +69,10 @@ class CoverageContent:
     emitter_m: Floats
     """(J, 3) positions in the tracker's frame [m]."""
     half_m: float
-    """Half the side of the volume below the middle [m]."""
+    """Half the side of the cube below the middle [m]."""
     views: Sequence[PlanView]
     rows: Sequence[CoverageRow]
-    """The volume first."""
+    """The cube first."""
     clip: str = ""
     """Name of the clip of `stations`; "" without any."""
     stations: Sequence[StationRow] = ()

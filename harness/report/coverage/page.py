@@ -40,11 +40,11 @@ def coverage_page(content: CoverageContent) -> str:
 
 
 def heading(content: CoverageContent) -> str:
-    """The coverage of the volume in one sentence, and the station that hears least."""
+    """The coverage of the cube in one sentence, and the station that hears least."""
     volume = content.rows[0]
     text = (
         f"{len(content.emitter_m)} emitters: three or more are heard in {format_fixed(100.0 * volume.share, 0)} % of "
-        f"the volume, at a median DOP of {format_dilution(volume.dilution)}"
+        f"the cube below them, at a median DOP of {format_dilution(volume.dilution)}"
     )
     if content.stations:
         least = min(content.stations, key=lambda row: row.shares[3])
@@ -56,7 +56,7 @@ def _by_place(content: CoverageContent, can_draw: bool) -> Markup:
     from harness.report.coverage.charts import dilution_chart, heard_chart
 
     charts = [chart_figure(chart(content), 3) for chart in (heard_chart, dilution_chart)] if can_draw else []
-    caption = f"A volume of {2 * content.half_m:g} m x {2 * content.half_m:g} m below the middle of the emitters."
+    caption = f"A cube of {2 * content.half_m:g} m on the floor below the middle of the emitters, and squares in it."
     table = html_table(place_table(content.rows), caption, label="Coverage by height")
     return join(tag("p", _DILUTION_NOTE), *charts, table)
 
