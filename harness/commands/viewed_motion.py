@@ -53,8 +53,16 @@ def open_motion(
     if methods:
         raise BadInput(f"--methods with {what}.", "A clip has no estimates: name a run or a recording.")
     _refuse_options(playback, "A clip")
-    clip = read_clip(path, rate_hz) if path.exists() else _find_clip(what, mocap)
-    return view_clip(clip)
+    return view_clip(open_clip(what, mocap, rate_hz))
+
+
+def open_clip(what: str, mocap: LibraryFolders | None, rate_hz: float | None = None) -> Clip:
+    """The clip that a text names: a motion file, a built-in take or a clip of the library.
+
+    `rate_hz` is the rate of an AMC file that no index names. Raises UnknownName, BadFile or BadInput.
+    """
+    path = Path(what)
+    return read_clip(path, rate_hz) if path.exists() else _find_clip(what, mocap)
 
 
 def _refuse_options(playback: dict[str, Any], kind: str) -> None:

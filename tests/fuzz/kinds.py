@@ -46,6 +46,8 @@ from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run
 from harness.results.placement_findings import read_placement
 from harness.results.storage import read_summary
+from harness.simulate.physics.mcf_file import read_mcf
+from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
@@ -301,6 +303,14 @@ KINDS: dict[str, Kind] = {
         Kind("amass", _write("91_01.npz", _npz()), ("*",), NPZ, _inspect("91_01.npz"), "inspect {}/91_01.npz"),
         Kind("c3d header", _write("x.c3d", _c3d()), ("*",), BYTES, lambda folder: check_header(folder / "x.c3d")),
         Kind("c3d", _make_markers, ("*",), BYTES, _inspect("91_01.c3d"), "inspect {}/91_01.c3d", share=0.02),
+        Kind(
+            "constellation",
+            _write("x.mcf", b"".join(emitter.line() for emitter in DEFAULT_EMITTERS)),
+            ("*",),
+            TEXT,
+            lambda folder: read_mcf(folder / "x.mcf"),
+            "inspect {0}/x.mcf --out {0}/x.html --force",
+        ),
         Kind("library index", _make_library, ("manifest.csv",), TEXT, _read_library, "mocap list --mocap {}"),
         Kind(
             "scenario",

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from harness.report.comparison.writer import write_comparison_page
+from harness.report.coverage.page import coverage_page
 from harness.report.paper.writer import write_paper_page
 from harness.report.physics.writer import write_physics_page
 from harness.report.placement import writer as placement_writer
@@ -13,6 +14,7 @@ from harness.report.run.writer import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from tests.report.fabricate import Plan, fabricate
 from tests.report.fabricate_comparison import comparison
+from tests.report.fabricate_coverage import fabricate_coverage
 from tests.report.fabricate_paper import liu, write_study
 from tests.report.fabricate_physics import made_up as made_up_physics
 from tests.report.fabricate_placement import write_made_up
@@ -20,7 +22,7 @@ from tests.report.fabricate_sweep import fabricate_sweep
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
-KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics")
+KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics", "coverage")
 PRINTED_PX = 703
 """Width of an A4 page within margins of 12 mm, at 96 pixels an inch."""
 UNFOLD = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
@@ -41,7 +43,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(placement_writer, "draw_body_map", lambda *args, **options: (None, "not in this test"))
         placement = placement_writer.write_placement_page(write_made_up(folder / "placement"))
+    coverage = folder / "coverage.html"
+    coverage.write_text(coverage_page(fabricate_coverage()), encoding="utf-8")
     return {
+        "coverage": coverage,
         "run": write_run_page(fabricate(folder / "run", plan), rendered=False),
         "comparison": write_comparison_page(comparison(7, ("local_pca",)), folder / "comparison.html"),
         "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),

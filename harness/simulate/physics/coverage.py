@@ -9,6 +9,8 @@ from harness.simulate.physics.constellation import Constellation
 
 ENOUGH = 3
 """Number of ranges that a position needs."""
+LARGEST_DILUTION = 10.0
+"""Largest dilution of precision that counts as a fix [choice]: 4 mm of a range then make 4 cm."""
 PLAN_POINTS = 121
 """Places along each axis of a plan view [choice]."""
 _MARGIN_M = 2.0
@@ -46,6 +48,11 @@ class PlaceCoverage:
     def share(self) -> float:
         """Share of the places where three emitters or more are heard."""
         return float(np.mean(self.heard >= ENOUGH))
+
+    @property
+    def fixed_share(self) -> float:
+        """Share of the places where these ranges fix a position, with a dilution of at most `LARGEST_DILUTION`."""
+        return float(np.mean(self.dilution <= LARGEST_DILUTION))
 
     @property
     def median_heard(self) -> float:

@@ -10,7 +10,7 @@ from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation, middle_of_path_m
-from harness.simulate.physics.coverage import ENOUGH, dilution_of_precision, median_of_finite
+from harness.simulate.physics.coverage import ENOUGH, LARGEST_DILUTION, dilution_of_precision, median_of_finite
 from harness.simulate.physics.level import level_db, threshold_db
 from harness.simulate.physics.room import PlacedRoom, Room
 from harness.simulate.physics.sight import Sight
@@ -41,6 +41,10 @@ class StationCoverage:
         counts = np.bincount(np.minimum(self.heard[:, station], ENOUGH), minlength=ENOUGH + 1) / len(self.heard)
         none, one, two, enough = map(float, counts)
         return none, one, two, enough
+
+    def fixed_share(self, station: int) -> float:
+        """Share of the time in which a station has a fix, with a dilution of at most `LARGEST_DILUTION`."""
+        return float(np.mean(self.dilution[:, station] <= LARGEST_DILUTION))
 
     def median_dilution(self, station: int) -> float:
         """Median dilution of precision of a station while it has a fix; NaN if it never has."""

@@ -34,12 +34,15 @@ def test_cave_has_the_emitters_of_the_emulator() -> None:
     assert (cave.cone_rad, cave.range_m) == (np.deg2rad(70.0), 4.0)
 
 
-def test_hall_is_nine_bars_of_three_that_face_down() -> None:
+def test_hall_is_twelve_bars_of_three_that_face_down() -> None:
     hall = load_constellation(ConstellationSettings())
-    assert len(hall) == 27
-    np.testing.assert_array_equal(hall.normal, np.tile(DOWN, (27, 1)))
-    bars_m = hall.position_m.reshape(9, 3, 3)
-    np.testing.assert_allclose(np.diff(bars_m, axis=1), np.tile([0.9144, 0.0, 0.0], (9, 2, 1)), atol=1e-9)
+    assert len(hall) == 36
+    np.testing.assert_array_equal(hall.normal, np.tile(DOWN, (36, 1)))
+    by_bar = np.argsort(hall.identity)
+    assert not np.any(np.abs(np.diff(by_bar)) == 1), "the turn jumps from bar to bar"
+    steps_m = np.diff(hall.position_m[by_bar].reshape(12, 3, 3), axis=1)
+    along = np.array([0.9144 * np.roll([1.0, 0.0, 0.0], (row + place) % 2) for row in range(3) for place in range(4)])
+    np.testing.assert_allclose(steps_m, np.repeat(along[:, None], 2, axis=1), atol=1e-9)
     np.testing.assert_allclose(hall.position_m.mean(axis=0), 0.0, atol=1e-9)
 
 

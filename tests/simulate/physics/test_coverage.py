@@ -42,7 +42,8 @@ def test_places_are_heard_in_range_and_cone() -> None:
     places_m = np.array([[0.0, 0.0, 1.5], [0.0, 0.0, 4.0], [0.0, 0.0, 4.1], [0.0, 0.0, -0.5], [0.0, 0.0, 0.3]])
     found = place_coverage(cave(), places_m)
     assert found.heard.tolist() == [9, 1, 0, 0, 3]
-    assert found.share == pytest.approx(0.4)
+    assert (found.share, found.fixed_share) == pytest.approx((0.4, 0.2))
+    assert found.median_heard == 1.0
     assert np.isfinite(found.dilution[0])
     assert np.isnan(found.dilution[1:]).all(), "three emitters of one bar and the place lie in a plane"
     assert found.median_dilution == pytest.approx(found.dilution[0])

@@ -1,0 +1,152 @@
+"""`inspect` of an MCF file: coverage and dilution of precision, by place and by station of a performer."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from harness.commands.common import mocap_words, print_result, this_command
+from harness.errors import BadInput, Outcome, UnknownName
+from harness.report.coverage.content import (
+    CoverageContent,
+    CoverageRow,
+    PlanView,
+    StationRow,
+    place_table,
+    station_table,
+)
+from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
+from harness.simulate.physics.coverage import PlaceCoverage, grid_m, place_coverage, plan_axes_m
+
+if TYPE_CHECKING:
+    from harness.body.mounts import Mount
+    from harness.core.motion import Clip
+
+HEIGHTS_M = (0.3, 1.0, 1.7)
+"""Heights of the plan views above the floor: shin, hanging hand and head [m] [choice]."""
+SIDE_M = 2.0
+"""Side of the cube on the floor below the middle of the emitters, whose coverage is summed up [m] [choice]."""
+_POINTS = 11
+DEFAULT_STATIONS = "liu2011"
+
+
+def inspect_constellation(args: argparse.Namespace) -> Outcome:
+    """Print the coverage of the emitters in a file, and write its page."""
+    if args.unit is not None:
+        raise BadInput(f"--unit with {args.file.name}.", "An MCF file is in metres.")
+    for name in ("stations", "rate"):
+        if getattr(args, name) is not None and args.clip is None:
+            raise BadInput(f"--{name} without --clip.", "It is for the performer that --clip names.")
+    page = args.out or Path("results") / "coverage" / f"{args.file.stem}.html"
+    if args.out is not None and args.out.exists() and not args.force:
+        raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")
+    constellation = _load(args.file)
+    content = _content(args, constellation)
+    from harness.core.files import write_text
+    from harness.report.coverage.page import coverage_page
+
+    html = coverage_page(content)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    write_text(page, html)
+    lines = [f"{content.emitters}; {content.reach}; {content.turn}", *place_table(content.rows).lines()]
+    if content.stations:
+        lines += [f"stations of {content.clip}, in the shadow of the body:", *station_table(content.stations).lines()]
+    said = {
+        "emitters": len(constellation),
+        "rows": [asdict(row) for row in content.rows],
+        "clip": content.clip,
+        "stations": [asdict(row) for row in content.stations],
+        "page": str(page),
+    }
+    following = [] if args.clip else ["inspect", args.file, "--clip", "walking_p1_01", *mocap_words(args.mocap)]
+    return print_result(args, said, *lines, f"page: {page}", following=following)
+
+
+def _load(path: Path) -> Constellation:
+    """The constellation in a file; a bare name that no file has is a shipped one."""
+    from harness.core.input_file import names_input_file
+    from harness.core.names import check_words
+    from harness.simulate.physics.constellation import shipped_constellation
+    from harness.simulate.physics.mcf_file import read_mcf
+
+    check_words(path)
+    if path.parent == Path() and not names_input_file(path):
+        path = shipped_constellation(path.stem)
+    return load_constellation(ConstellationSettings(emitters=read_mcf(path)))
+
+
+def _content(args: argparse.Namespace, constellation: Constellation) -> CoverageContent:
+    from harness.simulate.link import TrackerConfig
+    from harness.simulate.physics.inertial import Inertial
+    from harness.simulate.physics.schedule import Schedule
+
+    extent_m = np.ptp(constellation.position_m, axis=0)
+    turn_s = len(constellation) * Schedule(Inertial().rate_hz, len(constellation)).slot_s
+    floor_m = TrackerConfig().origin_m[2]
+    x_m, y_m = plan_axes_m(constellation)
+    views = []
+    for height_m in HEIGHTS_M:
+        found = place_coverage(constellation, grid_m(x_m, y_m, np.array([floor_m - height_m])))
+        shape = len(x_m), len(y_m)
+        views.append(PlanView(height_m, x_m, y_m, found.heard.reshape(shape), found.dilution.reshape(shape)))
+    stations = _station_rows(args, constellation) if args.clip is not None else ("", ())
+    return CoverageContent(
+        name=args.file.stem,
+        emitters=f"{len(constellation)} emitters on {' x '.join(f'{each:.2f}' for each in extent_m)} m",
+        reach=f"{constellation.range_m:g} m within {np.rad2deg(constellation.cone_rad):.0f} deg of each axis",
+        turn=f"{turn_s:.3f} s for a turn of all emitters",
+        emitter_m=constellation.position_m,
+        half_m=SIDE_M / 2,
+        views=views,
+        rows=_place_rows(constellation, floor_m),
+        clip=stations[0],
+        stations=stations[1],
+        command=this_command(),
+    )
+
+
+def _place_rows(constellation: Constellation, floor_m: float) -> list[CoverageRow]:
+    """Coverage of the cube on the floor below the middle of the emitters, and of squares at heights in it."""
+    middle_m = 0.5 * (np.min(constellation.position_m, axis=0) + np.max(constellation.position_m, axis=0))
+    across_m = np.linspace(-SIDE_M / 2, SIDE_M / 2, _POINTS)
+
+    def row(place: str, heights_m: object) -> CoverageRow:
+        depths_m = floor_m - np.asarray(heights_m, dtype=float)
+        grid = grid_m(middle_m[0] + across_m, middle_m[1] + across_m, depths_m)
+        found: PlaceCoverage = place_coverage(constellation, grid)
+        return CoverageRow(place, found.share, found.fixed_share, found.median_heard, found.median_dilution)
+
+    whole = row(f"0 to {SIDE_M:g} m", np.linspace(0.0, SIDE_M, _POINTS))
+    return [whole, *(row(f"{height_m:g} m", [height_m]) for height_m in HEIGHTS_M)]
+
+
+def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tuple[str, list[StationRow]]:
+    """The name of the clip, and the coverage of each station of its performer."""
+    from harness.body.retargeting import retarget_to_own_body
+    from harness.commands.viewed_motion import open_clip
+    from harness.simulate.link import TrackerConfig
+    from harness.simulate.physics.station_coverage import station_coverage
+    from harness.simulate.simulation import exact_calibration
+
+    mounts = _mounts(args.stations or DEFAULT_STATIONS)
+    clip: Clip = open_clip(args.clip, args.mocap, args.rate)
+    body, motion = retarget_to_own_body(clip)
+    found = station_coverage(constellation, body, motion, exact_calibration(body, mounts, TrackerConfig()))
+    rows = [
+        StationRow(name, found.shares(row), found.fixed_share(row), found.median_dilution(row))
+        for row, name in enumerate(found.stations)
+    ]
+    return clip.name, rows
+
+
+def _mounts(name: str) -> "list[Mount]":
+    """The nominal mounts of a set of stations; UnknownName."""
+    from harness.experiment.clip_evaluation import mount_of
+    from harness.experiment.scenario import Station, read_station_sets
+
+    sets = read_station_sets()
+    if name not in sets:
+        raise UnknownName("set of stations", name, sets)
+    return [mount_of(station, Station(**table)) for station, table in sets[name].items()]
