@@ -1,12 +1,14 @@
 """Episodes against a plain loop, and the cases that a loop hides: ends of the recording, NaN, merging."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
-from harness.errors import BadInput
+from harness.errors import BadInput, ShapeError
 from harness.measure.episodes import find_episodes, find_excursions, find_gaps
 
 
@@ -93,3 +95,17 @@ def test_arrays_that_do_not_fit_are_refused(time_s: list[float], samples: int, m
 def test_a_negative_distance_is_refused(merge_s: float) -> None:
     with pytest.raises(BadInput, match="merge_s"):
         find_episodes(np.arange(2.0), np.zeros(2), np.zeros(2, bool), merge_s=merge_s)
+
+
+def test_without_a_wish_half_a_second_splits_an_excursion() -> None:
+    error_m = np.zeros(200)
+    error_m[[10, 58, 120, 172]] = 1.0  # 0.47 s and 0.51 s apart at 100 Hz
+    assert len(find_excursions(np.arange(200) / 100.0, error_m, 0.5).peak) == 3
+
+
+def test_records_are_immutable_and_their_arrays_agree() -> None:
+    found = find_gaps(np.arange(3.0), np.zeros(3))
+    with pytest.raises(ValueError, match="read-only"):
+        found.begin_s[0] = 1.0
+    with pytest.raises(ShapeError):
+        replace(found, peak=np.zeros(2))

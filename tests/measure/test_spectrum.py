@@ -1,5 +1,7 @@
 """The spectrum against a plain transform of segments, against known signals, and its refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.errors import BadInput
+from harness.errors import BadInput, ShapeError
 from harness.measure.spectrum import ErrorSpectrum, measure_spectrum, pool_spectra
 
 
@@ -96,3 +98,11 @@ def test_spectra_over_different_frequencies_are_refused() -> None:
 def test_a_segment_of_too_few_samples_is_refused(rate_hz: float, segment_s: float) -> None:
     with pytest.raises(BadInput, match="four samples"):
         measure_spectrum(np.zeros((80, 3)), rate_hz, segment_s=segment_s)
+
+
+def test_records_are_immutable_and_their_arrays_agree() -> None:
+    found = measure_spectrum(np.zeros((80, 1)), 40.0, segment_s=1.0)
+    with pytest.raises(ValueError, match="read-only"):
+        found.density_m2_hz[0] = 1.0
+    with pytest.raises(ShapeError):
+        replace(found, density_m2_hz=np.zeros(3))

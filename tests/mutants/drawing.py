@@ -7,7 +7,7 @@ import numpy as np
 
 from tests.mutants.operators import Mutation, mutations
 
-PACKAGES = ("simulate", "stream", "reconstruct", "score", "calibrate", "compare", "study")
+PACKAGES = ("simulate", "stream", "reconstruct", "score", "calibrate", "compare", "measure", "study")
 """Folders of `harness` whose lines are mutated."""
 
 

@@ -1,7 +1,7 @@
 """The charts of the page: spectrum, excursions, gaps and quality, each with a curve or bar for every error model."""
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _HEIGHT_IN = 3.4
 _MM2 = 1e6
 """Square millimetres in a square metre."""
+_BAND: Mapping[str, Any] = {"color": GRID, "alpha": 0.6, "linewidth": 0.0}
+"""Look of a range that episodes are held to."""
 _LEAST_SHARE = 1e-6
 """Share at which bars on a logarithmic axis begin, unless a smaller one is shown."""
 
@@ -86,13 +88,16 @@ def _excursions(comparison: ErrorModelComparison) -> Chart:
 
 def _draw_excursions(figure: "Figure", comparison: ErrorModelComparison) -> None:
     durations, peaks = figure.subplots(1, 2, sharey=True)
-    peak_range = comparison.peak_range_m
-    _draw_rates(durations, comparison.models, lambda model: model.excursion_s, comparison.duration_range_s)
-    held_to_mm = (1e3 * peak_range[0], 1e3 * peak_range[1]) if peak_range else None
-    _draw_rates(peaks, comparison.models, lambda model: 1e3 * model.excursion_peak_m, held_to_mm)
+    _draw_rates(durations, comparison.models, lambda model: model.excursion_s)
+    _draw_rates(peaks, comparison.models, lambda model: 1e3 * model.excursion_peak_m)
     if comparison.duration_range_s:
         least_s = comparison.duration_range_s[0]
-        _draw_rates(peaks, comparison.models, lambda m: 1e3 * m.excursion_peak_m[m.excursion_s >= least_s], dashes="--")
+        _draw_rates(peaks, comparison.models, lambda m: 1e3 * m.excursion_peak_m[m.excursion_s >= least_s], "--")
+        durations.axvspan(*comparison.duration_range_s, **_BAND)
+    if comparison.peak_range_m:
+        peaks.axvspan(*(1e3 * end_m for end_m in comparison.peak_range_m), **_BAND)
+    for axes in (durations, peaks):
+        _scale_rates(axes)
     durations.set_xlabel("duration, at least [s]")
     durations.set_ylabel("excursions per minute and station")
     peaks.set_xlabel("largest error, at least [mm]")
@@ -119,6 +124,7 @@ def _gaps(comparison: ErrorModelComparison) -> Chart:
 def _draw_gaps(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -> None:
     axes = figure.subplots()
     _draw_rates(axes, models, lambda model: model.gap_s)
+    _scale_rates(axes)
     axes.set_xlabel("duration, at least [s]")
     axes.set_ylabel("gaps per minute and station")
     add_legend(figure, axes)
@@ -128,17 +134,18 @@ def _draw_rates(
     axes: "Axes",
     models: Sequence[TrackerErrorStatistics],
     values_of: Callable[[TrackerErrorStatistics], Floats],
-    held_to: tuple[float, float] | None = None,
-    dashes: str = "solid",
+    dashes: str = "-",
 ) -> None:
     """Draw how many episodes of each model have at least a value, as steps; a model without any has only its name."""
     for n, model in enumerate(models):
         x, rates = rates_of_at_least(values_of(model), model)
         axes.plot(x, rates, drawstyle="steps-pre", linestyle=dashes, color=series_style(n)["color"], label=model.label)
         axes.plot(x[-1:], rates[-1:], "o", color=series_style(n)["color"], markersize=3.5)
-    if held_to:
-        axes.axvspan(*held_to, color=GRID, alpha=0.6, linewidth=0.0)
-    if any(len(values_of(model)) for model in models):
+
+
+def _scale_rates(axes: "Axes") -> None:
+    """Make both axes logarithmic; axes without any episode say so instead."""
+    if any(np.size(line.get_xdata()) for line in axes.lines):
         set_log_scale(axes, "x")
         set_log_scale(axes, "y")
     else:

@@ -85,3 +85,14 @@ def test_the_statistics_fill_a_page(tmp_path: Path) -> None:
     text = text_of(write_physics_page(tmp_path / "physics.html", comparison))
     assert "physics: 1 excursion; noise = default: 1 excursion." in text
     assert "physics: 1 gap, 1.67 % of the readings" in text
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_no_error_or_no_reading_at_all_still_fills_a_page(tmp_path: Path, lost: bool) -> None:
+    quality = np.zeros((SAMPLES, 2)) if lost else np.ones((SAMPLES, 2))
+    exact = RecordedErrors(np.arange(SAMPLES) / RATE_HZ, np.zeros((SAMPLES, 2, 3)), quality)
+    comparison = ErrorModelComparison((error_statistics("clean", "no error", [exact]),), (), "bench", 0.01, 0.5, 10.0)
+    text = text_of(write_physics_page(tmp_path / "physics.html", comparison))
+    assert f"median error [mm] {'not measured' if lost else '0.00'}" in text
+    assert f"clean: {'2 gaps, 100.00 %' if lost else '0 gaps, 0.00 %'} of the readings" in text
+    assert f"clean: {'0' if lost else '10'} segments" in text

@@ -8,7 +8,6 @@ import pytest
 
 from harness.errors import BadInput, ShapeError
 from harness.report.physics import writer
-from harness.report.physics.charts import charts, rates_of_at_least
 from harness.report.physics.truth_table import result_sentence, truth_lines
 from harness.report.physics.writer import write_physics_page
 from tests.report.fabricate_physics import ROWS, made_up, statistics, without_episodes
@@ -61,6 +60,8 @@ def test_the_summary_has_rates_per_minute_and_station(page: Path) -> None:
     assert "excursions above 10 mm, per minute 0.25 0.42" in text
     assert "median error [mm] 1.50 1.50" in text
     assert "share of the readings lost 1.00 % 1.00 %" in text
+    sizes = (f"{1e3 * np.median(model.excursion_peak_m):.1f}" for model in made_up().models)
+    assert f"median size of an excursion [mm] {' '.join(sizes)}" in text
 
 
 def test_numbers_of_the_charts(page: Path) -> None:
@@ -92,20 +93,6 @@ def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pyt
     assert "Numbers of this chart" not in text
     assert "number 30 50 30 50" in text
     assert not any(name in ("img", "svg") for name, _ in read(path).found)
-
-
-def test_rates_count_the_episodes_that_have_at_least_a_value() -> None:
-    model = replace(statistics(), station_s=120.0)
-    values, rates = rates_of_at_least(np.array([3.0, 1.0, 1.0, 2.0]), model)
-    assert values.tolist() == [1.0, 2.0, 3.0]
-    assert rates.tolist() == [2.0, 1.0, 0.5]
-    assert np.isnan(replace(model, station_s=0.0).per_minute(3))
-
-
-def test_charts_name_every_model_in_their_legend() -> None:
-    drawn = charts(made_up())
-    assert list(drawn) == ["spectrum", "excursions", "gaps", "quality"]
-    assert all(chart.svg.count(f">{name}<") == 1 for chart in drawn.values() for name in ("physics", "noise = default"))
 
 
 def test_records_that_do_not_fit_are_refused(tmp_path: Path) -> None:
