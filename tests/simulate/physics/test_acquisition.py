@@ -89,9 +89,10 @@ def test_gravity_levels_a_station_at_rest(rng: np.random.Generator) -> None:
     search = Search(np.zeros((1, 4, 12)), np.zeros(1, dtype=np.int64), np.zeros((1, 7)), np.zeros((1, 5)), np.zeros(1))
     begin_search(search, 0, 1.0)
     motion = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    add_force(search.path[0], *force, 1.0)
+    add_force(search.path[0], force[0], force[1], force[2], 1.0)
     for _ in range(80):
-        level_attitude(search, 0, motion, *rotations.rotate(motion[6:], force), 0.0125)
+        x, y, z = rotations.rotate(motion[6:], force)
+        level_attitude(search, 0, motion, x, y, z, 0.0125)
     kept = rotations.rotate(motion[6:], force)
     assert np.arctan2(np.hypot(kept[0], kept[1]), -kept[2]) < 0.01
     assert np.sqrt(search.tilt_variance[0]) < 0.02

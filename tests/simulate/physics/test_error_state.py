@@ -60,7 +60,7 @@ def test_joseph_update_equals_the_dense_one_for_any_gain(rng: np.random.Generato
     covariance, slope, noise = root @ root.T, np.zeros(15), 0.3
     slope[:9] = rng.standard_normal(9)
     column = covariance @ slope
-    total = 1.1 * (slope @ column + noise)  # a gain that is not the best one
+    total = 1.1 * float(slope @ column + noise)  # a gain that is not the best one
     rest = np.eye(15) - np.outer(column / total, slope)
     expected = rest @ covariance @ rest.T + noise * np.outer(column, column) / total**2
     update(covariance, slope[:9], column, total, noise, np.empty(15))

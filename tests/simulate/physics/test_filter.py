@@ -96,7 +96,7 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
     print(f"NEES {nees:.2f} (15), of the position {nees_of_position:.2f} (3), NIS {nis:.4f} (1)")
     count = RUNS * 2 * 240
     for value, freedom, runs in ((nees, 15, RUNS), (nees_of_position, 3, RUNS), (nis, 1, count)):
-        low, high = stats.chi2.ppf([0.025, 0.975], freedom * runs) / runs
+        low, high = (float(stats.chi2.ppf(share, freedom * runs)) / runs for share in (0.025, 0.975))
         assert low < value < high, (freedom, value, low, high)
 
 
