@@ -20,6 +20,7 @@ TICK_HZ = 400.0
 EMITTER_M: Floats = np.array([[x, y, -2.5] for x in (-1.2, 0.0, 1.2) for y in (-1.2, 0.1, 1.2)])
 NORMAL: Floats = np.tile([0.0, 0.0, 1.0], (9, 1))
 FACING_UP: Floats = np.array([0.0, 1.0, 0.0, 0.0])
+RANGE_NOISE_M = Fusion().range_noise_m
 EXACT = Fusion(range_scale=0.0, survey_m=0.0, inertial_scale=0.0)
 
 
@@ -43,7 +44,7 @@ class FreeStation:
     range_m: Floats
     """(F, 2)."""
     sigma_m: Floats
-    """(F, 2) standard deviation of a range by the law of `level`, at 4 mm."""
+    """(F, 2) standard deviation of a range by the law of `level`, for the default noise."""
 
 
 def free_station(
@@ -89,7 +90,7 @@ def free_station(
             cosine = away[f, 2] / distance[f, m]
             facing = -float(np.sum(axis[f] * away[f])) / distance[f, m]
             level = level_db(distance[f, m], cosine, facing, sound.absorption_db_per_m)
-            sigma[f, m] = 0.004 * noise_factor(level, sound.absorption_db_per_m)
+            sigma[f, m] = RANGE_NOISE_M * noise_factor(level, sound.absorption_db_per_m)
     return FreeStation(
         position,
         turn,
@@ -112,7 +113,7 @@ def exact_inertial() -> Inertial:
 
 
 def noisy(
-    station: FreeStation, seed: int, inertial: Inertial, range_noise_m: float = 0.004
+    station: FreeStation, seed: int, inertial: Inertial, range_noise_m: float = RANGE_NOISE_M
 ) -> tuple[FreeStation, Floats]:
     """The station with white noise, a turn-on bias that walks, and noise of ranges; and the biases (5 F + 1, 6)."""
     rng = generator(seed, "noise")
@@ -123,7 +124,7 @@ def noisy(
         bias = errors.turn_on * rng.standard_normal(3) + walk
         measured.append(true + bias[:-1] * dt + errors.white * np.sqrt(dt) * rng.standard_normal((count, 3)))
         biases.append(bias)
-    noise = station.sigma_m * range_noise_m / 0.004 * rng.standard_normal(station.sigma_m.shape)
+    noise = station.sigma_m * range_noise_m / RANGE_NOISE_M * rng.standard_normal(station.sigma_m.shape)
     out = replace(station, angle_rad=measured[0], gain_m_s=measured[1], range_m=station.range_m + noise)
     return out, np.concatenate(biases, axis=1)
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from harness.core.arrays import Floats
-from tests.simulate.physics.free_station import EMITTER_M, TICK_HZ
+from tests.simulate.physics.free_station import EMITTER_M, RANGE_NOISE_M, TICK_HZ
 
 DT, TICKS = 1.0 / TICK_HZ, 5
 GRAVITY: Floats = np.array([0.0, 0.0, 9.81])
@@ -75,7 +75,7 @@ class ReferenceFilter:
             row[:3], row[3:6], row[6:9] = n, -lag * n, n @ (-cross(arm) + 0.5 * lag**2 * cross(force))
             cardioid = 0.5 - 0.5 * float(facing.apply([0.0, 0.0, 1.0]) @ n)
             amplitude = n[2] * cardioid / distance * 10.0 ** (-ABSORPTION * (distance - 2.0) / 20.0)
-            noise = (0.004 * np.clip(0.5 / amplitude, 0.5, 4.0)) ** 2
+            noise = (RANGE_NOISE_M * np.clip(0.5 / amplitude, 0.5, 4.0)) ** 2
             noise += (self.range_scale * distance) ** 2 + self.survey**2
             innovation = measured - distance - row @ error
             total = row @ self.covariance @ row + noise
