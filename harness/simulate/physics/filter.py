@@ -59,6 +59,7 @@ _FIX_SIGMA_M, _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.1, 0.3, 0.1
 _CONFIRMED_NIS = 2.0
 """Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
 _ATTEMPT_SLOTS = 8
+"""Slots between two attempts of a fix; they must not follow the turn of the emitters [choice]."""
 
 
 class FilterModel(NamedTuple):
@@ -102,7 +103,7 @@ class FilterState(NamedTuple):
     """(S, 2, 6) offsets of enhancement modes 1 and 2."""
     status: Ints
     """(S, 6) LOST, CONFIRMING or TRACKING; whether the position is frozen; slots since an accepted range; accepted and
-    rejected ranges since the fix; slots since the fix."""
+    rejected ranges since the fix; slots since the fix, or since the last attempt of one."""
     counts: Ints
     """(2, S, slots of a second) ranges received and rejected, in a ring."""
     report: Floats
@@ -385,8 +386,9 @@ def search_slot(
     covariance = state.covariance[s]
     drift = covariance[9, 9] + covariance[10, 10] + covariance[11, 11]
     search.tilt_variance[s] += slot_s * (model.noise[0] + drift * slot_s * search.gravity[s, 4])
-    if received == 0 or slot % _ATTEMPT_SLOTS != 0:
+    if received == 0 or state.status[s, 5] < _ATTEMPT_SLOTS:
         return
+    state.status[s, 5] = 0
     now = motion[TICKS_PER_SLOT].copy()
     trial = covariance.copy()
     if not fix(ranging, search, s, model.window_s, now, trial):

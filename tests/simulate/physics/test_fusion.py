@@ -215,3 +215,12 @@ def test_enhancement_turns_jumps_into_slopes() -> None:
     assert steps[2] < 0.5 * steps[0]
     apart = np.linalg.norm(outputs.position_m[settled, 0, 1] - outputs.position_m[settled, 0, 0], axis=-1)
     assert 0.0 < apart.max() < 0.05
+
+
+@pytest.mark.parametrize("silent_after", range(8))
+def test_a_fix_comes_whichever_slots_are_heard(silent_after: int) -> None:
+    """Every eighth slot is silent. Attempts must not fall on those slots alone, as with a turn of 36 emitters."""
+    measured, _ = noisy(free_station(4.0, 3), 3, Inertial())
+    measured.range_m[silent_after::8] = np.nan
+    outputs = run(new_filter(fusion=Fusion()), measured)
+    assert quality(outputs)[-1] > 0.0
