@@ -205,6 +205,18 @@ def test_a_performer_who_has_turned_goes_back_without_a_jump(boxer: tuple[Body, 
     assert 0.99 < products.min() <= products.max() < 1.01
 
 
+def test_a_take_of_two_frames_has_a_return(boxer: tuple[Body, BodyMotion]) -> None:
+    """Shorter than the time for which it goes on into its next round: it stops, and jumps nowhere."""
+    body, take = boxer
+    short = Trajectory(body, BodyMotion("short", "p1", "test", "", take.rate_hz, take.qpos[600:602]))
+    back = short.with_return(2.0)
+    assert back.ends_s > 2.4
+    for moment_s in (0.3 + short.duration_s, 2.0, 2.0 + short.duration_s):
+        place, speed = jump(back, moment_s)
+        assert place < 1e-7
+        assert speed < 1e-6
+
+
 @pytest.mark.parametrize("make", ["lead_in", "lead_out", "return"])
 def test_too_short_rests_are_refused(trajectory: Trajectory, make: str) -> None:
     with pytest.raises(BadInput, match="too short"):
