@@ -27,7 +27,7 @@ from harness.simulate.resting_ends import (
 
 OVERLAP_S = 0.05
 """Time for which a take goes on into its next round [s]: longer than what a device does at once."""
-_RETURN_HZ = 120.0
+_RETURN_HZ, _LAST_REST_S = 120.0, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class Trajectory:
         """The take and a way back to its first position and velocity, where it begins again at `loop_s` [s].
 
         The performer stops, goes back to the first pose in a minimum-jerk motion, and starts as in `with_lead_in`. The
-        beginning of the take follows once more, for `OVERLAP_S`. BadInput when no time is left for the way back.
+        beginning of the take follows once more, for `OVERLAP_S`, and a stop. BadInput when the loop is too short.
         """
         from_s, to_s = self.duration_s + STOP_S, loop_s - START_S
         if not to_s > from_s:
@@ -120,7 +120,8 @@ class Trajectory:
         again = int(np.searchsorted(self._take.x[1:-1], OVERLAP_S)) + 1
         pieces = [stop_piece(self._take), back.c, sign * start_piece(self._take), sign * self._take.c[:, :again]]
         ends_s = np.concatenate([back.x, [loop_s], loop_s + self._take.x[1 : again + 1]])
-        return self._with_spline(extended(self._spline, np.concatenate(pieces, axis=1), ends_s))
+        looped = extended(self._spline, np.concatenate(pieces, axis=1), ends_s)
+        return self._with_spline(with_rest_after(looped, _LAST_REST_S))
 
     def _with_spline(self, spline: PPoly) -> "Trajectory":
         out = copy(self)

@@ -200,8 +200,21 @@ def test_a_performer_who_has_turned_goes_back_without_a_jump(boxer: tuple[Body, 
     time_s = np.arange(trajectory.duration_s, loop_s + 0.04, 1e-3)
     back = trajectory.with_return(loop_s)
     assert np.abs(back.qvel(time_s)[:, 3:6]).max() < 10.0
-    length = np.linalg.norm(back.spline(time_s)[:, 3:7], axis=1)
-    assert 0.99 < length.min() <= length.max() < 1.01
+    turn = back.spline(time_s)[:, 3:7]
+    products = np.sum(turn[1:] * turn[:-1], axis=1)
+    assert 0.99 < products.min() <= products.max() < 1.01
+
+
+def test_a_take_of_two_frames_has_a_return(boxer: tuple[Body, BodyMotion]) -> None:
+    """Shorter than the time for which it goes on into its next round: it stops, and jumps nowhere."""
+    body, take = boxer
+    short = Trajectory(body, BodyMotion("short", "p1", "test", "", take.rate_hz, take.qpos[600:602]))
+    back = short.with_return(2.0)
+    assert back.ends_s > 2.4
+    for moment_s in (0.3 + short.duration_s, 2.0, 2.0 + short.duration_s):
+        place, speed = jump(back, moment_s)
+        assert place < 1e-7
+        assert speed < 1e-6
 
 
 @pytest.mark.parametrize("make", ["lead_in", "lead_out", "return"])
