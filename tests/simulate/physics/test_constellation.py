@@ -35,7 +35,7 @@ def test_cave_has_the_emitters_of_the_emulator() -> None:
 
 
 def test_hall_is_twelve_bars_of_three_that_face_down() -> None:
-    hall = load_constellation(ConstellationSettings())
+    hall = load_constellation(ConstellationSettings(name="hall"))
     assert len(hall) == 36
     np.testing.assert_array_equal(hall.normal, np.tile(DOWN, (36, 1)))
     by_bar = np.argsort(hall.identity)
@@ -120,7 +120,7 @@ def test_shifting_moves_every_emitter() -> None:
 
 
 def test_each_emitter_has_its_own_survey_error() -> None:
-    hall = load_constellation(ConstellationSettings())
+    hall = load_constellation(ConstellationSettings(name="hall"))
     true = hall.surveyed(0.01, 7, "morning")
     error_m = true.position_m - hall.position_m
     assert 0.007 < np.std(error_m) < 0.013

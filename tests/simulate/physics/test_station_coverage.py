@@ -85,7 +85,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
     sets = read_station_sets()
     stations = {**sets["liu2011"], "pelvis": sets["kim2012"]["pelvis"]}
     mounts = [mount_of(name, Station(**station)) for name, station in stations.items()]
-    hall, out = load_constellation(ConstellationSettings()), {}
+    hall, out = load_constellation(ConstellationSettings(name="hall")), {}
     for performer in synthetic.performer_names():
         parts = []
         for take in range(1, 7):
