@@ -55,6 +55,7 @@ def test_quality_has_classes_that_include_their_upper_end() -> None:
     counts = 8.0 * found.quality_share
     np.testing.assert_allclose(counts, [1, 2, 1, 0, 0, 1, 0, 0, 0, 0, 3])
     np.testing.assert_allclose(found.class_error_m[:, 0], [0.0015, 0.003, *[np.nan] * 2, 0.004, *[np.nan] * 4, 0.006])
+    np.testing.assert_allclose(found.error_m, np.quantile([1, 2, 3, 4, 5, 6, 7], [0.5, 0.95, 0.99]) / 1000.0)
     assert found.quality_edges.tolist() == pytest.approx([n / 10 for n in range(11)])
 
 

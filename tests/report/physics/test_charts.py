@@ -116,6 +116,10 @@ def test_bars_have_the_share_of_each_class(figures: dict[str, Figure]) -> None:
     tops = [bar.get_y() + bar.get_height() for bar in bars]
     np.testing.assert_allclose(tops, [1.0] * 10 + [90.0])
     assert min(bar.get_y() for bar in bars) < 1.0
+    middles = np.array([[bar.get_x() + 0.5 * bar.get_width() for bar in each] for each in shares.containers])
+    np.testing.assert_allclose(middles.mean(axis=0), [-1.0, *np.arange(0.5, 10.0)])  # bars of one class share a place
+    np.testing.assert_allclose(middles[1] - middles[0], bars[0].get_width())
+    assert 2.0 * bars[0].get_width() < 1.0
     assert [text.get_text() for text in shares.get_xticklabels()] == ["lost", "0", "0.2", "0.4", "0.6", "0.8", "1"]
     np.testing.assert_allclose(points(errors.lines[0])[0], np.arange(0.05, 1.0, 0.1))
     np.testing.assert_allclose(points(errors.lines[0])[1], 1e3 * statistics().class_error_m[:, 0])
@@ -146,5 +150,10 @@ def test_rates_count_the_episodes_that_have_at_least_a_value() -> None:
 
 
 def test_charts_name_every_model_in_their_legend(figures: dict[str, Figure]) -> None:
+    assert all(
+        "for physics and noise = default;" in chart.alt
+        for name, chart in charts(made_up()).items()
+        if name != "quality"
+    )
     for figure in figures.values():
         assert [text.get_text() for text in figure.legends[0].get_texts()] == ["physics", "noise = default"]

@@ -49,6 +49,9 @@ def test_each_chart_has_an_alternative_text_and_its_numbers(page: Path) -> None:
     text = text_of(page)
     assert text.count("Numbers of this chart") == 4
     assert "made-up errors of physics" in text
+    assert all(
+        f"{title}. " in text.replace(" .", ".") for title in ("Spectrum of the position error", "Duration of gaps")
+    )
     assert "(physics: 600 segments; noise = default: 600 segments)" in text
     assert "physics: 30 excursions; noise = default: 50 excursions." in text
     assert text.count("begins or ends within count with the part that was seen") == 2
@@ -59,6 +62,7 @@ def test_the_summary_has_rates_per_minute_and_station(page: Path) -> None:
     assert "minutes, summed over stations 120.0 120.0" in text
     assert "excursions above 10 mm, per minute 0.25 0.42" in text
     assert "median error [mm] 1.50 1.50" in text
+    assert "gaps per minute 0.25 0.42" in text
     assert "share of the readings lost 1.00 % 1.00 %" in text
     sizes = (f"{1e3 * np.median(model.excursion_peak_m):.1f}" for model in made_up().models)
     assert f"median size of an excursion [mm] {' '.join(sizes)}" in text
@@ -68,6 +72,8 @@ def test_numbers_of_the_charts(page: Path) -> None:
     text = text_of(page)
     assert "0.1 100 100" in text  # the spectrum: 1e-6 m^2/Hz over the square of 0.1 Hz, in mm^2/Hz
     assert "number 30 50 30 50" in text
+    longest = (f"{model.excursion_s.max():.2f}" for model in made_up().models)
+    assert f"longest or largest {' '.join(longest)}" in text
     assert "lost 1.00 % 1.00 % – – – –" in text
     assert "0 to 0.1 1.00 % 1.00 % not measured not measured not measured not measured" in text
     assert "0.9 to 1 90.00 % 90.00 % 2.0 4.0 2.0 4.0" in text
@@ -102,3 +108,7 @@ def test_records_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         replace(statistics(), quality_share=np.zeros(10))
     with pytest.raises(ShapeError, match="excursion"):
         replace(statistics(), excursion_peak_m=np.zeros(2))
+    with pytest.raises(ShapeError, match="density_m2_hz"):
+        replace(statistics(), density_m2_hz=np.zeros(2))
+    with pytest.raises(ShapeError, match="error_m"):
+        replace(statistics(), error_m=np.zeros(2))
