@@ -11,7 +11,8 @@ from harness.core.calibration import Calibration
 from harness.simulate.noise import Noise
 from harness.simulate.physics.body_motion import BodyMotionSource
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
-from harness.simulate.physics.physical_tracker import FilterReadings, PhysicalTracker, lead_in_s
+from harness.simulate.physics.filter_readings import FilterReadings
+from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
 from harness.simulate.physics.room import PlacedRoom, check_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight

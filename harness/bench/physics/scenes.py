@@ -150,7 +150,7 @@ def _cover(tracker: PhysicalTracker, covered_s: tuple[float, float]) -> None:
         covered = (time_s >= covered_s[0]) & (time_s < covered_s[1])
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))
 
-    tracker.ranging.measure = measure_covered  # type: ignore[method-assign,assignment]
+    tracker.ranging.measure = measure_covered  # type: ignore[method-assign]
 
 
 def _errors(time_s: Floats, readings: FilterReadings, true: TrackerMotion) -> StationErrors:

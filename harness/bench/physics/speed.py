@@ -56,8 +56,8 @@ def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
     rows = []
     for count, target in ((6, ">= 20"), (12, ">= 10")):
         parts: tuple[Callable[[], object], ...] = (
-            lambda count=count: simulate(body, take, count, PHYSICAL, seed),  # type: ignore[misc]
-            lambda count=count: simulate(body, take, count, noise_preset("default"), seed),  # type: ignore[misc]
+            lambda count=count: simulate_stations(body, take, count, PHYSICAL, seed),  # type: ignore[misc]
+            lambda count=count: simulate_stations(body, take, count, noise_preset("default"), seed),  # type: ignore[misc]
             lambda: _pose_all(Kinematics(body), np.asarray(take.qpos)),
         )
         parts[0]()
@@ -76,7 +76,7 @@ def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
     return [*rows, *_memory_rows(seed), _block_row(body, take, seed)]
 
 
-def simulate(body: Body, take: BodyMotion, count: int, noise: Noise, seed: int) -> Simulation:
+def simulate_stations(body: Body, take: BodyMotion, count: int, noise: Noise, seed: int) -> Simulation:
     """Simulate the first `count` stations on a line that is fast enough for twelve."""
     return simulate_tracker(body, take, MOUNTS[:count], TrackerConfig(baud=_BAUD), noise, seed=seed)
 
@@ -109,7 +109,7 @@ def _block_row(body: Body, take: BodyMotion, seed: int) -> BenchmarkRow:
     try:
         for slots in _BLOCKS:
             physical_tracker.BLOCK_SLOTS = slots
-            digests.add(hashlib.sha256(simulate(body, take, 6, PHYSICAL, seed).wire.data).hexdigest())
+            digests.add(hashlib.sha256(simulate_stations(body, take, 6, PHYSICAL, seed).wire.data).hexdigest())
     finally:
         physical_tracker.BLOCK_SLOTS = default
     sizes = ", ".join(map(str, _BLOCKS))
@@ -138,5 +138,5 @@ def _pose_all(kinematics: Kinematics, poses: np.ndarray) -> None:
 if __name__ == "__main__":
     _kind, _seconds, _seed = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
     _noise = PHYSICAL if _kind == "physics" else noise_preset(_kind)
-    simulate(*_boxing(_seed, _seconds), 6, _noise, _seed)
+    simulate_stations(*_boxing(_seed, _seconds), 6, _noise, _seed)
     print(peak_bytes())

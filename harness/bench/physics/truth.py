@@ -5,6 +5,7 @@ Every row is computed with the default settings and the same seeds. A row that m
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -125,8 +126,8 @@ def speed_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     rms_mm: dict[float, dict[str, float | None]] = {}
     for speed in SPEEDS_M_S:
         rms_mm[speed] = {str(seed): 1e3 * _at_speed(seed, speed).rms_m for seed in seeds}
-    steps = [compare_paired(rms_mm[fast], rms_mm[slow]) for slow, fast in zip(SPEEDS_M_S, SPEEDS_M_S[1:], strict=False)]
-    means = ", ".join(f"{np.mean(list(by_seed.values())):.2f}" for by_seed in rms_mm.values())  # type: ignore[arg-type]
+    steps = [compare_paired(rms_mm[fast], rms_mm[slow]) for slow, fast in pairwise(SPEEDS_M_S)]
+    means = ", ".join(f"{np.mean(list(by_seed.values())):.2f}" for by_seed in rms_mm.values())
     return [
         TruthRow(
             "four speeds, rest to fast",

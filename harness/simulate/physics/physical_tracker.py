@@ -120,7 +120,8 @@ class _Hearing:
         self._ranges, self._echoes = np.zeros(stations), np.zeros(stations)
 
     def add(self, first_slot: int, ranges: Ranges) -> None:
-        heard, emitters = ranges.direct.any(axis=2), self._last.shape[1]
+        heard: Bools = np.any(ranges.direct, axis=2)
+        emitters = self._last.shape[1]
         for k, emitter in enumerate(ranges.emitter.tolist()):
             self._last[heard[k], emitter] = first_slot + k
             if first_slot + k >= 0:
