@@ -7,6 +7,7 @@ from harness.bench.leak_check import bench_leak_check
 from harness.bench.live_viewer import bench_live_viewer
 from harness.bench.load import bench_load
 from harness.bench.neighbour_search import bench_index
+from harness.bench.physics.speed import bench_physics
 from harness.bench.regression_gate import bench_regression_gate
 from harness.bench.rejected_readings import bench_rejected_readings
 from harness.bench.rows import BenchmarkRow
@@ -47,6 +48,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "startup": lambda seed, large, runs: bench_startup(),
     "load": lambda seed, large, runs: bench_load(seed),
     "stream": lambda seed, large, runs: bench_stream(seed),
+    "physics": lambda seed, large, runs: bench_physics(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "serve": lambda seed, large, runs: bench_serve(seed, runs=runs),
     "view": lambda seed, large, runs: bench_live_viewer(seed, runs=runs),

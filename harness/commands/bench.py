@@ -1,8 +1,9 @@
-"""The verb `bench`: measure speed, or the accuracy of a method against stored errors."""
+"""The verb `bench`: measure speed, a method's accuracy against stored errors, or the physics against published figures."""
 
 import argparse
 import sys
 from contextlib import redirect_stdout
+from dataclasses import asdict
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
@@ -17,13 +18,19 @@ _ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save"
 def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
-    text = "methods, ik, index, wire, serve, view, stream, load, gate, sweep, startup (default: all), or accuracy"
+    text = (
+        "methods, ik, index, wire, serve, view, stream, physics, load, gate, sweep, startup (default: all), or accuracy"
+    )
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
     verb.add_argument("--runs", type=positive_int, metavar="N", help="wire, serve, view: number of runs (default 1)")
+    text = "physics: hold the simulated errors to published figures and write a page, instead of speed"
+    verb.add_argument("--truth", action="store_true", help=text)
     verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default expert_map)")
-    verb.add_argument("--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5)")
+    verb.add_argument(
+        "--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5); --truth: (default 20)"
+    )
     text = "accuracy: clips computed at the same time (default 1)"
     verb.add_argument("--jobs", type=positive_int, metavar="N", help=text)
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
@@ -34,6 +41,8 @@ def add_bench(verbs: Verbs) -> None:
 
 
 def run_bench(args: argparse.Namespace) -> Outcome:
+    if args.truth:
+        return _bench_truth(args)
     if ACCURACY in args.what:
         return _bench_accuracy(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
@@ -55,6 +64,33 @@ def _bench_speed(args: argparse.Namespace) -> Outcome:
     return print_result(
         args, content, format_rows(rows), *left_out, outcome=Outcome.INCOMPLETE if left_out else Outcome.PASS
     )
+
+
+def _bench_truth(args: argparse.Namespace) -> Outcome:
+    """Print the truth table of the physics and write its page; a row that is missed is no error."""
+    from harness.bench.physics.comparison import compare_error_models
+    from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
+    from harness.bench.physics.truth import SEEDS, truth_rows
+    from harness.report.physics.error_comparison import ErrorModelComparison
+    from harness.report.physics.truth_table import result_sentence, truth_lines
+    from harness.report.physics.writer import write_physics_page
+
+    given = [name for name in _ACCURACY_FLAGS if name not in ("seeds", "out") and getattr(args, name) is not None]
+    if args.what != ["physics"] or args.large or args.runs or args.seed is not None or given:
+        raise BadInput(
+            "--truth is for physics alone, with --seeds N and --out FOLDER.", "Run: harness bench physics --truth."
+        )
+    if args.seeds and args.seeds > len(SEEDS):
+        raise BadInput(f"--seeds {args.seeds}: there are {len(SEEDS)} seeds.", "Name fewer.")
+    seeds, out = SEEDS[: args.seeds], args.out or Path("results") / "physics"
+    with ProgressBar("rows") as progress:
+        rows = truth_rows(seeds, progress)
+        models = compare_error_models(seeds, progress)
+    comparison = ErrorModelComparison(models, tuple(rows), this_command(), LIMIT_M, MERGE_S, SEGMENT_S)
+    page = write_physics_page(out / "report.html", comparison)
+    content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "page": str(page)}
+    lines = [*truth_lines(rows), result_sentence("the physical simulation", rows), f"report: {page}"]
+    return print_result(args, content, *lines)
 
 
 def _bench_accuracy(args: argparse.Namespace) -> Outcome:
