@@ -1,4 +1,4 @@
-"""The verb `bench`: measure speed, a method's accuracy against stored errors, or the physics against published figures."""
+"""The verb `bench`: measure speed, accuracy against stored errors, or the physics against published figures."""
 
 import argparse
 import sys

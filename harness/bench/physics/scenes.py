@@ -1,5 +1,6 @@
 """Scenes for `harness bench physics --truth`: free stations and a performer under the default constellation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,14 +78,19 @@ class StationErrors:
 
 def rest_source(seconds: float, physics: Physics, *, pitch_rad: float = 0.0) -> FreeMotionSource:
     """A station that rests below the middle of the constellation, its z axis at an angle to the vertical [rad]."""
-    time_s = np.array([0.0, seconds / 2.0, seconds])
     turn = rotations.multiply(FACING_UP, rotations.exp(np.array([0.0, pitch_rad, 0.0])))
-    place = np.array(_MIDDLE_M)
+    return resting_source(middle_m(), turn, seconds, physics)
+
+
+def resting_source(
+    position_m: Floats, tracker_from_station: Floats, seconds: float, physics: Physics
+) -> FreeMotionSource:
+    """A station that rests at a position (3,) with an orientation (4,)."""
     return FreeMotionSource(
         (STATION,),
-        time_s,
-        np.broadcast_to(place, (3, 1, 3)),
-        np.broadcast_to(turn, (3, 1, 4)),
+        np.array([0.0, seconds / 2.0, seconds]),
+        np.broadcast_to(position_m, (3, 1, 3)),
+        np.broadcast_to(tracker_from_station, (3, 1, 4)),
         warm_up_s=lead_in_s(physics),
     )
 
@@ -138,6 +144,16 @@ def track_free_station(
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
     readings = tracker.measure(time_s[:, None])
     return _errors(time_s, readings, truth.advance(time_s))
+
+
+def join_errors(parts: Sequence[StationErrors]) -> StationErrors:
+    """The errors of several recordings of a station as one; times begin anew with each."""
+    return StationErrors(
+        np.concatenate([part.time_s for part in parts]),
+        np.concatenate([part.error_m for part in parts]),
+        np.concatenate([part.tilt_rad for part in parts]),
+        np.concatenate([part.quality for part in parts]),
+    )
 
 
 def _cover(tracker: PhysicalTracker, covered_s: tuple[float, float]) -> None:

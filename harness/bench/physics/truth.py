@@ -12,8 +12,10 @@ import numpy as np
 from harness.bench.physics.scenes import (
     StationErrors,
     free_source,
+    join_errors,
     middle_m,
     rest_source,
+    resting_source,
     scaled_position_m,
     track_free_station,
     track_hand,
@@ -34,6 +36,7 @@ SEEDS = tuple(range(1, 21))
 SPEEDS_M_S = (0.0, 0.5, 1.5, 4.0)
 """Mean speeds of the row on speed [m/s]; at every speed but 0 the station moves along the same path."""
 _PATH_M, _REST_S, _HAND_S = 60.0, 60.0, 30.0
+_PLACES, _PLACE_S = 20, 5.0
 _FREE_S, _FREE_M_S = 600.0, 0.5
 """Length and mean speed of the free motion [s], [m/s]."""
 EXCURSION_M, LARGEST_EXCURSION_M, _LARGEST_M = 0.01, 0.04, 0.10
@@ -190,14 +193,9 @@ def covered_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     ratios, silent, errors_mm = [], 0, []
     for seed in seeds:
         seconds = until_s + 1.0
-        errors = track_free_station(
-            rest_source(seconds, physics),
-            rest_source(seconds, physics),
-            seconds,
-            physics,
-            seed,
-            covered_s=(_COVERED_FROM_S, until_s),
-        )
+        sources = [free_source(seed, seconds, _FREE_M_S, physics) for _ in range(2)]
+        covered_s = (_COVERED_FROM_S, until_s)
+        errors = track_free_station(sources[0], sources[1], seconds, physics, seed, covered_s=covered_s)
         first, last = (int(np.searchsorted(errors.time_s, at)) for at in (_COVERED_FROM_S, until_s - 1e-6))
         last = min(last, len(errors.time_s) - 1)
         leak_m = 0.5 * GRAVITY_M_S2 * np.sin(errors.tilt_rad[first]) * _COVERED_S**2
@@ -247,10 +245,19 @@ def _free(seed: int, physics: Physics) -> StationErrors:
 
 
 def _at_speed(seed: int, speed_m_s: float) -> StationErrors:
+    """Errors along a path, or at rest at places of the same path."""
     physics = without_shadow(Physics())
-    seconds = _PATH_M / speed_m_s if speed_m_s else _REST_S
-    sources = [free_source(seed, seconds, speed_m_s, physics) for _ in range(2)]
-    return track_free_station(sources[0], sources[1], seconds, physics, seed)
+    if speed_m_s:
+        seconds = _PATH_M / speed_m_s
+        sources = [free_source(seed, seconds, speed_m_s, physics) for _ in range(2)]
+        return track_free_station(sources[0], sources[1], seconds, physics, seed)
+    path = free_source(seed, _PATH_M, 1.0, physics).advance(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
+    parts = []
+    for place in range(_PLACES):
+        pose = path.position_m[place, 0], path.tracker_from_station[place, 0]
+        sources = [resting_source(*pose, _PLACE_S, physics) for _ in range(2)]
+        parts.append(track_free_station(sources[0], sources[1], _PLACE_S, physics, seed))
+    return join_errors(parts)
 
 
 def _excursions(errors: StationErrors) -> list[float]:
