@@ -52,6 +52,8 @@ _CONFIRMING_REJECTS = 0.3
 """Share of rejected ranges that refutes one [choice]."""
 _FEWEST_JUDGED = 10
 _COAST_SIGMA_M = 0.5
+_CLIPPED_SHARE = 0.3
+"""Standard deviation of what a sensor at its limit leaves out, as a share of the limit [choice]."""
 _CORRELATION_S = 0.2
 """Time over which a motion keeps its direction, and so the error of scale and misalignment its sign [s] [choice]."""
 _FIX_SIGMA_M, _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.1, 0.3, 0.1
@@ -74,6 +76,8 @@ class FilterModel(NamedTuple):
     bias_variance: Floats
     """(2,) variances of the biases at switch-on."""
     inertial_scale: float
+    limit: Floats
+    """(2,) largest values of gyroscopes [rad/s] and accelerometers [m/s^2]."""
     sigma_limit_m: float
     reject_share: float
     coast_slots: int
@@ -173,7 +177,7 @@ def advance(
                 write_record(model, state, s, k, turn, acceleration, outputs, record)
                 record += 1
             propagate(state.covariance[s], transition, TICKS_PER_SLOT * model.tick_s, scratch)
-            add_slot_noise(model, state.covariance[s], angles, force)
+            add_slot_noise(model, state.covariance[s], angles, force, inertia)
             emitter = slot % len(ranging.emitter_m)
             if state.status[s, 0] == LOST:
                 search_slot(model, ranging, state, search, s, slot, emitter, range_m[f, s], angles, force)
@@ -219,9 +223,12 @@ def predict_slot(
 
 
 @compiled
-def add_slot_noise(model: FilterModel, covariance: Floats, angles: Floats, force: Floats) -> None:
+def add_slot_noise(
+    model: FilterModel, covariance: Floats, angles: Floats, force: Floats, inertia: tuple[Floats, Floats]
+) -> None:
     """Add the noise of the sensors, and that of scale and misalignment, which grows with the motion of the slot.
 
+    A sensor at its limit measures too little, by an unknown part of the limit.
     Such an error keeps its sign while the motion goes on, so its density is its variance times a correlation time.
     Where the station turns, gravity changes its place among the axes, and so the accelerometers' apparent bias.
     """
@@ -238,7 +245,22 @@ def add_slot_noise(model: FilterModel, covariance: Floats, angles: Floats, force
     density[0] += scale * turn
     density[1] += scale * change
     density[3] += scale * turn * GRAVITY_M_S2**2
+    for sensor in range(2):
+        clipped = count_at_limit(inertia[sensor], model.limit[sensor] * model.tick_s) / TICKS_PER_SLOT
+        density[sensor] += clipped * duration * (_CLIPPED_SHARE * model.limit[sensor]) ** 2
     add_noise(covariance, duration, density)
+
+
+@compiled
+def count_at_limit(increments: Floats, limit: float) -> int:
+    """Number of increments (5, 3) with an axis at its limit."""
+    total = 0
+    for k in range(len(increments)):
+        clipped = False
+        for i in range(3):
+            clipped = clipped or abs(increments[k, i]) >= (1.0 - 1e-9) * limit
+        total += clipped
+    return total
 
 
 @compiled

@@ -115,6 +115,7 @@ class FusionFilter:
             ),
             bias_variance=np.array([_bias_variance(gyroscope), _bias_variance(accelerometer)]),
             inertial_scale=fusion.inertial_scale,
+            limit=np.array([gyroscope.limit, accelerometer.limit]),
             sigma_limit_m=fusion.sigma_limit_m,
             reject_share=fusion.reject_share,
             coast_slots=int(fusion.coast_s / slot_s),

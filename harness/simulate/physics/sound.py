@@ -39,7 +39,7 @@ class Sound:
     """Time after which the correlation of that speed is 1/e [s] [choice]."""
     bursts_per_min: Annotated[float, Range(0.0, 600.0)] = 2.0
     """Mean number of bursts of noise in the band, such as jingling keys (docs/is900.md 13.3) [choice]."""
-    burst_s: Annotated[tuple[float, float], Range(0.0, 60.0, ascending=True)] = (0.05, 0.3)
+    burst_s: Annotated[tuple[float, float], Range(0.0, 60.0, ascending=True)] = (0.02, 0.1)
     """Shortest and longest burst [s] [choice]."""
     microphones_m: tuple[Point, ...] = ((0.0, 0.03, 0.01), (0.0, -0.03, 0.01))
     """Positions of the two microphones in the station's axes [m]. The manual has two (docs/is900.md 7). They lie across
