@@ -79,7 +79,7 @@ def rest_row(seeds: tuple[int, ...]) -> list[TruthRow]:
             "static, spread of 3-D position",
             "1.0 to 2.0 mm",
             f"median {middle:.2f} mm, {spread_mm.min():.2f} to {spread_mm.max():.2f} mm",
-            1.0 <= middle <= 2.0,
+            bool(1.0 <= middle <= 2.0),
             "about 1.5 mm (Gilson et al. 2006)",
             f"one station at rest for {_REST_S:.0f} s, {len(seeds)} seeds",
         )
@@ -180,7 +180,7 @@ def temperature_row(seeds: tuple[int, ...]) -> list[TruthRow]:
             "3 K wrong",
             "scale error of arithmetic within 20 %",
             f"{middle:.2f} times the {1e3 * size_m:.1f} mm of arithmetic, {along.min():.2f} to {along.max():.2f}",
-            abs(middle - 1.0) <= 0.2,
+            bool(abs(middle - 1.0) <= 0.2),
             "0.17 % of a range per K (arithmetic)",
             "displacement at rest; arithmetic is least squares with the same ranges",
         )
@@ -209,14 +209,14 @@ def covered_row(seeds: tuple[int, ...]) -> list[TruthRow]:
             "all emitters covered for 2 s: error",
             "median within a factor 2 of 0.5 g sin(own tilt) t²",
             f"median {middle:.2f} times; {np.median(errors_mm):.0f} mm",
-            0.5 <= middle <= 2.0,
+            bool(0.5 <= middle <= 2.0),
             "3.4 cm at a tilt of 0.1 deg (arithmetic)",
         ),
         TruthRow(
             "the same: quality after 2 s",
             f"0 in {len(seeds)} of {len(seeds)} seeds",
             f"0 in {silent}",
-            silent == len(seeds),
+            bool(silent == len(seeds)),
         ),
     ]
 
@@ -284,7 +284,7 @@ def _rms_with_losses_m(errors: StationErrors) -> float:
 
 
 def _is_above_zero(difference: PairedDifference) -> bool:
-    return difference.low is not None and difference.low > 0.0
+    return bool(difference.low is not None and difference.low > 0.0)
 
 
 def _intervals(differences: list[PairedDifference]) -> str:
