@@ -1,14 +1,21 @@
 """Compile all compiled functions in advance: `python -m harness.testing.compile_all`.
 
 A function is compiled when it is first called and then cached on disk (`core.compiled`). All of them take about a
-minute. Here every method follows a few frames, with full and with partial readings, so that the first run need not
-wait.
+minute. Here every method follows a few frames, with full and with partial readings, and a physical tracker is
+simulated, so that the first run need not wait.
 """
 
 import numpy as np
 
+from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body.retargeting import retarget_to_own_body
 from harness.errors import HarnessError
+from harness.mocap import synthetic
 from harness.reconstruct import registry
+from harness.simulate.components.soft_tissue import SoftTissueArtefact
+from harness.simulate.noise import Noise
+from harness.simulate.physics.settings import Physics
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 from harness.testing.contract_case import keep_positions, make_case, run_session
 
@@ -26,6 +33,15 @@ def compile_all() -> None:
             estimates = run_session(case.reconstructor.begin(case.calibration), readings)
             if not all(np.isfinite(estimate.qpos).all() for estimate in estimates):
                 raise HarnessError(f"{name} returned an estimate that is not finite.")
+    _simulate_physical_tracker()
+
+
+def _simulate_physical_tracker() -> None:
+    """Simulate a second of boxing with a physical tracker on soft tissue."""
+    clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=1, duration_s=1.0)
+    noise = Noise(soft_tissue=SoftTissueArtefact(), physics=Physics())
+    body, take = retarget_to_own_body(clip)
+    simulate_tracker(body, take, [DEFAULT_MOUNTS["right_hand"]], TrackerConfig(), noise, seed=1)
 
 
 if __name__ == "__main__":
