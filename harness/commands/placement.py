@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from harness.results.placement_findings import PlacementFindings, StatisticalPower
     from harness.study.placement.question import PlacementQuestion
 
-_QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "minutes", "clips", "seed")
+_QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "physics", "minutes", "clips", "seed")
 _EXAMPLE = "harness placement --stations 3 --behaviour table_tennis"
 
 
@@ -50,6 +50,10 @@ def add_placement(verbs: Verbs) -> None:
     question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
     text = "noise preset of the tracker (default: default)"
     question.add_argument("--noise", choices=["clean", "noise", "default"], help=text)
+    text = (
+        "simulate ultrasound, line of sight and inertia under this constellation, such as hall (default: noise alone)"
+    )
+    question.add_argument("--physics", metavar="NAME", help=text)
     text = "budget of time, which limits sets and clips (default 10)"
     question.add_argument("--minutes", type=positive_float, metavar="N", help=text)
     text = "number of clips to choose on, without regard to --minutes (default: what the budget allows, at most 16)"
@@ -128,6 +132,7 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
         places=_split_names(args.places, "--places") if args.places is not None else (),
         method=args.method or DEFAULT_METHOD,
         noise=args.noise or "default",
+        constellation=args.physics or "",
         minutes=args.minutes or DEFAULT_MINUTES,
         clips=args.clips or 0,
         seed=1 if args.seed is None else args.seed,

@@ -17,6 +17,8 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
+from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
+from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig
 from harness.study.placement.candidates import Candidate
 from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
@@ -47,6 +49,8 @@ class PlacementQuestion:
     """Names of places (see `harness.body.places`); the common ones by default."""
     method: str = DEFAULT_METHOD
     noise: NoisePreset = "default"
+    constellation: str = ""
+    """Name of the constellation under which the physics of the tracker is simulated; "" draws statistical errors."""
     minutes: float = DEFAULT_MINUTES
     """Budget of time [min]."""
     clips: int = 0
@@ -75,10 +79,14 @@ def spoken(name: str) -> str:
 def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -> tuple[PlacementStudy, Scenario]:
     """The study that answers a question, with all clips that it may use, and its scenario.
 
-    Without `folder` the motion is built in, else that of the library. UnknownName for a place or a behaviour; BadInput
-    for a number of stations that the places do not allow, and for a behaviour with too few clips.
+    Without `folder` the motion is built in, else that of the library. UnknownName for a place, a behaviour or a
+    constellation; BadInput for a number of stations that the places do not allow, and for a behaviour with too few
+    clips.
     """
     places = select_places(question.places)
+    physics = Physics(ConstellationSettings(name=question.constellation)) if question.constellation else None
+    if physics is not None:
+        load_constellation(physics.constellation)  # refuses a name that does not exist
     most = min(MAX_STATIONS, len(places))
     if not 1 <= question.fewest <= question.most <= most:
         raise BadInput(
@@ -107,6 +115,7 @@ def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -
         methods=(question.method,),
         seed=question.seed,
         noise=question.noise,
+        physics=physics,
     )
     study = PlacementStudy(
         name=question.name,

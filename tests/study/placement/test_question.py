@@ -34,6 +34,13 @@ def test_several_behaviours_have_equal_shares() -> None:
     assert question.title == "Where are 3 stations worn for walking and boxing?"
 
 
+def test_a_constellation_asks_for_the_physics_of_the_tracker() -> None:
+    _, scenario = question_study(replace(TRIPLES, constellation="hall"), None)
+    assert scenario.physics is not None
+    assert scenario.physics.constellation.name == "hall"
+    assert question_study(TRIPLES, None)[1].physics is None
+
+
 def test_every_set_of_each_size_is_planned() -> None:
     question = replace(TRIPLES, fewest=2, places=("head", "hand", "pelvis"))
     study, scenario = question_study(question, None)
