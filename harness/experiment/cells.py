@@ -21,7 +21,7 @@ from harness.body.mounts import locate_mount
 from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import ClipPart, ExampleLeak
-from harness.errors import BadInput, HarnessError, SystemFault, was_interrupted
+from harness.errors import BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
@@ -33,6 +33,8 @@ from harness.reconstruct.contract import Method
 from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row, varied_text
 from harness.score.score import score_estimate
+from harness.simulate.physics.constellation import load_constellation
+from harness.simulate.physics.room import check_emitters
 from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
 
@@ -297,4 +299,10 @@ def _check_variant_names(scenario: Scenario, source: MotionSource, isolation: Is
     WireFormat(tuple(scenario.worn_stations), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
         locate_mount(standard_skeleton(), mount)
-    scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.worn_stations))
+    noise = scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.worn_stations))
+    for slip in noise.mount_slip:
+        if slip.station not in scenario.stations:
+            raise UnknownName("station", slip.station, scenario.stations)
+    if noise.physics is not None:
+        emitters = load_constellation(noise.physics.constellation)
+        check_emitters(noise.physics.room, scenario.tracker.origin_m[2], emitters.number, emitters.position_m)

@@ -15,6 +15,7 @@ from harness.body import humanoid, retargeting
 from harness.body.mounts import Mount, locate_mount
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core.fields import replace_fields
+from harness.core.hearing import poor_hearing
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import BodyMotion, Clip
 from harness.core.seeds import generator
@@ -303,7 +304,8 @@ class Observation:
         """The conditions that all methods and inputs share, as JSON content."""
         scenario, subject = self.scenario, self.subject
         content, components = scenario.content(), asdict(noise_of(scenario))
-        del components["physics"]
+        if (physics := components.pop("physics")) is not None:
+            content["physics"] = physics  # with what the noise preset leaves out
         for key in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
             del content[key]
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
@@ -422,10 +424,11 @@ class ClipEvaluation:
         }
 
     def notes(self, method: Method) -> tuple[str, ...]:
-        """Notes for readers: on the clip, on the calibration, and on the errors of retargeting to another body."""
+        """Notes for readers: on the clip, the calibration, stations that hear too few emitters, and retargeting."""
         reports = [self.subject.retarget_report, *(self.training.retarget_reports if method.needs_examples else [])]
         known = [report for report in reports if report is not None]
-        notes = (*self.subject.clip.notes, *self.performer_calibration.notes)
+        hearing = poor_hearing(self.simulation.health)
+        notes = (*self.subject.clip.notes, *self.performer_calibration.notes, *([hearing] if hearing else []))
         if not known:
             return notes
         deviation_mm = np.mean([report.deviation_mm for report in known])

@@ -25,6 +25,7 @@ from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
+from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
 from harness.stream.emulator.faults import Fault
 
@@ -199,12 +200,20 @@ def load_scenario(path: Path | str) -> Scenario:
                 content["stations"] = expand_station_set(content["stations"])
             scenario = build(Scenario, content, "scenario")
             methods = tuple(name for text in scenario.methods for name in expand_alternatives(text))
-            scenario = replace(scenario, methods=methods)
+            scenario = _read_constellation(replace(scenario, methods=methods), path.parent)
         except (TypeError, ValueError) as error:
             raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
         check_scenario(path, scenario)
         check_expected_orders(path, scenario)
     return scenario
+
+
+def _read_constellation(scenario: Scenario, folder: Path) -> Scenario:
+    """The scenario with the emitters of its file, if it names one; BadFile."""
+    if scenario.physics is None:
+        return scenario
+    constellation = scenario.physics.constellation.with_file_read(folder)
+    return replace(scenario, physics=replace(scenario.physics, constellation=constellation))
 
 
 def expand_station_set(stations: Any) -> Any:
@@ -300,11 +309,28 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
                 content: Any = value
                 for name in reversed(key.split(".")):
                     content = {name: content}
-                variant = replace_fields(variant, content, "scenario")
+                variant = change_scenario(variant, content, "scenario")
         except (TypeError, ValueError) as error:
             raise BadInput(f"vary: {error}.", "A value must be one that the scenario's own key may have.") from error
         found.append((varied, variant))
     return found
+
+
+def change_scenario(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
+    """The scenario with some fields changed, as `core.fields.replace_fields` does it.
+
+    BadInput for a change of `physics.constellation.file`, which is read with the scenario, and for a change of
+    `physics.constellation.name` beside a file, which would have no effect.
+    """
+    changed = replace_fields(scenario, content, where)
+    before, after = (s.physics.constellation if s.physics else ConstellationSettings() for s in (scenario, changed))
+    if after.file != before.file:
+        found = f"{where}: a change of physics.constellation.file."
+        raise BadInput(found, "Write a scenario for each file; physics.constellation.name can be changed.")
+    if after.file and after.name != before.name:
+        found = f"{where}: physics.constellation.name = {after.name!r} beside physics.constellation.file."
+        raise BadInput(found, "The file replaces the name: start from a scenario without it.")
+    return changed
 
 
 def count_variants(scenario: Scenario) -> int:
@@ -384,6 +410,16 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
     for name in scenario.worn:
         if name not in scenario.stations:
             refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
+    _check_settings_of_stations(scenario)
+
+
+def _check_settings_of_stations(scenario: Scenario) -> None:
+    """UnknownName for prediction or enhancement of a station that is not there."""
+    fusion = scenario.physics.fusion if scenario.physics else None
+    for key in ("prediction_ms", "enhancement"):
+        for name in getattr(fusion, key, ()):
+            if name not in scenario.stations:
+                raise UnknownName(f"station in physics.fusion.{key}", name, scenario.stations)
 
 
 def check_expected_orders(path: Path, scenario: Scenario) -> None:

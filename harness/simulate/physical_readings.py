@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from harness.body.kinematics import pose_from_qpos
 from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -13,7 +14,7 @@ from harness.simulate.physics.body_motion import BodyMotionSource
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
 from harness.simulate.physics.filter_readings import FilterReadings
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
-from harness.simulate.physics.room import PlacedRoom, check_room
+from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.worn import Worn
@@ -42,17 +43,11 @@ def simulate_physical_readings(
     """Readings at the times (E, S) of a trajectory, and the constellation that the device knows.
 
     `calibration` is the exact one. `ends_s` is the last sampling time of the take, when a way back follows it [s].
-    `take` and `session` key the random draws. BadInput when the room is too small for the motion, and when no emitter
-    is within reach.
+    `take` and `session` key the random draws. BadInput when the room is too small for the motion or the emitters, and
+    when no emitter is within reach.
     """
     constellation, placed = place_constellation(trajectory, calibration, physics)
-    checked_s = np.arange(0.0, trajectory.duration_s, 1.0 / _CHECKED_HZ)
-    path = trajectory.station_motion(calibration, np.repeat(checked_s[:, None], len(mounts), axis=1))
-    for row, station in enumerate(calibration.stations):
-        check_room(physics.room, placed.centre_m, f"station {station}", path.position_m[:, row])
-    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    places_m = rotations.rotate(tracker_from_world, path.position_m - calibration.tracker_origin_m)
-    check_reach(constellation, places_m.reshape(-1, 3))
+    _check_path(trajectory, calibration, constellation, placed)
     whole = trajectory.with_lead_in(lead_in_s(physics))
     if whole.ends_s == trajectory.duration_s:
         whole = whole.with_lead_out(_LEAD_OUT_S)
@@ -98,4 +93,23 @@ def place_constellation(
     placed = PlacedRoom(physics.room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
     offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    return load_constellation(settings).shifted(rotations.rotate(tracker_from_world, offset_m)), placed
+    constellation = load_constellation(settings)
+    check_emitters(physics.room, float(calibration.tracker_origin_m[2]), constellation.number, constellation.position_m)
+    return constellation.shifted(rotations.rotate(tracker_from_world, offset_m)), placed
+
+
+def _check_path(
+    trajectory: Trajectory, calibration: Calibration, constellation: Constellation, placed: PlacedRoom
+) -> None:
+    """BadInput if a station or the end of a bone leaves the room, and if no emitter is within reach."""
+    time_s = np.arange(0.0, trajectory.duration_s, 1.0 / _CHECKED_HZ)
+    stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
+    skeleton = trajectory.body.skeleton
+    end_m = pose_from_qpos(skeleton, trajectory.qpos(time_s)).end_m
+    for row, station in enumerate(calibration.stations):
+        check_room(placed.room, placed.centre_m, f"station {station}", stations.position_m[:, row])
+    for row, bone in enumerate(skeleton.names):
+        check_room(placed.room, placed.centre_m, f"bone {bone}", end_m[:, row])
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    places_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
+    check_reach(constellation, places_m.reshape(-1, 3))

@@ -11,6 +11,7 @@ from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
+from harness.core.hearing import hearing_key
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.simulate.filter_report import apply_device_settings
@@ -245,7 +246,7 @@ def _health(
         for station, hears, echoes in zip(
             readings.stations, readings.filter.hearing_share, readings.filter.echo_share, strict=True
         ):
-            counts |= {f"{station} hears 3 emitters": float(hears), f"{station} echoes": float(echoes)}
+            counts |= {hearing_key(station): float(hears), f"{station} echoes": float(echoes)}
     return {
         "frames_sampled": float(len(readings.time_s)),
         "frames_received": float(len(frames)),

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.core.estimate import name_with_lag
+from harness.core.hearing import poor_hearing
 from harness.core.number_format import count_noun, format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
@@ -38,6 +39,7 @@ def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
         [
             _setup_lines(cells),
             *_link_loss(cells),
+            *_poor_hearing(cells),
             "",
             *(_pooled_rows(summary) if pooled else _behaviour_rows(summary)),
             "",
@@ -124,6 +126,16 @@ def _link_loss(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     if not dropped:
         return []
     return [f"THE LINK IS TOO SLOW: {format_share(dropped / (sent + dropped))} of the records were dropped"]
+
+
+def _poor_hearing(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A warning if stations hear too few emitters, with the first such clip."""
+    poor = {cell["clip"]: sentence for cell in cells if (sentence := poor_hearing(cell["health"]))}
+    if not poor:
+        return []
+    clip, sentence = next(iter(poor.items()))
+    more = f" (and in {count_noun(len(poor) - 1, 'more clip')})" if len(poor) > 1 else ""
+    return [f"TOO FEW EMITTERS IN {clip}{more}: {sentence}"]
 
 
 def _fallback_lines(methods: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.hearing import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter import Outputs
 from harness.simulate.physics.filter_readings import FilterReadings, empty_readings
@@ -23,8 +24,6 @@ from harness.simulate.physics.sight import Sight
 
 BLOCK_SLOTS = 160
 """Slots of a block: two seconds."""
-ENOUGH_EMITTERS = 3
-"""Number of emitters that a position needs."""
 
 
 class PhysicalTracker:

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats, freeze
+from harness.core.arrays import Floats, Ints, freeze
 from harness.core.ranges import Range, check_fields
 from harness.errors import BadInput
 
@@ -97,3 +97,19 @@ def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> N
         f"The room is too small: {name} reaches {'xyz'[axis]} = {at_m:.2f} m, and the {surface} is at {limit_m:.2f} m.",
         f"Make physics.room.{'height_m' if axis == 2 else 'size_m'} larger, or move constellation.centre_m.",
     )
+
+
+def check_emitters(room: Room, origin_height_m: float, number: Ints, position_m: Floats) -> None:
+    """BadInput if one of J emitters hangs outside the walls or above the ceiling.
+
+    `position_m` (J, 3) are their places by their numbers (J,), in a tracker's frame whose origin is `origin_height_m`
+    above the middle of the floor [m].
+    """
+    for name, (x, y, z) in zip(number.tolist(), position_m.tolist(), strict=True):
+        height_m = origin_height_m - z  # the frame's z points down
+        if abs(x) > room.size_m[0] / 2 or abs(y) > room.size_m[1] / 2:
+            found = f"Emitter {name} hangs outside the walls, at ({x:.2f}, {y:.2f}) m from the middle of the room."
+            raise BadInput(found, "Make physics.room.size_m larger.")
+        if height_m > room.height_m:
+            found = f"Emitter {name} hangs at {height_m:.2f} m, above the ceiling at {room.height_m:.2f} m."
+            raise BadInput(found, "Make physics.room.height_m larger, or tracker.origin_m lower.")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from harness.compare.margins import MARGINS
-from harness.core.fields import build, replace_fields
+from harness.core.fields import build
 from harness.core.files import MAX_TOML_BYTES, read_toml
 from harness.core.input_file import check_input_file, names_input_file
 from harness.core.names import FileName, MethodName, Name, Text, check_words
@@ -14,7 +14,7 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario
+from harness.experiment.scenario import SCHEMA, Scenario, change_scenario, check_scenario, load_scenario
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -287,7 +287,7 @@ def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -
     if fixed := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
         raise BadInput(f"{where}: {', '.join(fixed)}.", "The study defines these keys.")
     try:
-        return replace_fields(scenario, content, where)
+        return change_scenario(scenario, content, where)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error
 
