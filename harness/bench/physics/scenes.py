@@ -37,7 +37,9 @@ RATE_HZ = 40.0
 HEIGHT_M = 1.2
 """Height of the middle of the free motion above the floor [m]."""
 BYSTANDER = Box(centre_m=(0.0, 0.7, 0.875), size_m=(0.5, 0.3, 1.75))
-"""A person who stands beside the free motion and shades a part of it."""
+"""A person who stands beside the free motion. The emitters hang overhead, so that it shades next to nothing."""
+BOARD = Box(centre_m=(0.2, 0.1, 1.9), size_m=(0.8, 0.8, 0.1))
+"""A board that hangs above the free motion and shades a part of it, such as a lamp."""
 _TRACKER = TrackerConfig(rate_hz=RATE_HZ)
 _ORIGIN_M = np.array(_TRACKER.origin_m)
 _MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
@@ -108,9 +110,9 @@ def free_source(seed: int, seconds: float, speed_m_s: float, physics: Physics) -
     )
 
 
-def with_bystander(physics: Physics) -> Physics:
-    """The physics with a person who stands beside the motion."""
-    return replace(physics, room=replace(physics.room, furniture=(BYSTANDER,)))
+def with_furniture(physics: Physics, box: Box) -> Physics:
+    """The physics with one piece of furniture in the room."""
+    return replace(physics, room=replace(physics.room, furniture=(box,)))
 
 
 def without_shadow(physics: Physics) -> Physics:
