@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from harness.bench.physics.truth import SEEDS
 from harness.core.package_data import data_folder
 from harness.core.split import GUARD_S, ClipPart
 
@@ -63,6 +64,11 @@ def test_nothing_is_judged_where_a_constant_was_chosen(name: str) -> None:
 @pytest.mark.parametrize("name", SEARCHES)
 def test_the_record_names_every_clip_of_a_search(name: str) -> None:
     assert set(SEARCHES[name]) <= {clip for clip, _ in CHOSEN}
+
+
+def test_the_seeds_of_the_truth_table_chose_no_default_of_the_physics() -> None:
+    (entry,) = (entry for entry in CONTENT["constant"] if entry["method"] == "physics of the simulated tracker")
+    assert max(SEEDS) < entry["seeds_from"]
 
 
 def test_lengths_are_those_of_the_manifest() -> None:
