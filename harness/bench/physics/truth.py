@@ -107,8 +107,8 @@ def free_rows(seeds: tuple[int, ...]) -> list[TruthRow]:
             f"in {with_one} seeds, {count / minutes / len(seeds):.2f} a minute",
             with_one >= needed,
             "up to 3 cm for several seconds, now and then (Gilson et al. 2006)",
-            f"{_FREE_M_S:g} m/s in the mean below a board of 0.8 m, lost for {lost:.1%} of the time; a person beside the "
-            f"motion instead of the board: {beside / minutes / len(seeds):.2f} a minute",
+            f"{_FREE_M_S:g} m/s in the mean below a board of 0.8 m, lost for {lost:.1%} of the time; with a person "
+            f"beside the motion instead of the board {beside / minutes / len(seeds):.2f} a minute",
         ),
         TruthRow(
             "the same: error while the quality is above 0",

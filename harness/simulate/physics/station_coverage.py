@@ -72,13 +72,14 @@ def station_coverage(
     time_s = np.linspace(0.0, trajectory.duration_s, count)
     qpos = trajectory.qpos(time_s)
     stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
-    centre_m = middle_of_path_m(motion.qpos)
+    centre_m = np.round(middle_of_path_m(motion.qpos), 2)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     placed = PlacedRoom(room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
-    centred = constellation.shifted(rotations.rotate(tracker_from_world, np.array([*centre_m, 0.0])))
+    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
+    centred = constellation.shifted(rotations.rotate(tracker_from_world, offset_m))
     position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
     turned = rotations.multiply(tracker_from_world, stations.world_from_station)
-    sight = Sight(body, placed) if room.shadow or room.furniture else None
+    sight = Sight(body, placed) if room.shadow else None
     heard = np.empty((count, len(calibration.stations), len(constellation)), dtype=bool)
     for n in range(count):
         if sight is not None:
