@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,9 +132,9 @@ def test_the_gate_keeps_wrong_ranges_out() -> None:
     ],
     ids=lambda component: next(iter(component)),
 )
-def test_what_is_worn_moves_the_tracker_as_with_statistics(worn_component: dict[str, object]) -> None:
+def test_what_is_worn_moves_the_tracker_as_with_statistics(worn_component: dict[str, Any]) -> None:
     """After a slip the tracker is where the statistical error model has it; slips differ in profile while they last."""
-    shift_m = positions_m(observed(Noise(**worn_component))) - positions_m(observed(Noise()))  # type: ignore[arg-type]
+    shift_m = positions_m(observed(Noise(**worn_component))) - positions_m(observed(Noise()))
     moved_m = positions_m(observed(physical("clean", **worn_component))) - positions_m(observed(physical("clean")))
     after = slice(round(1.2 * TRACKER.rate_hz), None)
     assert np.abs(shift_m[after]).max() > 5e-3
@@ -145,10 +146,10 @@ def test_what_is_worn_moves_the_tracker_as_with_statistics(worn_component: dict[
     [{"soft_tissue": SoftTissueArtefact()}, {"strap_slip": StrapSlip(share=1.0)}],
     ids=lambda c: next(iter(c)),
 )
-def test_tissue_and_straps_move_the_tracker_nearly_as_with_statistics(component: dict[str, object]) -> None:
+def test_tissue_and_straps_move_the_tracker_nearly_as_with_statistics(component: dict[str, Any]) -> None:
     """The statistical model samples oscillations at the tracker's rate, so the rate is high here."""
     fast = TrackerConfig(rate_hz=160.0, baud=10_000_000, slot_s=0.0)
-    with_it, without = (observed(Noise(**c), tracker=fast) for c in (component, {}))  # type: ignore[arg-type]
+    with_it, without = (observed(Noise(**c), tracker=fast) for c in (component, {}))
     shift_m = positions_m(with_it) - positions_m(without)
     with_it, without = (observed(physical("clean", **c), tracker=fast) for c in (component, {}))
     off_m = positions_m(with_it) - positions_m(without) - shift_m
@@ -189,7 +190,7 @@ def test_a_room_that_does_not_fit_is_refused(physics: Physics, says: str) -> Non
 
 def test_a_bone_without_a_station_may_not_pass_the_ceiling_either() -> None:
     low, noise = TrackerConfig(origin_m=(0.0, 0.0, 1.4)), physical("clean", Physics(room=Room(height_m=1.5)))
-    with pytest.raises(BadInput, match="bone .* reaches z"):
+    with pytest.raises(BadInput, match=r"bone .* reaches z"):
         simulate_tracker(*performed("jumping"), worn("torso"), low, noise, seed=SEED)
 
 
