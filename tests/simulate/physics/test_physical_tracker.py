@@ -43,8 +43,8 @@ def test_the_lead_in_is_a_whole_number_of_slots() -> None:
 
 
 def make_tracker() -> PhysicalTracker:
-    """The head and left ankle of the boxer, who boxes for 3 s below `cave`."""
-    (body, take), mounts = performed(), worn("left_ankle", "head")
+    """The chest and left ankle of the boxer, who boxes for 3 s below `cave`."""
+    (body, take), mounts = performed(), worn("left_ankle", "torso")
     calibration = exact_calibration(body, mounts, TRACKER)
     physics, trajectory = Physics(), Trajectory(body, take)
     constellation, placed = place_constellation(trajectory, calibration, physics)
