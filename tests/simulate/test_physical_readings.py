@@ -177,7 +177,7 @@ def test_a_station_out_of_range_hears_nothing() -> None:
         (Physics(ConstellationSettings(range_m=0.2)), "within reach"),
         (
             Physics(room=Room(size_m=(3.0, 3.0)), constellation=ConstellationSettings(centre_m=(2.0, 0.0))),
-            "the wall is",
+            "station head reaches x",
         ),
         (Physics(room=Room(height_m=2.0)), "above the ceiling"),
         (Physics(room=Room(size_m=(1.5, 1.5))), "outside the walls"),
