@@ -95,7 +95,7 @@ def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> N
     surface = "ceiling" if axis == 2 else "wall"
     raise BadInput(
         f"The room is too small: {name} reaches {'xyz'[axis]} = {at_m:.2f} m, and the {surface} is at {limit_m:.2f} m.",
-        f"Make physics.room.{'height_m' if axis == 2 else 'size_m'} larger, or move constellation.centre_m.",
+        f"Make physics.room.{'height_m larger' if axis == 2 else 'size_m larger, or move constellation.centre_m'}.",
     )
 
 

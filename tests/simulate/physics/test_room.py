@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput
-from harness.simulate.physics.room import Box, Room, check_room
+from harness.simulate.physics.room import Box, Room, check_emitters, check_room
 from tests.simulate.physics.rooms import ORIGIN_M, placed
 
 CENTRE_M = np.array([1.0, -2.0])
@@ -50,3 +50,20 @@ def test_a_path_inside_is_accepted_and_so_is_a_foot_below_the_floor() -> None:
 def test_furniture_that_passes_a_wall_is_refused(centre: tuple[float, ...], size: tuple[float, ...]) -> None:
     with pytest.raises(BadInput, match=r"Box 2 of room\.furniture passes a wall"):
         Room(size_m=(6.0, 4.0), furniture=(Box((0.0, 0.0, 0.5), (1.0, 1.0, 1.0)), Box(centre, size)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("room", "says"),
+    [
+        (Room(size_m=(2.0, 12.0)), "Emitter 2 hangs outside the walls, at (1.50, 0.00) m"),
+        (Room(size_m=(12.0, 2.0)), "Emitter 3 hangs outside the walls, at (0.00, 1.20) m"),
+        (Room(height_m=2.3), "Emitter 3 hangs at 2.40 m, above the ceiling at 2.30 m"),
+    ],
+)
+def test_emitters_outside_the_room_are_refused(room: Room, says: str) -> None:
+    """The tracker's z points down from 2.5 m above the floor."""
+    number, position_m = np.array([1, 2, 3]), np.array([[0.0, 0.0, 0.4], [1.5, 0.0, 0.3], [0.0, 1.2, 0.1]])
+    check_emitters(Room(), 2.5, number, position_m)
+    with pytest.raises(BadInput) as refusal:
+        check_emitters(room, 2.5, number, position_m)
+    assert says in str(refusal.value)

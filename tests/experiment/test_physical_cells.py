@@ -1,0 +1,138 @@
+"""Cells of a scenario with the table [physics]: conditions, processes, calibration, notes and recordings."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.core.split import ClipPart
+from harness.experiment import engine
+from harness.experiment.cells import open_scenario_motion
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.method_run import run_method
+from harness.experiment.playback import prepare_playback
+from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
+from harness.experiment.score_recording import score_methods
+from harness.reconstruct import registry
+from harness.report.run.text import run_table
+from harness.results.cell import Cell, read_cell
+from harness.results.storage import read_summary
+from harness.score.score import score_estimate
+from harness.simulate.physics.constellation import ConstellationSettings
+from harness.simulate.physics.settings import Physics
+from harness.simulate.physics.sound import Sound
+from harness.stream.recording.recording import record_capture
+from harness.stream.recording.replay import RecordingStream
+
+PLAIN = Scenario(
+    name="small",
+    motion=ScenarioMotion("builtin", ("boxing_p1_01",), ("boxing",), ("boxing_p1_02",), longest_s=2.0),
+    stations=load_scenario("demo").stations,
+    methods=("ik:previous", "mean_pose"),
+)
+PHYSICAL = replace(PLAIN, physics=Physics(), noise="noise")
+
+
+def evaluation(scenario: Scenario) -> ClipEvaluation:
+    source = open_scenario_motion(scenario.motion, None, scenario.seed)
+    return ClipEvaluation(scenario, source, ClipPart("boxing_p1_01"), "boxing")
+
+
+def conditions(scenario: Scenario) -> dict[str, Any]:
+    return evaluation(scenario).conditions_of(registry.resolve("ik:previous"), "pos+ori")
+
+
+def test_without_physics_conditions_do_not_name_it() -> None:
+    found = conditions(PLAIN)
+    assert "physics" not in found
+    assert "physics" not in found["components"]
+
+
+def test_conditions_have_the_causes_that_act() -> None:
+    """Those that the preset leaves out are zero, so that results stay comparable when defaults change."""
+    acting = conditions(PHYSICAL)["physics"]
+    assert acting["sound"]["range_noise_m"] == Sound().range_noise_m
+    assert acting["sound"]["bursts_per_min"] == 0.0
+    assert not acting["room"]["echoes"]
+    assert conditions(replace(PHYSICAL, noise="clean"))["physics"]["sound"]["range_noise_m"] == 0.0
+    assert conditions(replace(PHYSICAL, noise="default"))["physics"]["sound"]["bursts_per_min"] > 0.0
+
+
+def cells_of(scenario: Scenario, out: Path, jobs: int) -> dict[str, Cell]:
+    engine.run(scenario, out, jobs=jobs)
+    cells = [read_cell(folder) for folder in sorted((out / "cells").iterdir())]
+    return {cell.key: cell for cell in cells}
+
+
+@pytest.mark.long
+def test_cells_are_the_same_with_any_number_of_processes(tmp_path: Path) -> None:
+    scenario = replace(PHYSICAL, noise="default", vary={"physics.constellation.name": ["cave", "hall"]})
+    one, two = (cells_of(scenario, tmp_path / f"{jobs}", jobs) for jobs in (1, 2))
+    assert len(one) == 4
+    assert set(one) == set(two)
+    for key, cell in one.items():
+        np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
+        np.testing.assert_array_equal(cell.quality, two[key].quality)
+        assert cell.health == two[key].health
+    assert len({cell.estimate_qpos.tobytes() for cell in one.values() if cell.method == "ik:previous"}) == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "noise"),
+    [("tpose", "clean"), ("tpose", "noise"), ("tpose", "default"), ("poses", "clean"), ("poses", "noise")],
+)
+def test_calibration_poses_are_held_below_the_same_constellation(kind: Any, noise: Any) -> None:
+    """Poses are held at the world's origin, the take is boxed elsewhere: the constellation hangs above either.
+
+    Errors of the calibration are little more than with statistical errors. Under `default` the last of the eight poses
+    cannot be held: the chest's station hears no emitter while the performer bows.
+    """
+    scenario = replace(PHYSICAL, calibration=kind, noise=noise)
+    physical = evaluation(scenario).performer_calibration
+    statistical = evaluation(replace(scenario, physics=None)).performer_calibration
+    assert physical.calibration.kind == statistical.calibration.kind == kind
+    assert physical.errors["mount_mm"] < statistical.errors["mount_mm"] + 5.0
+    assert physical.errors["mount_deg"] < statistical.errors["mount_deg"] + 3.0
+
+
+def test_a_station_that_hears_too_little_is_noted(tmp_path: Path) -> None:
+    """Emitters that reach 1.6 m: none is heard at the ankles."""
+    deaf = replace(PHYSICAL, physics=Physics(ConstellationSettings(range_m=1.6)), methods=("ik:previous",))
+    made = evaluation(deaf)
+    note = next(text for text in made.notes(registry.resolve("ik:previous")) if "hears" in text)
+    assert note.startswith("left_ankle hears three emitters for 0 % of the time, right_ankle for 0 %")
+    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.resolve("ik:previous")))
+    engine.run(deaf, tmp_path / "out")
+    assert f"TOO FEW EMITTERS IN boxing_p1_01: {note}" in run_table(read_summary(tmp_path / "out"))
+
+
+SCENARIO = """
+methods = ["ik:previous"]
+stations = "liu2011"
+[motion]
+source = "builtin"
+behaviours = ["boxing"]
+test = ["boxing_p1_01"]
+longest_s = 3.0
+[physics]
+fusion.prediction_ms = { head = 20 }
+"""
+
+
+def test_a_recording_of_a_physical_tracker_is_scored_as_its_simulation(tmp_path: Path) -> None:
+    path = tmp_path / "physical.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    playback = prepare_playback(path)
+    simulation = playback.simulation
+    record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {"scenario": str(path)})
+    (score,) = score_methods(RecordingStream(tmp_path / "a.rec"), playback, ["ik:previous"])
+    method = playback.clip_evaluation.fit_method(registry.resolve("ik:previous"), "ik:previous")
+    qpos, status, _, step_ms, *_ = run_method(method, simulation.calibration, simulation.frames)
+    truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
+    whole = score_estimate(playback.body.skeleton, playback.tracker.rate_hz, *truth)
+    assert score.frames_matched == score.frames_expected == whole.metrics["frames_matched"]
+    for name in ("joint_angle_mean_deg", "mpjpe_mm"):
+        assert score.metrics[name] == whole.metrics[name]
+        assert score.metrics[name] is not None

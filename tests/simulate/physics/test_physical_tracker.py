@@ -1,0 +1,90 @@
+"""The driver of the parts: blocks of any size, and the counts for the stream's health."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.simulate.noise import Noise
+from harness.simulate.physical_readings import place_constellation
+from harness.simulate.physics import physical_tracker
+from harness.simulate.physics.body_motion import BodyMotionSource
+from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
+from harness.simulate.physics.ranging import Ranges
+from harness.simulate.physics.settings import Physics
+from harness.simulate.physics.sight import Sight
+from harness.simulate.physics.worn import Worn
+from harness.simulate.simulation import exact_calibration
+from harness.simulate.skin import skin_below
+from harness.simulate.trajectory import Trajectory
+from tests.simulate.conftest import worn
+from tests.simulate.physical_takes import TRACKER, observed, performed, physical
+
+PHYSICS = Physics(fusion=Fusion(prediction_ms={"head": 30}, enhancement={"left_wrist": 1, "torso": 2}))
+
+
+@pytest.mark.parametrize("slots", [1, 7, 53])
+def test_bytes_do_not_depend_on_the_size_of_the_blocks(slots: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = physical("default", PHYSICS)
+    whole = observed(noise)
+    monkeypatch.setattr(physical_tracker, "BLOCK_SLOTS", slots)
+    pieces = observed(noise)
+    assert pieces.wire.data == whole.wire.data
+    assert pieces.health == whole.health
+
+
+def test_the_lead_in_is_a_whole_number_of_slots() -> None:
+    """A slot is five ticks of the inertial sensors; 0.5 s of 333.3 Hz are 33.33 slots."""
+    inertial = replace(Physics().inertial, rate_hz=333.3)
+    physics = Physics(inertial=inertial, fusion=Fusion(warm_up_s=0.5))
+    assert lead_in_slots(physics) == 34
+    assert lead_in_s(physics) == pytest.approx(34 * 5 / 333.3)
+
+
+def make_tracker() -> PhysicalTracker:
+    """The chest and left ankle of the boxer, who boxes for 3 s below `cave`."""
+    (body, take), mounts = performed(), worn("left_ankle", "torso")
+    calibration = exact_calibration(body, mounts, TRACKER)
+    physics, trajectory = Physics(), Trajectory(body, take)
+    constellation, placed = place_constellation(trajectory, calibration, physics)
+    whole = trajectory.with_lead_in(lead_in_s(physics)).with_lead_out(0.5)
+    skin = skin_below(body.skeleton, mounts, calibration)
+    component = Worn(Noise(), calibration.stations, skin, tick_hz=400.0, ends_s=3.0, seed=1, take="t")
+    source = BodyMotionSource(whole, calibration, component)
+    return PhysicalTracker(source, physics, constellation, placed, Sight(body, placed), seed=1, take="t")
+
+
+def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted again by hand: three emitters heard within the last turn, and the share of echoes, from time 0 on."""
+    tracker, seen = make_tracker(), dict[int, tuple[Ranges, int]]()
+    measure = tracker.ranging.measure
+
+    def watched(first: int, motion: object, qpos: object) -> Ranges:
+        found = measure(first, motion, qpos)  # type: ignore[arg-type]
+        seen.update({first + k: (found, k) for k in range(len(found.emitter))})
+        return found
+
+    monkeypatch.setattr(tracker.ranging, "measure", watched)
+    time_s = np.repeat(np.arange(0.0, 2.5, 0.025)[:, None], 2, axis=1)
+    found = tracker.measure(time_s)
+    slots = range(int(np.floor(2.475 * 400.0)) // 5 + 1)
+    for station in range(2):
+        heard = {slot: bool(ranges.direct[k, station].any()) for slot, (ranges, k) in seen.items()}
+        enough = [sum(heard.get(slot - back, False) for back in range(9)) >= 3 for slot in slots]
+        assert found.hearing_share[station] == pytest.approx(np.mean(enough))
+        received = sum(int(np.sum(~np.isnan(seen[slot][0].range_m[seen[slot][1], station]))) for slot in slots)
+        echoes = sum(int(np.sum(seen[slot][0].echo[seen[slot][1], station])) for slot in slots)
+        assert found.echo_share[station] == pytest.approx(echoes / received)
+    assert found.motion is None
+
+
+def test_a_part_of_the_records_has_their_values() -> None:
+    """Values are those of the record's time, however many others are asked for."""
+    time_s = np.repeat(np.arange(0.0, 2.5, 0.025)[:, None], 2, axis=1)
+    whole, some = make_tracker().measure(time_s, with_motion=True), make_tracker().measure(time_s[7::13])
+    np.testing.assert_array_equal(some.position_m, whole.position_m[7::13])
+    np.testing.assert_array_equal(some.quality, whole.quality[7::13])
+    np.testing.assert_array_equal(some.ranges_received, whole.ranges_received[7::13])
+    assert whole.ranges_received.max() == 12
+    assert (whole.ranges_rejected <= whole.ranges_received).all()
