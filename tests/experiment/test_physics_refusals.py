@@ -61,6 +61,7 @@ def checked(path: Path) -> Scenario:
         ("[physics]\nsound.range_noise_m = -0.1", BadFile, "range_noise_m = -0.1 must be"),
         ("[physics]\nsound.microphones_m = [[0.0, 0.0, 0.0]]", BadInput, "1 positions. A station has 2"),
         ("[physics]\ninertial.rate_hz = 10.0", BadFile, "rate_hz = 10.0 must be"),
+        ("[physics]\ninertial.rate_hz = 800.0", BadInput, "sound travels 2.15 m, less than constellation.range_m = 4"),
         ("[physics]\ninertial.gyroscope.white = -1.0", BadFile, "white = -1.0 must be"),
         ("[physics]\ninertial.accelerometer.scale = nan", BadFile, "scale: expected a finite number"),
         ("[physics]\nfusion.warm_up_s = 0.0", BadFile, "warm_up_s = 0.0 must be"),

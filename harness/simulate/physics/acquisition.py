@@ -1,4 +1,4 @@
-"""The fix: position, velocity and attitude of a lost station, out of the ranges of the last turn of emitters.
+"""The fix: position, velocity and attitude of a lost station, out of the ranges of the last turns of emitters.
 
 A lost station keeps its attitude by the gyroscopes, and gravity levels it slowly. Its specific force is integrated
 twice in that attitude, so the path between two ranges is known but for a velocity, a heading and a small tilt. A fix
@@ -21,36 +21,46 @@ HEARD = 12
 """Numbers of a stored range: time [s] 0, range [m] 1, path of the inertial unit at its arrival [m] 2:5, microphone from
 that unit [m] 5:8, the station's z axis 8:11, and the emitter's index 11."""
 LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS = 40, 80
+"""Limits of the window whose ranges make a fix: 0.5 s and 1 s at the default rate [choice]."""
 _LEAST_RANGES, _LEAST_EMITTERS = 10, 4
+"""Ranges and emitters of a fix, more than the nine unknowns and the three places need [choice]."""
 _LARGEST_MISFIT = 1.5
 """Root mean square of the residuals, in their standard deviations [choice]."""
 _LARGEST_RESIDUAL = 3.0
+"""Largest residual of a range that is kept, in its standard deviations [choice]."""
 _NEAR_THE_WORST = 0.7
+"""Ranges whose residuals exceed this share of the largest are left out together [choice]."""
 _SPARED_SHARE = 0.75
 """Share of the ranges that a fix must keep [choice]."""
 _HEADINGS = 4
 _ITERATIONS = 15
+"""Headings from which Gauss-Newton starts, and its most steps [choice]."""
 _SMALL_STEP = 1e-5
 """Length of a step that ends the search [m], [rad]."""
 _DISTANCE_BELOW_M = 1.5
+"""Distance from the emitters at which it starts, on the side of their normals [choice]."""
 _SPEED_SIGMA_M_S, _LARGEST_SPEED_M_S = 5.0, 15.0
+"""Standard deviation of the speed of a lost station, and the largest speed of a fix [choice]."""
 _OTHER_PLACE_M, _OTHER_HEADING_RAD = 0.05, 0.5
+"""Differences at which two minima are different places or headings [choice]."""
 _CLEAR_MARGIN = 9.0
 """Least difference of the sums of squared residuals of two places: 3 standard deviations."""
 _GRAVITY_S = 0.5
 _LEVEL_SIGMA_RAD = 0.01
+"""Time over which the specific force is averaged, and the least error of a level from it [choice]."""
 _MOTION_M_S2 = 5.0
 """Acceleration that a motion may have whose variance is not yet known [choice]."""
 _INFLATION = 2.0
 """Factor on the covariance of a fix, for what its model leaves out [choice]."""
 FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE, _LEAST_TILT_VARIANCE = 1.0, 0.1, 1e-6
+"""Variances of the tilt at switch-on and after ranges refuted it, and the least one [rad^2] [choice]."""
 
 
 class Search(NamedTuple):
     """What S lost stations have collected."""
 
     heard: Floats
-    """(S, N, 12) ranges in a ring, the latest of one turn of emitters."""
+    """(S, N, 12) ranges in a ring, the latest of the window: three turns of emitters, within the limits above."""
     stored: Ints
     """(S,) ranges stored since the loss."""
     path: Floats

@@ -51,7 +51,9 @@ CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
 _CONFIRMING_REJECTS = 0.3
 """Share of rejected ranges that refutes one [choice]."""
 _FEWEST_JUDGED = 10
+"""Ranges in a second below which no share of rejected ones is judged [choice]."""
 _COAST_SIGMA_M = 0.5
+"""Standard deviation of the position at which a lost station stops coasting [choice]."""
 _CLIPPED_SHARE = 0.3
 """Standard deviation of what a sensor at its limit leaves out, as a share of the limit [choice]."""
 _CORRELATION_S = 0.2

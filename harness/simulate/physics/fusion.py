@@ -47,7 +47,8 @@ class Fusion:
     """Largest innovation of an accepted range, in its standard deviations. InterSense's header gives a factor of 4
     (docs/is900.md 13.2)."""
     range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.002
-    """Assumed standard deviation of a range at 2 m on the axis [m]; it grows with distance and angle as in `sound`."""
+    """Assumed standard deviation of a range at 2 m on the axis [m]; it grows with distance and angle as in `sound`. The
+    value is that of `sound` [choice]."""
     range_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
     """Assumed standard deviation of the scale of a range, from temperature and air [choice]."""
     survey_m: Annotated[float, Range(0.0, 1.0)] = 0.001

@@ -10,6 +10,7 @@ from harness.core.compiled import compiled
 NOISE_AT_M = 2.0
 """Distance on the axes for which the noise of a range is specified [m]."""
 _LEAST_NOISE, _LARGEST_NOISE = 0.5, 4.0
+"""Limits of the factor on the noise of a range [choice]."""
 _LEAST_AMPLITUDE = 1e-6
 
 

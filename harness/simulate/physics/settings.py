@@ -3,11 +3,13 @@
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from harness.errors import BadInput
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.physics.inertial import Inertial, InertialErrors
 from harness.simulate.physics.room import Room
-from harness.simulate.physics.sound import Sound
+from harness.simulate.physics.schedule import TICKS_PER_SLOT
+from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
 
 E = TypeVar("E", bound=InertialErrors)
 
@@ -25,12 +27,22 @@ class Physics:
     inertial: Inertial = field(default_factory=Inertial)
     fusion: Fusion = field(default_factory=Fusion)
 
+    def __post_init__(self) -> None:
+        slot_s = TICKS_PER_SLOT / self.inertial.rate_hz
+        reach_m = slot_s * speed_of_sound_m_s(self.sound.temperature_c)
+        if self.constellation.range_m > reach_m:
+            raise BadInput(
+                f"physics.inertial.rate_hz = {self.inertial.rate_hz:g} makes slots of {1e3 * slot_s:.2f} ms, in which "
+                f"sound travels {reach_m:.2f} m, less than constellation.range_m = {self.constellation.range_m:g}.",
+                "Lower inertial.rate_hz or constellation.range_m.",
+            )
+
     def with_preset(self, noise: str) -> "Physics":
         """The physics under a noise preset.
 
         `default` has every cause of errors. `noise` has no shadow, echo, burst or wrong cycle. `clean` also has no
-        noise of ranges and inertia, no survey error and no temperature error. Cones and reaches of emitters hold
-        under each.
+        noise of ranges and inertia, no limit of the inertial sensors, no air flow, no survey error and no temperature
+        error. Cones and reaches of emitters hold under each.
         """
         if noise == "default":
             return self

@@ -17,11 +17,11 @@ class Sound:
     """Speed and level of sound, the microphones of a station, and the errors of a range."""
 
     temperature_c: Annotated[float, Range(-40.0, 60.0)] = 20.0
-    """Mean temperature of the air [deg C]."""
+    """Mean temperature of the air [deg C] [choice]."""
     temperature_sd_c: Annotated[float, Range(0.0, 20.0)] = 0.6
     """Standard deviation of the temperature between sessions [K]: a scale error of 0.1 % (docs/is900.md 13.5)."""
     assumed_c: Annotated[float, Range(-40.0, 60.0)] = 20.0
-    """Temperature for which the device computes the speed of sound [deg C]."""
+    """Temperature for which the device computes the speed of sound [deg C] [choice]."""
     range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.002
     """Standard deviation of a range at 2 m on the axis of emitter and microphone [m]. It grows as the amplitude falls,
     to about 4 mm in the mean. Chosen because the position at rest then varies by about the published 1.5 mm

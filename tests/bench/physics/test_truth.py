@@ -1,0 +1,78 @@
+"""The rows of `harness bench physics --truth` on few seeds, and that they notice parts that are missing."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.bench.physics import scenes, truth
+from harness.report.physics.error_comparison import TruthRow
+from harness.simulate.physics.settings import Physics
+
+SEEDS = tuple(range(101, 115))
+"""Not those of the table."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("rows", "count"),
+    [
+        (truth.rest_row, 1),
+        (truth.free_rows, 3),
+        (truth.speed_row, 1),
+        (truth.turned_row, 1),
+        (truth.hand_row, 1),
+        (truth.temperature_row, 1),
+        (truth.covered_row, 2),
+    ],
+)
+def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[TruthRow]], count: int) -> None:
+    found = rows(SEEDS)
+    assert len(found) == count
+    for row in found:
+        assert row.met is True, f"{row.name}: {row.measured}"
+
+
+def changed(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
+    """Let the rows use other defaults of the physics."""
+    monkeypatch.setattr(truth, "Physics", lambda: replace(Physics(), **changes))  # type: ignore[arg-type]
+
+
+def test_a_row_is_missed_where_ranges_are_worse(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, sound=replace(Physics().sound, range_noise_m=0.01))
+    (row,) = truth.rest_row(SEEDS[:3])
+    assert row.met is False
+    assert row.name == "static, spread of 3-D position"
+
+
+def test_the_temperature_row_is_missed_where_the_device_measures_the_temperature(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(truth, "_WARMER_K", 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        (row,) = truth.temperature_row(SEEDS[:2])
+    assert row.met is False
+
+
+@pytest.mark.long
+def test_excursions_need_the_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, room=replace(Physics().room, shadow=False))
+    assert truth.free_rows(SEEDS[:3])[0].met is False
+
+
+@pytest.mark.long
+def test_a_filter_that_never_gives_a_station_up_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(monkeypatch, fusion=replace(Physics().fusion, sigma_limit_m=10.0, coast_s=60.0))
+    assert truth.covered_row(SEEDS[:3])[1].met is False
+
+
+def test_a_station_is_lost_rather_than_wrong_while_an_accelerometer_is_at_its_limit() -> None:
+    physics, seconds, speed_m_s = Physics(), 15.0, 4.0
+    sources = [scenes.free_source(107, seconds, speed_m_s, physics) for _ in range(3)]
+    motion = sources[2].advance(np.arange(0.0, seconds, 1.0 / 400.0))
+    force_m_s2 = np.gradient(motion.velocity_m_s[:, 0], 1.0 / 400.0, axis=0)
+    assert np.abs(force_m_s2).max() > physics.inertial.accelerometer.limit
+    errors = scenes.track_free_station(sources[0], sources[1], seconds, physics, 107)
+    assert np.nanmax(errors.size_m) < 0.1
+    assert np.mean(errors.quality > 0.0) > 0.7
