@@ -34,7 +34,7 @@ from harness.simulate.physics.error_state import (
 )
 from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CONFIRMING, CYCLE_SLOTS, LOST, TRACKING, quality, sum_last
+from harness.simulate.physics.status import CONFIRMING, CYCLE_SLOTS, DOUBTED, LOST, TRACKING, quality, sum_last
 from harness.simulate.physics.strapdown import (
     Vector,
     attitude,
@@ -52,6 +52,8 @@ _CONFIRMING_REJECTS = 0.3
 """Share of rejected ranges that refutes one [choice]."""
 _FEWEST_JUDGED = 10
 """Ranges in a second below which no share of rejected ones is judged [choice]."""
+_DOUBTED_SIGMA_M = 0.15
+"""Standard deviation of the position at which a doubted station needs a new fix [choice]."""
 _COAST_SIGMA_M = 0.5
 """Standard deviation of the position at which a lost station stops coasting [choice]."""
 _CLIPPED_SHARE = 0.3
@@ -108,8 +110,8 @@ class FilterState(NamedTuple):
     offset: Floats
     """(S, 2, 6) offsets of enhancement modes 1 and 2."""
     status: Ints
-    """(S, 6) LOST, CONFIRMING or TRACKING; whether the position is frozen; slots since an accepted range; accepted and
-    rejected ranges since the fix; slots since the fix, or since the last attempt of one."""
+    """(S, 6) LOST, CONFIRMING, TRACKING or DOUBTED; whether the position is frozen; slots since an accepted range;
+    accepted and rejected ranges since the fix or the doubt; slots since then, or since the last attempt of a fix."""
     counts: Ints
     """(2, S, slots of a second) ranges received and rejected, in a ring."""
     report: Floats
@@ -439,17 +441,21 @@ def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, 
         rejected = sum_last(counts[1, s], slot, model.judged_slots)
         if received >= _FEWEST_JUDGED and rejected > model.reject_share * received:
             distrust(model, state, search, s)
-        elif sigma > model.sigma_limit_m or status[2] > model.coast_slots:
-            lose(state, search, s, max(0.5 * (covariance[6, 6] + covariance[7, 7]), 1e-6))
-    elif status[0] == CONFIRMING:
-        judged = status[3] + status[4]
+        elif status[2] > model.coast_slots:
+            lose(state, search, s, kept_tilt_variance(covariance))
+        elif sigma > model.sigma_limit_m:
+            doubt(state, s)
+    elif status[0] != LOST:
+        judged, doubted = status[3] + status[4], status[0] == DOUBTED
         if judged >= CONFIRMING_RANGES and status[4] > _CONFIRMING_REJECTS * judged:
             distrust(model, state, search, s)
-        elif status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M:
+        elif doubted and (status[2] > model.coast_slots or not sigma < _DOUBTED_SIGMA_M):
+            lose(state, search, s, kept_tilt_variance(covariance))
+        elif not doubted and (status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M):
             lose(state, search, s, LOST_TILT_VARIANCE)
         elif (
             status[3] >= CONFIRMING_RANGES
-            and status[5] >= model.confirm_slots
+            and status[5] >= (CONFIRMING_SLOTS if doubted else model.confirm_slots)
             and sigma < model.sigma_limit_m
             and attitude_sigma_rad(covariance) < _CONFIRMED_SIGMA_RAD
         ):
@@ -475,6 +481,22 @@ def lose(state: FilterState, search: Search, s: int, tilt_variance: float) -> No
     """Declare a station lost."""
     state.status[s, 0] = LOST
     begin_search(search, s, tilt_variance)
+
+
+@compiled
+def doubt(state: FilterState, s: int) -> None:
+    """Report a station as lost whose position is too uncertain; ranges go on to correct it until it is sure again."""
+    status = state.status[s]
+    status[0] = DOUBTED
+    status[3], status[4], status[5] = 0, 0, 0
+    state.nis[s] = 0.0
+
+
+@compiled
+def kept_tilt_variance(covariance: Floats) -> float:
+    """Variance of the tilt about each horizontal axis that a station keeps when it is lost [rad^2]."""
+    out: float = max(0.5 * (covariance[6, 6] + covariance[7, 7]), 1e-6)
+    return out
 
 
 @compiled

@@ -3,8 +3,9 @@
 from harness.core.arrays import Ints
 from harness.core.compiled import compiled
 
-LOST, CONFIRMING, TRACKING = 0, 1, 2
-"""Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one."""
+LOST, CONFIRMING, TRACKING, DOUBTED = 0, 1, 2, 3
+"""Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one; with one whose position
+has become too uncertain. Records show quality 0 for all but the third."""
 CYCLE_SLOTS = 6
 """Slots whose ranges `MP` counts: at most twelve ranges of two microphones (docs/is900.md 7)."""
 LEAST_QUALITY = 1.0 / 255.0

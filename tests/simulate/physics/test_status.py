@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from harness.simulate.physics.status import CONFIRMING, LEAST_QUALITY, LOST, TRACKING, quality, sum_last
+from harness.simulate.physics.status import CONFIRMING, DOUBTED, LEAST_QUALITY, LOST, TRACKING, quality, sum_last
 
 
-@pytest.mark.parametrize("state", [LOST, CONFIRMING])
+@pytest.mark.parametrize("state", [LOST, CONFIRMING, DOUBTED])
 def test_a_station_without_a_confirmed_fix_has_quality_0(state: int) -> None:
     assert quality(state, 0.001, 12, 0, 0.003) == 0.0
 
