@@ -1,7 +1,7 @@
 """Every number that a scenario, a study or an option may set has a declared range, and other numbers are refused."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
@@ -20,6 +20,8 @@ METHODS = {type(registry.resolve(name)) for name in (*registry.methods(), "mean_
 ENDLESS = {"jump_m", "to_s"}
 """Fields that may be as large as you like; `inf` switches the outlier gate off, or lasts to the end."""
 NOT_CHOSEN = {"schema"}
+CHECKED_TOGETHER = {"Emitter"}
+"""Records of the protocol, which `simulate.physics.emitter_checks` checks where a scenario names them."""
 
 
 def types_in(hint: Any) -> Iterator[type]:
@@ -45,6 +47,7 @@ RECORDS = list(records(iter([Scenario, Sweep, PlacementStudy, Noise, *sorted(MET
 NUMBERS = [
     (kind, f.name, hint)
     for kind in RECORDS
+    if kind.__name__ not in CHECKED_TOGETHER
     for f in fields(kind)
     if f.init and f.name not in NOT_CHOSEN
     for hint in [get_type_hints(kind, include_extras=True)[f.name]]
@@ -66,9 +69,10 @@ def test_there_are_many() -> None:
 
 @pytest.mark.parametrize(("kind", "name", "hint"), NUMBERS, ids=lambda part: getattr(part, "__name__", str(part)[:20]))
 def test_a_number_without_meaning_is_refused(kind: type, name: str, hint: Any) -> None:
-    assert constraints_of(hint), f"{kind.__name__}.{name} declares no range"
-    (allowed,) = constraints_of(hint)
-    whole, shape = types_in(hint), get_args(hint)[0]
+    entry, enclose = ranged_entry(hint)
+    assert constraints_of(entry), f"{kind.__name__}.{name} declares no range"
+    (allowed,) = constraints_of(entry)
+    whole, shape = types_in(entry), without_none(get_args(entry)[0])
     number, count = (
         next(t for t in whole if t in (int, float)),
         len(get_args(shape)) if get_origin(shape) is tuple else 0,
@@ -81,10 +85,24 @@ def test_a_number_without_meaning_is_refused(kind: type, name: str, hint: Any) -
             value = 2**63
         given = [value] * (2 if Ellipsis in get_args(shape) else count) if get_origin(shape) is tuple else value
         with pytest.raises((TypeError, ValueError, HarnessError)) as caught:
-            replace_fields(holder(name, hint), {name: given}, "here", infinite=True)
+            replace_fields(holder(name, hint), {name: enclose(given)}, "here", infinite=True)
         assert f"here.{name}" in str(caught.value)
         if math.isfinite(bad):
             assert str(allowed) in str(caught.value)
+
+
+def ranged_entry(hint: Any) -> tuple[Any, Callable[[Any], Any]]:
+    """The annotation that declares the range, and what puts its value into the field: an entry of a list or table."""
+    if not constraints_of(hint) and get_origin(hint) is dict:
+        return get_args(hint)[1], lambda value: {"entry": value}
+    if not constraints_of(hint) and get_origin(hint) is tuple and Ellipsis in get_args(hint):
+        return get_args(hint)[0], lambda value: [value]
+    return hint, lambda value: value
+
+
+def without_none(hint: Any) -> Any:
+    """A tuple's annotation, also where None may stand for the tuple."""
+    return next((part for part in get_args(hint) if get_origin(part) is tuple), hint)
 
 
 def holder(name: str, hint: Any) -> Any:
