@@ -18,7 +18,7 @@ from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.filter_readings import FilterReadings
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
 from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
+from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
 from harness.simulate.physics.ranging import Ranges
 from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.room import Box, PlacedRoom
@@ -142,7 +142,7 @@ def track_free_station(
         take=STATION,
     )
     if covered_s is not None:
-        _cover(tracker, covered_s)
+        tracker.ranging = _CoveredEmitters(tracker.ranging, covered_s, tracker.schedule.slot_s)
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
     readings = tracker.measure(time_s[:, None])
     return _errors(time_s, readings, truth.advance(time_s))
@@ -158,17 +158,17 @@ def join_errors(parts: Sequence[StationErrors]) -> StationErrors:
     )
 
 
-def _cover(tracker: PhysicalTracker, covered_s: tuple[float, float]) -> None:
-    """Let no sound through from the first to the second time [s]."""
-    measure, schedule = tracker.ranging.measure, tracker.schedule
+class _CoveredEmitters:
+    """Ranges of a tracker, but for a time in which all emitters are covered."""
 
-    def measure_covered(first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
-        ranges = measure(first_slot, motion, qpos)
-        time_s = (first_slot + np.arange(len(ranges.emitter))) * schedule.slot_s
-        covered = (time_s >= covered_s[0]) & (time_s < covered_s[1])
+    def __init__(self, ranging: RangeSource, covered_s: tuple[float, float], slot_s: float) -> None:
+        self._ranging, self._covered_s, self._slot_s = ranging, covered_s, slot_s
+
+    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        ranges = self._ranging.measure(first_slot, motion, qpos)
+        time_s = (first_slot + np.arange(len(ranges.emitter))) * self._slot_s
+        covered = (time_s >= self._covered_s[0]) & (time_s < self._covered_s[1])
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))
-
-    tracker.ranging.measure = measure_covered  # type: ignore[method-assign]
 
 
 def _errors(time_s: Floats, readings: FilterReadings, true: TrackerMotion) -> StationErrors:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -56,8 +56,8 @@ def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
     rows = []
     for count, target in ((6, ">= 20"), (12, ">= 10")):
         parts: tuple[Callable[[], object], ...] = (
-            lambda count=count: simulate_stations(body, take, count, PHYSICAL, seed),  # type: ignore[misc]
-            lambda count=count: simulate_stations(body, take, count, noise_preset("default"), seed),  # type: ignore[misc]
+            partial(simulate_stations, body, take, count, PHYSICAL, seed),
+            partial(simulate_stations, body, take, count, noise_preset("default"), seed),
             lambda: _pose_all(Kinematics(body), np.asarray(take.qpos)),
         )
         parts[0]()

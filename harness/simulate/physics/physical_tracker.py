@@ -5,6 +5,7 @@ carries its state from block to block, and results do not depend on the size of 
 """
 
 import math
+from typing import Protocol
 
 import numpy as np
 
@@ -24,6 +25,12 @@ from harness.simulate.physics.sight import Sight
 
 BLOCK_SLOTS = 160
 """Slots of a block: two seconds."""
+
+
+class RangeSource(Protocol):
+    """What measures the ranges of block after block of slots; see `Ranging`."""
+
+    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges: ...
 
 
 class PhysicalTracker:
@@ -48,7 +55,7 @@ class PhysicalTracker:
         stations, inertial = source.stations, physics.inertial
         self.schedule = Schedule(inertial.rate_hz, len(constellation))
         true = constellation.surveyed(physics.constellation.survey_sd_m, seed, session or take)
-        self.ranging = Ranging(
+        self.ranging: RangeSource = Ranging(
             physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
