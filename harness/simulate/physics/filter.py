@@ -5,21 +5,17 @@ moment at which its sound arrived. It is compared with the motion at that moment
 the error at the slot's end.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from harness.core.arrays import Floats, Ints
+from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.simulate.physics.acquisition import (
-    LOST_TILT_VARIANCE,
     Search,
     add_force,
-    begin_search,
     fix,
     level_attitude,
 )
-from harness.simulate.physics.enhancement import MODES, add_to_offset, decay
+from harness.simulate.physics.enhancement import MODES, add_to_offset
 from harness.simulate.physics.error_state import (
     ERRORS,
     MOTION_ERRORS,
@@ -32,11 +28,12 @@ from harness.simulate.physics.error_state import (
     reset_attitude,
     update,
 )
+from harness.simulate.physics.filter_record import write_record
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
 from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CONFIRMING, CYCLE_SLOTS, DOUBTED, LOST, TRACKING, quality, sum_last
+from harness.simulate.physics.status import CONFIRMING, LOST
 from harness.simulate.physics.strapdown import (
-    Vector,
     attitude,
     exponential,
     integrate,
@@ -44,99 +41,17 @@ from harness.simulate.physics.strapdown import (
     rotated,
     set_attitude,
 )
+from harness.simulate.physics.tracking_state import finish_slot
 from harness.simulate.readings import GRAVITY_M_S2
 
-CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
-"""Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
-_CONFIRMING_REJECTS = 0.3
-"""Share of rejected ranges that refutes one [choice]."""
-_FEWEST_JUDGED = 10
-"""Ranges in a second below which no share of rejected ones is judged [choice]."""
-_DOUBTED_SIGMA_M = 0.15
-"""Standard deviation of the position at which a doubted station needs a new fix [choice]."""
-_COAST_SIGMA_M = 0.5
-"""Standard deviation of the position at which a lost station stops coasting [choice]."""
 _CLIPPED_SHARE = 0.3
 """Standard deviation of what a sensor at its limit leaves out, as a share of the limit [choice]."""
 _CORRELATION_S = 0.2
 """Time over which a motion keeps its direction, and so the error of scale and misalignment its sign [s] [choice]."""
-_FIX_SIGMA_M, _FIX_SIGMA_RAD, _CONFIRMED_SIGMA_RAD = 0.1, 0.3, 0.1
-"""Largest standard deviations of a fix: position [m], attitude and attitude once confirmed [rad] [choice]."""
-_CONFIRMED_NIS = 2.0
-"""Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
+_FIX_SIGMA_M, _FIX_SIGMA_RAD = 0.1, 0.3
+"""Largest standard deviations of a fix: position [m] and attitude [rad] [choice]."""
 _ATTEMPT_SLOTS = 8
 """Slots between two attempts of a fix; they must not follow the turn of the emitters [choice]."""
-
-
-class FilterModel(NamedTuple):
-    """Constants of the filter, shared by all stations."""
-
-    tick_s: float
-    lever_m: Floats
-    """(3,) inertial unit in the station's axes [m]."""
-    gate: float
-    noise: Floats
-    """(4,) noise densities of gyroscopes, accelerometers and their biases, x^2 per second."""
-    bias_variance: Floats
-    """(2,) variances of the biases at switch-on."""
-    inertial_scale: float
-    limit: Floats
-    """(2,) largest values of gyroscopes [rad/s] and accelerometers [m/s^2]."""
-    sigma_limit_m: float
-    reject_share: float
-    coast_slots: int
-    judged_slots: int
-    """Slots in a second."""
-    confirm_slots: int
-    window_s: float
-    """Time whose ranges make a fix."""
-    best_sigma_m: float
-    """Standard deviation of the position up to which the quality is 1."""
-
-
-class FilterState(NamedTuple):
-    """State of S stations' filters; a slot has 5 ticks."""
-
-    motion: Floats
-    """(S, 6, 10) position, velocity and attitude of the inertial unit at the ticks of the last slot, 5 is its end."""
-    bias: Floats
-    """(S, 6) of gyroscopes [rad/s] and accelerometers [m/s^2]."""
-    covariance: Floats
-    """(S, 15, 15)."""
-    turn_rad_s: Floats
-    """(S, 3) turn rate in the last interval, in the station's axes."""
-    acceleration_m_s2: Floats
-    """(S, 3) acceleration in the last interval, in the tracker's axes."""
-    offset: Floats
-    """(S, 2, 6) offsets of enhancement modes 1 and 2."""
-    status: Ints
-    """(S, 6) LOST, CONFIRMING, TRACKING or DOUBTED; whether the position is frozen; slots since an accepted range;
-    accepted and rejected ranges since the fix or the doubt; slots since then, or since the last attempt of a fix."""
-    counts: Ints
-    """(2, S, slots of a second) ranges received and rejected, in a ring."""
-    report: Floats
-    """(S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
-    nis: Floats
-    """(S, 2) sum of normalised squared innovations of accepted ranges since the fix, and their number."""
-
-
-class Outputs(NamedTuple):
-    """What E records of S stations show, and when they are made."""
-
-    tick: Ints
-    """(E, S) last tick before a record, ascending."""
-    fraction: Floats
-    """(E, S) part of the tick that had passed, in 0..1."""
-    position_m: Floats
-    """(E, S, 3 modes, 3) the station's origin, in each enhancement mode."""
-    tracker_from_station: Floats
-    """(E, S, 3 modes, 4)."""
-    velocity_m_s: Floats
-    """(E, S, 3) of the origin."""
-    turn_rad_s: Floats
-    """(E, S, 3) angular velocity in the tracker's axes."""
-    report: Floats
-    """(E, S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
 
 
 @compiled
@@ -428,143 +343,3 @@ def search_slot(
     status = state.status[s]
     status[:] = 0
     status[0] = CONFIRMING
-
-
-@compiled
-def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, slot: int) -> None:
-    """Decide whether a station is lost or confirmed, and what its records report from now on."""
-    status, counts, covariance = state.status[s], state.counts, state.covariance[s]
-    sigma = position_sigma_m(covariance)
-    status[5] += 1
-    if status[0] == TRACKING:
-        received = sum_last(counts[0, s], slot, model.judged_slots)
-        rejected = sum_last(counts[1, s], slot, model.judged_slots)
-        if received >= _FEWEST_JUDGED and rejected > model.reject_share * received:
-            distrust(model, state, search, s)
-        elif status[2] > model.coast_slots:
-            lose(state, search, s, kept_tilt_variance(covariance))
-        elif sigma > model.sigma_limit_m:
-            doubt(state, s)
-    elif status[0] != LOST:
-        judged, doubted = status[3] + status[4], status[0] == DOUBTED
-        if judged >= CONFIRMING_RANGES and status[4] > _CONFIRMING_REJECTS * judged:
-            distrust(model, state, search, s)
-        elif doubted and (status[2] > model.coast_slots or not sigma < _DOUBTED_SIGMA_M):
-            lose(state, search, s, kept_tilt_variance(covariance))
-        elif not doubted and (status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M):
-            lose(state, search, s, LOST_TILT_VARIANCE)
-        elif (
-            status[3] >= CONFIRMING_RANGES
-            and status[5] >= (CONFIRMING_SLOTS if doubted else model.confirm_slots)
-            and sigma < model.sigma_limit_m
-            and attitude_sigma_rad(covariance) < _CONFIRMED_SIGMA_RAD
-        ):
-            if state.nis[s, 0] < _CONFIRMED_NIS * state.nis[s, 1]:
-                status[0] = TRACKING
-            else:
-                distrust(model, state, search, s)
-    if status[0] == LOST and not sigma < _COAST_SIGMA_M:
-        freeze(state, s)
-    motion = state.motion[s, TICKS_PER_SLOT]
-    speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
-    turn = state.turn_rad_s[s]
-    decay(state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2))
-    received = sum_last(counts[0, s], slot, CYCLE_SLOTS)
-    rejected = sum_last(counts[1, s], slot, CYCLE_SLOTS)
-    report = state.report[s]
-    report[0] = quality(status[0], sigma, received, rejected, model.best_sigma_m)
-    report[1], report[2], report[3] = sigma, received, rejected
-
-
-@compiled
-def lose(state: FilterState, search: Search, s: int, tilt_variance: float) -> None:
-    """Declare a station lost."""
-    state.status[s, 0] = LOST
-    begin_search(search, s, tilt_variance)
-
-
-@compiled
-def doubt(state: FilterState, s: int) -> None:
-    """Report a station as lost whose position is too uncertain; ranges go on to correct it until it is sure again."""
-    status = state.status[s]
-    status[0] = DOUBTED
-    status[3], status[4], status[5] = 0, 0, 0
-    state.nis[s] = 0.0
-
-
-@compiled
-def kept_tilt_variance(covariance: Floats) -> float:
-    """Variance of the tilt about each horizontal axis that a station keeps when it is lost [rad^2]."""
-    out: float = max(0.5 * (covariance[6, 6] + covariance[7, 7]), 1e-6)
-    return out
-
-
-@compiled
-def distrust(model: FilterModel, state: FilterState, search: Search, s: int) -> None:
-    """Declare a station lost whose ranges contradict it: velocity, tilt and biases are then worth nothing either."""
-    lose(state, search, s, LOST_TILT_VARIANCE)
-    freeze(state, s)
-    state.bias[s] = 0.0
-    set_bias_covariance(model, state.covariance[s])
-
-
-@compiled
-def set_bias_covariance(model: FilterModel, covariance: Floats) -> None:
-    """Set the biases' part of P (15, 15) to that at switch-on."""
-    covariance[MOTION_ERRORS:, :] = 0.0
-    covariance[:, MOTION_ERRORS:] = 0.0
-    for i in range(6):
-        covariance[MOTION_ERRORS + i, MOTION_ERRORS + i] = model.bias_variance[i // 3]
-
-
-@compiled
-def freeze(state: FilterState, s: int) -> None:
-    """Stop the position of a station that knows its motion no longer; its covariance stays bounded, too."""
-    state.status[s, 1] = 1
-    state.motion[s, TICKS_PER_SLOT, 3:6] = 0.0
-    covariance = state.covariance[s]
-    covariance[:MOTION_ERRORS, :] = 0.0
-    covariance[:, :MOTION_ERRORS] = 0.0
-    for i in range(3):
-        covariance[i, i] = _COAST_SIGMA_M**2
-        covariance[6 + i, 6 + i] = LOST_TILT_VARIANCE
-
-
-@compiled
-def write_record(
-    model: FilterModel,
-    state: FilterState,
-    s: int,
-    k: int,
-    turn: Vector,
-    acceleration: Vector,
-    outputs: Outputs,
-    record: int,
-) -> None:
-    """Write a record of station s, from the slot's tick k and the motion of the interval before it."""
-    now, lever = state.motion[s, k], model.lever_m
-    since = outputs.fraction[record, s] * model.tick_s
-    q = product(attitude(now), exponential(turn[0] * since, turn[1] * since, turn[2] * since))
-    arm = rotated(q, lever[0], lever[1], lever[2])
-    rate = rotated(q, turn[0], turn[1], turn[2])
-    swing = (
-        rate[1] * arm[2] - rate[2] * arm[1],
-        rate[2] * arm[0] - rate[0] * arm[2],
-        rate[0] * arm[1] - rate[1] * arm[0],
-    )
-    for i in range(3):
-        velocity = now[3 + i] + acceleration[i] * since
-        position = now[i] + (now[3 + i] + 0.5 * acceleration[i] * since) * since - arm[i]
-        outputs.velocity_m_s[record, s, i] = velocity - swing[i]
-        outputs.turn_rad_s[record, s, i] = rate[i]
-        outputs.position_m[record, s, 0, i] = position
-        for mode in range(1, MODES):
-            outputs.position_m[record, s, mode, i] = position + state.offset[s, mode - 1, i]
-    for mode in range(MODES):
-        shown = q
-        if mode > 0:
-            offset = state.offset[s, mode - 1]
-            shown = product(exponential(offset[3], offset[4], offset[5]), q)
-        for i in range(4):
-            outputs.tracker_from_station[record, s, mode, i] = shown[i]
-    outputs.report[record, s] = state.report[s]

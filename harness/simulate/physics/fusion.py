@@ -23,20 +23,14 @@ from harness.simulate.physics.acquisition import (
 )
 from harness.simulate.physics.enhancement import MODES
 from harness.simulate.physics.error_state import ERRORS
-from harness.simulate.physics.filter import (
-    CONFIRMING_SLOTS,
-    FilterModel,
-    FilterState,
-    Outputs,
-    advance,
-    freeze,
-    set_bias_covariance,
-)
+from harness.simulate.physics.filter import advance
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
 from harness.simulate.physics.inertial import Inertial, InertialErrors
 from harness.simulate.physics.ranging_model import RangingModel
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
 from harness.simulate.physics.strapdown import STATE
+from harness.simulate.physics.tracking_state import CONFIRMING_SLOTS, freeze, set_bias_covariance
 
 
 @dataclass(frozen=True)

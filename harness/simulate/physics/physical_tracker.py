@@ -12,8 +12,8 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.hearing import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.filter import Outputs
 from harness.simulate.physics.filter_readings import FilterReadings, empty_readings
+from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import InertialUnit, true_increments
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource

@@ -7,7 +7,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.simulate.physics.filter import Outputs
+from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import Fusion, FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
 from harness.simulate.physics.level import level_db, noise_factor

@@ -1,0 +1,76 @@
+"""Constants, state and outputs of the stations' filters, for compiled loops."""
+
+from typing import NamedTuple
+
+from harness.core.arrays import Floats, Ints
+
+
+class FilterModel(NamedTuple):
+    """Constants of the filter, shared by all stations."""
+
+    tick_s: float
+    lever_m: Floats
+    """(3,) inertial unit in the station's axes [m]."""
+    gate: float
+    noise: Floats
+    """(4,) noise densities of gyroscopes, accelerometers and their biases, x^2 per second."""
+    bias_variance: Floats
+    """(2,) variances of the biases at switch-on."""
+    inertial_scale: float
+    limit: Floats
+    """(2,) largest values of gyroscopes [rad/s] and accelerometers [m/s^2]."""
+    sigma_limit_m: float
+    reject_share: float
+    coast_slots: int
+    judged_slots: int
+    """Slots in a second."""
+    confirm_slots: int
+    window_s: float
+    """Time whose ranges make a fix."""
+    best_sigma_m: float
+    """Standard deviation of the position up to which the quality is 1."""
+
+
+class FilterState(NamedTuple):
+    """State of S stations' filters; a slot has 5 ticks."""
+
+    motion: Floats
+    """(S, 6, 10) position, velocity and attitude of the inertial unit at the ticks of the last slot, 5 is its end."""
+    bias: Floats
+    """(S, 6) of gyroscopes [rad/s] and accelerometers [m/s^2]."""
+    covariance: Floats
+    """(S, 15, 15)."""
+    turn_rad_s: Floats
+    """(S, 3) turn rate in the last interval, in the station's axes."""
+    acceleration_m_s2: Floats
+    """(S, 3) acceleration in the last interval, in the tracker's axes."""
+    offset: Floats
+    """(S, 2, 6) offsets of enhancement modes 1 and 2."""
+    status: Ints
+    """(S, 6) LOST, CONFIRMING, TRACKING or DOUBTED; whether the position is frozen; slots since an accepted range;
+    accepted and rejected ranges since the fix or the doubt; slots since then, or since the last attempt of a fix."""
+    counts: Ints
+    """(2, S, slots of a second) ranges received and rejected, in a ring."""
+    report: Floats
+    """(S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
+    nis: Floats
+    """(S, 2) sum of normalised squared innovations of accepted ranges since the fix, and their number."""
+
+
+class Outputs(NamedTuple):
+    """What E records of S stations show, and when they are made."""
+
+    tick: Ints
+    """(E, S) last tick before a record, ascending."""
+    fraction: Floats
+    """(E, S) part of the tick that had passed, in 0..1."""
+    position_m: Floats
+    """(E, S, 3 modes, 3) the station's origin, in each enhancement mode."""
+    tracker_from_station: Floats
+    """(E, S, 3 modes, 4)."""
+    velocity_m_s: Floats
+    """(E, S, 3) of the origin."""
+    turn_rad_s: Floats
+    """(E, S, 3) angular velocity in the tracker's axes."""
+    report: Floats
+    """(E, S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""

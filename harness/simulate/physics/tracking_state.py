@@ -1,0 +1,135 @@
+"""The state of a station: when it is tracked, doubted or lost, and what its records report (docs/is900.md 16.7)."""
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.compiled import compiled
+from harness.simulate.physics.acquisition import (
+    LOST_TILT_VARIANCE,
+    Search,
+    begin_search,
+)
+from harness.simulate.physics.enhancement import decay
+from harness.simulate.physics.error_state import (
+    MOTION_ERRORS,
+    attitude_sigma_rad,
+    position_sigma_m,
+)
+from harness.simulate.physics.filter_state import FilterModel, FilterState
+from harness.simulate.physics.schedule import TICKS_PER_SLOT
+from harness.simulate.physics.status import CYCLE_SLOTS, DOUBTED, LOST, TRACKING, quality, sum_last
+
+CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
+"""Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
+_CONFIRMING_REJECTS = 0.3
+"""Share of rejected ranges that refutes one [choice]."""
+_CONFIRMED_SIGMA_RAD = 0.1
+"""Largest standard deviation of the attitude of a confirmed fix [rad] [choice]."""
+_CONFIRMED_NIS = 2.0
+"""Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
+_FEWEST_JUDGED = 10
+"""Ranges in a second below which no share of rejected ones is judged [choice]."""
+_DOUBTED_SIGMA_M = 0.15
+"""Standard deviation of the position at which a doubted station needs a new fix [choice]."""
+_COAST_SIGMA_M = 0.5
+"""Standard deviation of the position at which a lost station stops coasting [choice]."""
+
+
+@compiled
+def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, slot: int) -> None:
+    """Decide whether a station is lost or confirmed, and what its records report from now on."""
+    status, counts, covariance = state.status[s], state.counts, state.covariance[s]
+    sigma = position_sigma_m(covariance)
+    status[5] += 1
+    if status[0] == TRACKING:
+        received = sum_last(counts[0, s], slot, model.judged_slots)
+        rejected = sum_last(counts[1, s], slot, model.judged_slots)
+        if received >= _FEWEST_JUDGED and rejected > model.reject_share * received:
+            distrust(model, state, search, s)
+        elif status[2] > model.coast_slots:
+            lose(state, search, s, kept_tilt_variance(covariance))
+        elif sigma > model.sigma_limit_m:
+            doubt(state, s)
+    elif status[0] != LOST:
+        judged, doubted = status[3] + status[4], status[0] == DOUBTED
+        if judged >= CONFIRMING_RANGES and status[4] > _CONFIRMING_REJECTS * judged:
+            distrust(model, state, search, s)
+        elif doubted and (status[2] > model.coast_slots or not sigma < _DOUBTED_SIGMA_M):
+            lose(state, search, s, kept_tilt_variance(covariance))
+        elif not doubted and (status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M):
+            lose(state, search, s, LOST_TILT_VARIANCE)
+        elif (
+            status[3] >= CONFIRMING_RANGES
+            and status[5] >= (CONFIRMING_SLOTS if doubted else model.confirm_slots)
+            and sigma < model.sigma_limit_m
+            and attitude_sigma_rad(covariance) < _CONFIRMED_SIGMA_RAD
+        ):
+            if state.nis[s, 0] < _CONFIRMED_NIS * state.nis[s, 1]:
+                status[0] = TRACKING
+            else:
+                distrust(model, state, search, s)
+    if status[0] == LOST and not sigma < _COAST_SIGMA_M:
+        freeze(state, s)
+    motion = state.motion[s, TICKS_PER_SLOT]
+    speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
+    turn = state.turn_rad_s[s]
+    decay(state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2))
+    received = sum_last(counts[0, s], slot, CYCLE_SLOTS)
+    rejected = sum_last(counts[1, s], slot, CYCLE_SLOTS)
+    report = state.report[s]
+    report[0] = quality(status[0], sigma, received, rejected, model.best_sigma_m)
+    report[1], report[2], report[3] = sigma, received, rejected
+
+
+@compiled
+def lose(state: FilterState, search: Search, s: int, tilt_variance: float) -> None:
+    """Declare a station lost."""
+    state.status[s, 0] = LOST
+    begin_search(search, s, tilt_variance)
+
+
+@compiled
+def doubt(state: FilterState, s: int) -> None:
+    """Report a station as lost whose position is too uncertain; ranges go on to correct it until it is sure again."""
+    status = state.status[s]
+    status[0] = DOUBTED
+    status[3], status[4], status[5] = 0, 0, 0
+    state.nis[s] = 0.0
+
+
+@compiled
+def kept_tilt_variance(covariance: Floats) -> float:
+    """Variance of the tilt about each horizontal axis that a station keeps when it is lost [rad^2]."""
+    out: float = max(0.5 * (covariance[6, 6] + covariance[7, 7]), 1e-6)
+    return out
+
+
+@compiled
+def distrust(model: FilterModel, state: FilterState, search: Search, s: int) -> None:
+    """Declare a station lost whose ranges contradict it: velocity, tilt and biases are then worth nothing either."""
+    lose(state, search, s, LOST_TILT_VARIANCE)
+    freeze(state, s)
+    state.bias[s] = 0.0
+    set_bias_covariance(model, state.covariance[s])
+
+
+@compiled
+def set_bias_covariance(model: FilterModel, covariance: Floats) -> None:
+    """Set the biases' part of P (15, 15) to that at switch-on."""
+    covariance[MOTION_ERRORS:, :] = 0.0
+    covariance[:, MOTION_ERRORS:] = 0.0
+    for i in range(6):
+        covariance[MOTION_ERRORS + i, MOTION_ERRORS + i] = model.bias_variance[i // 3]
+
+
+@compiled
+def freeze(state: FilterState, s: int) -> None:
+    """Stop the position of a station that knows its motion no longer; its covariance stays bounded, too."""
+    state.status[s, 1] = 1
+    state.motion[s, TICKS_PER_SLOT, 3:6] = 0.0
+    covariance = state.covariance[s]
+    covariance[:MOTION_ERRORS, :] = 0.0
+    covariance[:, :MOTION_ERRORS] = 0.0
+    for i in range(3):
+        covariance[i, i] = _COAST_SIGMA_M**2
+        covariance[6 + i, 6 + i] = LOST_TILT_VARIANCE
