@@ -4,7 +4,6 @@ Keys hold metres and unit quaternions (w, x, y, z). There is a table for each st
 rows. The table `[diagnostics]` is information for people; the harness does not use it.
 """
 
-import string
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,11 +12,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from harness.core.calibration import Calibration
-from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
-from harness.core.files import read_toml, write_bytes
+from harness.core.files import read_toml
 from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.output_file import write_output
 from harness.core.skeleton import Skeleton
+from harness.core.toml_text import format_toml_key, format_toml_value, toml_table_lines
 from harness.errors import BadFile, BadInput, HarnessError
 
 SCHEMA = 1
@@ -27,8 +27,6 @@ _UNIT_TOLERANCE = 1e-6
 """Tolerance of a quaternion's length; seven digits copied by hand are enough."""
 _LONGEST_M = 1.0
 """Longest bone or mount that is accepted [m]."""
-_BARE_KEY_CHARACTERS = frozenset(string.ascii_letters + string.digits + "_-")
-"""Characters of a TOML key without quotes."""
 _HEAD_COMMENT = """\
 # Station mounts, the performer's bones, and the tracker's frame in the room. Written by `harness calibrate`.
 # Metres and unit quaternions (w, x, y, z); `a_from_b` takes b into a. docs/calibration.md says how to use it."""
@@ -95,29 +93,9 @@ class _FileContent:
     diagnostics: dict[str, Any] = field(default_factory=dict)
 
 
-def require_writable(path: Path, *, force: bool) -> None:
-    """BadFile when a calibration cannot be written to this path, or would overwrite a file without `force`."""
-    if path.exists() and not path.is_file():
-        raise BadFile(path, "it is not a file", "a file name for a calibration", "Choose another.")
-    if path.exists() and not force:
-        raise BadFile(path, "it exists", "a new file", "Choose another name, or overwrite it with --force.")
-    if not path.absolute().parent.is_dir():
-        raise BadFile(
-            path, "the folder does not exist", "a file name for a calibration", "Create it, or choose another."
-        )
-
-
 def write_calibration(path: Path, content: CalibrationFile, *, force: bool = False) -> None:
     """Write a calibration file atomically; BadFile as `require_writable`, BadInput for a skeleton of other joints."""
-    require_writable(path, force=force)
-    target = path.resolve()  # a symbolic link stays; its target is replaced
-    text = "\n".join(_lines(content)) + "\n"
-    try:
-        write_bytes(target, text.encode("utf-8", errors="replace"))
-    except OSError as error:
-        if is_system_fault(error):
-            raise
-        raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Choose another.") from error
+    write_output(path, "\n".join(_lines(content)) + "\n", EXPECTED, force=force)
 
 
 def read_calibration(path: Path | str) -> CalibrationFile:
@@ -183,15 +161,22 @@ def _require_unit(key: str, quaternion: Sequence[float]) -> None:
 
 def _lines(content: CalibrationFile) -> Iterator[str]:
     calibration = content.calibration
-    yield from (_HEAD_COMMENT, f"schema = {SCHEMA}", f"kind = {_value(calibration.kind)}", "", _ROOM_COMMENT, "[room]")
-    yield f"world_from_tracker = {_value(calibration.world_from_tracker.tolist())}"
-    yield f"tracker_origin_m = {_value(calibration.tracker_origin_m.tolist())}"
+    yield from (
+        _HEAD_COMMENT,
+        f"schema = {SCHEMA}",
+        f"kind = {format_toml_value(calibration.kind)}",
+        "",
+        _ROOM_COMMENT,
+        "[room]",
+    )
+    yield f"world_from_tracker = {format_toml_value(calibration.world_from_tracker.tolist())}"
+    yield f"tracker_origin_m = {format_toml_value(calibration.tracker_origin_m.tolist())}"
     yield from ("", _STATION_COMMENT)
     for row, name in enumerate(calibration.stations):
-        yield f"[station.{_key(name)}]"
-        yield f"bone = {_value(calibration.bones[row])}"
-        yield f"mount_m = {_value(calibration.mount_m[row].tolist())}"
-        yield f"bone_from_station = {_value(calibration.bone_from_station[row].tolist())}"
+        yield f"[station.{format_toml_key(name)}]"
+        yield f"bone = {format_toml_value(calibration.bones[row])}"
+        yield f"mount_m = {format_toml_value(calibration.mount_m[row].tolist())}"
+        yield f"bone_from_station = {format_toml_value(calibration.bone_from_station[row].tolist())}"
         yield ""
     if content.skeleton is not None:
         standard = standard_skeleton()
@@ -201,43 +186,6 @@ def _lines(content: CalibrationFile) -> Iterator[str]:
             raise BadInput("The skeleton has other joints than the body.", "Calibrate on the standard body's joints.")
         yield from (_BONES_COMMENT, "[bone_m]")
         for bone, vector_m in zip(BONES, content.skeleton.bone_m.tolist(), strict=True):
-            yield f"{bone} = {_value(vector_m)}"
+            yield f"{bone} = {format_toml_value(vector_m)}"
         yield ""
-    yield from (_DIAGNOSTICS_COMMENT, *_table("diagnostics", content.diagnostics))
-
-
-def _table(name: str, content: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of a TOML table; plain values come before inner tables, as TOML requires."""
-    yield f"[{name}]"
-    for key, value in content.items():
-        if not isinstance(value, Mapping):
-            yield f"{_key(key)} = {_value(value)}"
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            yield ""
-            yield from _table(f"{name}.{_key(key)}", value)
-
-
-def _key(name: str) -> str:
-    return name if name and set(name) <= _BARE_KEY_CHARACTERS else _value(name)
-
-
-def _value(value: Any) -> str:
-    """A TOML value; floats keep every digit. TypeError for types that TOML does not have."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        return repr(float(value))  # the repr of numpy floats names their type
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, str):
-        return f'"{"".join(map(_character, value))}"'
-    if isinstance(value, Sequence):
-        return f"[{', '.join(map(_value, value))}]"
-    raise TypeError(f"{value!r} cannot be written")
-
-
-def _character(character: str) -> str:
-    if character in '"\\':
-        return f"\\{character}"
-    return f"\\u{ord(character):04x}" if ord(character) < 0x20 or ord(character) == 0x7F else character
+    yield from (_DIAGNOSTICS_COMMENT, *toml_table_lines("diagnostics", content.diagnostics))

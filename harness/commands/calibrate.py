@@ -130,13 +130,14 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
 
 
 def _calibrate_performer(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.calibration_file import require_writable, write_calibration
+    from harness.calibrate.calibration_file import EXPECTED, write_calibration
+    from harness.core.output_file import require_writable
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write, such as --out me.toml.")
     if args.pictures is not None and args.view != "frames":
         raise BadInput("--pictures without --view frames.", "Give both, or neither.")
-    require_writable(args.out, force=args.force)
+    require_writable(args.out, EXPECTED, force=args.force)
     found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
     write_calibration(args.out, found.file, force=args.force)
     following: list[object] = ["replay", args.recording, "--methods", "ik,expert_map", "--calibration", args.out]
