@@ -19,6 +19,7 @@ from harness.core.package_data import data_folder
 from harness.core.ranges import Range, check_fields
 from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName, name_file
+from harness.experiment.fitted_unit import merge_fitted_unit
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
 from harness.results.cell import varied_text
@@ -31,7 +32,7 @@ from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
 _STATION_SETS_FILE = "stations.toml"
-_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault")
+_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault", "fitted")
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,9 @@ class Scenario:
     """Noise preset."""
     profile: Text = ""
     """Name of changed noise in tables; without it the preset's name and an asterisk."""
+    fitted: Text = ""
+    """Unit file of a measured device (`harness characterize`), in the scenario's folder. Its components and tracker
+    replace those of the preset `default`; the scenario's own tables take precedence."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise preset (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
     physics: Physics | None = None
@@ -172,8 +176,12 @@ class Scenario:
         return self.profile or self.noise + physical + ("*" if self.components else "")
 
     def content(self) -> dict[str, Any]:
-        """The fields as a dictionary, without a table [physics] that is not there."""
+        """The fields as a dictionary, without a table [physics] that is not there, and without the name of a unit file.
+
+        The values of the unit are in the tables.
+        """
         content = asdict(self)
+        del content["fitted"]
         if self.physics is None:
             del content["physics"]  # as before the key existed
         return content
@@ -198,6 +206,8 @@ def load_scenario(path: Path | str) -> Scenario:
         try:
             if "stations" in content:
                 content["stations"] = expand_station_set(content["stations"])
+            if "fitted" in content:
+                content = merge_fitted_unit(content, path.parent)
             scenario = build(Scenario, content, "scenario")
             methods = tuple(name for text in scenario.methods for name in expand_alternatives(text))
             scenario = _read_constellation(replace(scenario, methods=methods), path.parent)

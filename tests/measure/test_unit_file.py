@@ -1,0 +1,87 @@
+"""Unit files: read back as written, damaged ones refused in one line."""
+
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.errors import BadFile
+from harness.measure.measured import Measured
+from harness.measure.unit_file import UnitFile, read_unit_file, unit_value, write_unit_file
+
+UNIT = UnitFile(
+    name="lab unit",
+    components={"white": {"position_m": 0.0007}, "echo": {"share": 0.03, "size_m": [0.05, 0.3]}},
+    tracker={"rate_hz": 40.0, "items": [40, 2, 11, 21, 1]},
+    measured={"components.white.position_m": Measured(0.0007, 0.00069, 0.00071, 1000)},
+    not_measured={"components.session.scale": "A reference is needed."},
+    session={"scale": Measured(1.001, 1.0, 1.002, 6)},
+    capture={"file": 'a "quoted" name.is900', "seconds": 60.0},
+)
+
+
+def test_a_unit_file_reads_back_as_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "unit.toml"
+    write_unit_file(path, UNIT)
+    assert read_unit_file(path) == UNIT
+    before = path.read_bytes()
+    write_unit_file(path, UNIT, force=True)
+    assert path.read_bytes() == before
+
+
+def test_an_existing_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "unit.toml"
+    path.write_text("mine")
+    with pytest.raises(BadFile, match="it exists"):
+        write_unit_file(path, UNIT)
+    assert path.read_text() == "mine"
+
+
+def test_a_key_that_was_not_measured_has_no_interval(tmp_path: Path) -> None:
+    path = tmp_path / "unit.toml"
+    write_unit_file(path, replace(UNIT, measured={"components.echo.share": Measured.missing("no static stretch")}))
+    assert read_unit_file(path).measured == {}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('kind = "unit"', 'kind = "run"', "kind 'run'"),
+        ("schema = 1", "schema = 2", "schema 2"),
+        ("[tracker]", "[trackers]", "trackers"),
+        ("0.00069, 0.00071, 1000]", "0.00072, 0.00071, 1000]", "interval"),
+        ("0.00069, 0.00071, 1000]", "0.00069]", "expected 4 values"),
+        ("[components.white]", "[components]\nwhite = 3.0\n[components.other]", "components.white: expected a table"),
+    ],
+)
+def test_a_file_that_is_no_unit_file_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "unit.toml"
+    write_unit_file(path, UNIT)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(BadFile, match=message):
+        read_unit_file(path)
+
+
+@given(data=st.data())
+def test_a_damaged_file_is_read_or_refused(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("unit") / "unit.toml"
+    write_unit_file(path, UNIT)
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    with suppress(BadFile):  # any other error fails the test
+        read_unit_file(path)
+
+
+def test_values_are_found_by_dotted_keys() -> None:
+    assert unit_value(UNIT, "components.white.position_m") == 0.0007
+    assert unit_value(UNIT, "components.echo.size_m.1") == 0.3
+    assert unit_value(UNIT, "tracker.rate_hz") == 40.0
+    assert unit_value(UNIT, "components.echo.size_m") is None
+    assert unit_value(UNIT, "components.nothing.share") is None
