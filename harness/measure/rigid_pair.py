@@ -1,0 +1,170 @@
+"""Errors in motion of two stations on one rigid bar, without any reference.
+
+The vector from one station to the other is constant in the frame of the bar. What it changes by is the error of both
+stations. A position that is measured at another moment than the orientation shows as an error along the relative
+velocity of the two stations: (p_b - p_a) = R r + ahead d/dt (R r), with the bar's rotation R and vector r.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy import special
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints
+from harness.errors import BadInput
+from harness.measure.measured import Measured
+
+SPEED_EDGES_M_S = (0.0, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Edges of the classes of speed [m/s]; the first class is rest [choice]."""
+_MAX_STEP_S = 0.1
+"""Longest time between two readings that are interpolated [s]."""
+_BLOCK_S = 5.0
+"""Length of the blocks whose sums give the intervals [s]: five correlation times of the drift."""
+_MIN_BLOCKS = 6
+_OUTLIER = 5.0
+"""Errors beyond this many median absolute values are left out: echoes and excursions."""
+_MIN_TURN_SPEED_M_S = 0.05
+"""Least RMS of the stations' relative speed that shows a difference of their times [m/s]."""
+
+
+@dataclass(frozen=True)
+class SpeedClass:
+    """Errors of the bar's vector in one class of speed."""
+
+    from_m_s: float
+    to_m_s: float
+    rms_m: Measured
+    """RMS of the error, of both stations together [m]."""
+
+
+@dataclass(frozen=True)
+class RigidPair:
+    """What two stations on one bar show."""
+
+    stations: tuple[str, str]
+    length_m: Measured
+    """Distance of the two stations [m]."""
+    rotation_rad: Measured
+    """RMS of the difference of the two orientations from its mean [rad]."""
+    ahead_s: Measured
+    """Time by which positions run ahead of orientations [s]: `components.speed.ahead_s` of a scenario."""
+    speeds: tuple[SpeedClass, ...]
+    """Classes of speed in which the pair was measured."""
+
+
+def measure_rigid_pair(
+    stations: tuple[str, str],
+    time_s: tuple[Floats, Floats],
+    position_m: tuple[Floats, Floats],
+    tracker_from_station: tuple[Floats, Floats],
+) -> RigidPair:
+    """Measure two stations on one bar from their valid readings: times (N,), positions (N, 3), quaternions (N, 4).
+
+    The second station is interpolated at the times of the first. BadInput with fewer than `_MIN_BLOCKS` blocks of
+    common readings.
+    """
+    rows, b_m, b_turn = _at_times_of_first(time_s, position_m[1], tracker_from_station[1])
+    now_s, a_m, a_turn = time_s[0][rows], position_m[0][rows], tracker_from_station[0][rows]
+    block = ((now_s - now_s[0]) // _BLOCK_S).astype(np.int64) if len(now_s) else np.zeros(0, dtype=np.int64)
+    if len(np.unique(block)) < _MIN_BLOCKS:
+        found = f"{stations[0]} and {stations[1]} have {len(np.unique(block)) * _BLOCK_S:g} s of common readings."
+        raise BadInput(found, f"Move the bar for {_MIN_BLOCKS * _BLOCK_S:g} s or more, in sight of the emitters.")
+    vector_m = rotations.rotate(rotations.inverse(a_turn), b_m - a_m)  # in the frame of the first station
+    lever_m = np.median(vector_m, axis=0)
+    turned = rotations.multiply(rotations.inverse(a_turn), b_turn)
+    mean_turn = _mean_rotation(turned)
+    twist_rad = rotations.log(rotations.multiply(rotations.inverse(mean_turn), turned))
+    relative_m_s = _derivative(now_s, rotations.rotate(a_turn, lever_m))
+    speed_m_s = np.linalg.norm(_derivative(now_s, 0.5 * (a_m + b_m)), axis=1)
+    error_m = (b_m - a_m) - rotations.rotate(a_turn, lever_m)
+    size_m = np.linalg.norm(error_m, axis=1)
+    kept = np.isfinite(relative_m_s).all(axis=1) & np.isfinite(speed_m_s)
+    kept &= size_m < _OUTLIER * np.median(size_m[kept]) if kept.any() else False
+    columns = error_m[kept], relative_m_s[kept], twist_rad[kept], speed_m_s[kept], block[kept]
+    return RigidPair(
+        stations,
+        _mean(np.linalg.norm(vector_m[kept], axis=1), block[kept]),
+        _rms(np.linalg.norm(columns[2], axis=1), columns[4]),
+        _ahead(columns[0], columns[1], columns[4]),
+        tuple(
+            SpeedClass(low, high, _rms(size_m[kept][inside], block[kept][inside]))
+            for low, high in pairwise(SPEED_EDGES_M_S)
+            if len(np.unique(block[kept][inside := (columns[3] >= low) & (columns[3] < high)])) >= _MIN_BLOCKS
+        ),
+    )
+
+
+def _at_times_of_first(time_s: tuple[Floats, Floats], b_m: Floats, b_turn: Floats) -> tuple[Ints, Floats, Floats]:
+    """Rows of the first station between two near readings of the second, whose pose is interpolated there.
+
+    Positions follow a cubic through the nearest four readings (Catmull-Rom); orientations a great arc.
+    """
+    a_s, b_s = time_s
+    after = np.clip(np.searchsorted(b_s, a_s, side="right"), 2, max(len(b_s) - 2, 2))
+    if len(b_s) < 4 or not len(a_s):
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 4))
+    quartet_s = b_s[after[:, None] + np.arange(-2, 2)]
+    near = (np.diff(quartet_s, axis=1) < _MAX_STEP_S).all(axis=1)
+    rows = np.flatnonzero(near & (a_s >= quartet_s[:, 1]) & (a_s <= quartet_s[:, 2]))
+    before, now_s = after[rows] - 1, a_s[rows]
+    share = ((now_s - b_s[before]) / (b_s[before + 1] - b_s[before]))[:, None]
+    between = rotations.log(rotations.multiply(rotations.inverse(b_turn[before]), b_turn[before + 1]))
+    turn = rotations.multiply(b_turn[before], rotations.exp(share * between))
+    place = np.zeros((len(rows), 3))
+    for offset in range(-1, 3):  # Lagrange's polynomial through four readings, which need not be evenly spaced
+        weight = np.ones(len(rows))
+        for other in range(-1, 3):
+            if other != offset:
+                weight *= (now_s - b_s[before + other]) / (b_s[before + offset] - b_s[before + other])
+        place += weight[:, None] * b_m[before + offset]
+    return rows, place, turn
+
+
+def _derivative(time_s: Floats, values: Floats) -> Floats:
+    """Central differences (N, 3) of values over their neighbours; NaN at the ends and across gaps."""
+    out: Floats = np.full(values.shape, np.nan)
+    step_s = time_s[2:] - time_s[:-2]
+    near = step_s < 2.0 * _MAX_STEP_S
+    out[1:-1][near] = ((values[2:] - values[:-2])[near].T / step_s[near]).T
+    return out
+
+
+def _mean_rotation(quaternions: Floats) -> Floats:
+    """The mean orientation (4,) of (N, 4): the largest eigenvector of the sum of outer products (Markley 2007)."""
+    _, vectors = np.linalg.eigh(quaternions.T @ quaternions)
+    out: Floats = vectors[:, -1]
+    return out
+
+
+def _ahead(error_m: Floats, velocity_m_s: Floats, block: Ints) -> Measured:
+    """Regression of the errors (N, 3) on the relative velocities (N, 3)."""
+    power = np.sum(velocity_m_s**2, axis=1)
+    if np.sqrt(power.mean()) < _MIN_TURN_SPEED_M_S:
+        return Measured.missing("The bar hardly turned: turn it about several axes.")
+    return _block_ratio(np.sum(velocity_m_s * error_m, axis=1), power, block)
+
+
+def _mean(values: Floats, block: Ints) -> Measured:
+    return _block_ratio(values, np.ones(len(values)), block)
+
+
+def _rms(values: Floats, block: Ints) -> Measured:
+    squared = _block_ratio(values**2, np.ones(len(values)), block)
+    low, middle, high = np.sqrt(np.maximum([squared.low, squared.value, squared.high], 0.0)).tolist()
+    return Measured(middle, low, high, squared.count)
+
+
+def _block_ratio(numerator: Floats, denominator: Floats, block: Ints) -> Measured:
+    """The ratio of two sums over (N,) values, with the standard deviation that the blocks' sums show (delta method).
+
+    Values of one block may depend on each other.
+    """
+    _, row = np.unique(block, return_inverse=True)
+    above, below = np.bincount(row, numerator), np.bincount(row, denominator)
+    ratio = float(above.sum() / below.sum())
+    count = len(above)
+    deviation = np.sqrt(count / (count - 1) * np.sum((above - ratio * below) ** 2)) / below.sum()
+    half = float(special.stdtrit(count - 1, 0.975) * deviation)
+    return Measured(ratio, ratio - half, ratio + half, count)
