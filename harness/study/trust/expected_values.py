@@ -1,0 +1,96 @@
+"""Numbers that a unit is expected to have: those of a noise preset, or of an earlier unit file."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from harness.core.fields import replace_fields
+from harness.errors import BadInput
+from harness.measure.measured import Measured
+from harness.measure.unit_file import UnitFile
+from harness.simulate.noise import noise_preset
+
+UNIFORM_KEYS = (
+    "components.excursion.size_m",
+    "components.excursion.stay_s",
+    "components.echo.burst_records",
+    "components.echo.size_m",
+    "components.dropout.gap_s",
+)
+"""Keys of two numbers that are the ends of a uniform distribution. Its mean is checked, which is known better."""
+EXPECTED_PRESET = "default"
+
+
+def preset_components() -> dict[str, Any]:
+    """The components of the preset `default` as tables of TOML; components that it lacks are left out."""
+    return {
+        name: {key: list(value) if isinstance(value, tuple) else value for key, value in table.items()}
+        for name, table in asdict(noise_preset(EXPECTED_PRESET)).items()
+        if table
+    }
+
+
+def preset_values() -> dict[str, Measured]:
+    """Dotted key -> number of the preset `default`, known exactly; of a uniform distribution also its mean."""
+    return _with_means({key: _exact(value) for key, value in flatten_components(preset_components())})
+
+
+def unit_values(unit: UnitFile) -> dict[str, Measured]:
+    """Dotted key -> number that an earlier unit file measured, with its interval; of a uniform distribution its mean.
+
+    Keys that the file did not measure are left out. BadInput for values that no scenario would accept.
+    """
+    try:
+        replace_fields(noise_preset(EXPECTED_PRESET), unit.components, "components")
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"{error}.", "Use a unit file that `harness characterize` wrote.") from error
+    return _with_means(dict(unit.measured))
+
+
+def flatten_components(components: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Dotted keys and values of the numbers in tables of components, such as "components.echo.size_m.0"."""
+    for name, table in components.items():
+        for key, value in table.items():
+            values = value if isinstance(value, Sequence) and not isinstance(value, str) else None
+            if values is not None:
+                yield from (
+                    (f"components.{name}.{key}.{i}", float(v))
+                    for i, v in enumerate(values)
+                    if isinstance(v, int | float)
+                )
+            elif isinstance(value, int | float) and not isinstance(value, bool):
+                yield f"components.{name}.{key}", float(value)
+
+
+def nest_components(values: Mapping[str, float], base: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables `base` with the numbers of dotted keys in their places; whole numbers stay whole."""
+    out: dict[str, Any] = {
+        name: {key: list(value) if isinstance(value, list | tuple) else value for key, value in table.items()}
+        for name, table in base.items()
+    }
+    for dotted, value in values.items():
+        _, name, key, *index = dotted.split(".")
+        before = out[name][key]
+        if index:
+            whole = isinstance(before[int(index[0])], int)
+            before[int(index[0])] = round(value) if whole else float(value)
+        else:
+            out[name][key] = round(value) if isinstance(before, int) else float(value)
+    return out
+
+
+def _with_means(values: dict[str, Measured]) -> dict[str, Measured]:
+    """The numbers, and for each pair of ends of a uniform distribution its mean under the key without an index.
+
+    A mean that is there already stays: it was measured itself.
+    """
+    for key in UNIFORM_KEYS:
+        ends = [values.get(f"{key}.{i}") for i in (0, 1)]
+        if key not in values and ends[0] is not None and ends[1] is not None:
+            middle = 0.5 * (ends[0].value + ends[1].value)
+            values[key] = _exact(middle)
+    return values
+
+
+def _exact(value: float) -> Measured:
+    return Measured(value, value, value)
