@@ -7,6 +7,7 @@ import os
 import stat
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from harness.errors import BadFile
 
@@ -39,10 +40,8 @@ def check_input_file(path: Path, expected: str, limit_bytes: int, advice: str = 
 
 def read_input_file(path: Path, expected: str, limit_bytes: int, advice: str = "Check the path.") -> bytes:
     """The content of a file; BadFile as `check_input_file`, and where it cannot be read."""
-    check_input_file(path, expected, limit_bytes, advice)
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
     try:
-        with open(os.open(path, flags), "rb") as file:
+        with open_input_file(path, expected, limit_bytes, advice) as file:
             data = file.read(limit_bytes + 1)
     except OSError as error:
         raise BadFile(path, f"it cannot be read ({_reason(error)})", expected, advice) from error
@@ -50,6 +49,16 @@ def read_input_file(path: Path, expected: str, limit_bytes: int, advice: str = "
         limit = f"{expected} of at most {limit_bytes:,} bytes"
         raise BadFile(path, f"a file of more than {limit_bytes:,} bytes", limit, "Is it the right file?")
     return data
+
+
+def open_input_file(path: Path, expected: str, limit_bytes: int, advice: str = "Check the path.") -> BinaryIO:
+    """A file that is open for reading; BadFile as `check_input_file`, and where it cannot be opened."""
+    check_input_file(path, expected, limit_bytes, advice)
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        return open(os.open(path, flags), "rb")
+    except OSError as error:
+        raise BadFile(path, f"it cannot be read ({_reason(error)})", expected, advice) from error
 
 
 def names_input_file(path: Path) -> bool:

@@ -16,10 +16,12 @@ A file is a header and then blocks; all numbers are little-endian:
 Every version begins with these 16 bytes of header. Readers skip blocks of a kind that they do not know.
 """
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import BinaryIO
 
 MAGIC = b"\x89IS900\r\n"
 VERSION = 1
@@ -29,13 +31,15 @@ MAX_PAYLOAD_BYTES = 1 << 16
 
 RECEIVED, SENT = "recv", "sent"
 """Bytes from and to the device, unchanged."""
-CONFIGURED, EVENT, NOTE, ANSWERED = "conf", "evnt", "note", "answ"
+CONFIGURED, EVENT, NOTE, ANSWERED, MARK = "conf", "evnt", "note", "answ", "mark"
 """JSON: the format of the bytes that follow, an event on the line, the origin of the recording, a command with its
-decoded answer."""
+decoded answer, the stretch of a capture that begins."""
 
 _CRC = struct.Struct("<I")
 _VERSION = struct.Struct("<8sI")
 _HEAD = struct.Struct("<4s4sIdd")
+_LONGEST_BLOCK_BYTES = _HEAD.size + MAX_PAYLOAD_BYTES + _CRC.size
+_PIECE_BYTES = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -79,19 +83,31 @@ def read_version(data: bytes) -> int | None:
 
 def read_blocks(data: bytes, begin: int = len(FILE_HEADER)) -> Iterator[RecordingBlock | DamagedSpan]:
     """Yield every whole block of a file from byte `begin` on, and the damaged spans between them."""
-    offset = whole_until = begin
-    while offset < len(data):
-        block, size = _read_block(data, offset)
+    file = io.BytesIO(data)
+    file.seek(begin)
+    return scan_blocks(file)
+
+
+def scan_blocks(file: BinaryIO) -> Iterator[RecordingBlock | DamagedSpan]:
+    """Yield what `read_blocks` does, from the present position of a file on, which is read in pieces."""
+    base = whole_until = file.tell()
+    window, offset = file.read(_PIECE_BYTES), 0
+    while offset < len(window):
+        while len(window) - offset < _LONGEST_BLOCK_BYTES and (more := file.read(_PIECE_BYTES)):
+            window, base, offset = window[offset:] + more, base + offset, 0
+        block, size = _read_block(window, offset)
         if block is None:
-            following = data.find(BLOCK_MARKER, offset + 1)
-            offset = following if following >= 0 else len(data)
+            following = window.find(BLOCK_MARKER, offset + 1)
+            # A marker may begin in the last bytes of this piece and end in the next one.
+            offset = following if following >= 0 else max(offset + 1, len(window) - len(BLOCK_MARKER) + 1)
             continue
-        if offset > whole_until:
-            yield DamagedSpan(whole_until, offset)
+        if base + offset > whole_until:
+            yield DamagedSpan(whole_until, base + offset)
         yield block
-        offset = whole_until = offset + size
-    if whole_until < len(data):
-        yield DamagedSpan(whole_until, len(data))
+        offset += size
+        whole_until = base + offset
+    if whole_until < base + len(window):
+        yield DamagedSpan(whole_until, base + len(window))
 
 
 def _read_block(data: bytes, offset: int) -> tuple[RecordingBlock | None, int]:

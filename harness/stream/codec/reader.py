@@ -72,7 +72,7 @@ class FrameReader:
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
-        self._decoder = _make_decoder(wire)
+        self._decoder = make_decoder(wire)
         self._clock = ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
         self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
@@ -186,7 +186,8 @@ class FrameReader:
         )
 
 
-def _make_decoder(wire: WireFormat) -> Decoder | DatagramDecoder:
+def make_decoder(wire: WireFormat) -> Decoder | DatagramDecoder:
+    """The decoder of bytes of this format."""
     if wire.datagrams:
         return DatagramDecoder(wire.items, wire.characters)
     return Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)

@@ -8,6 +8,8 @@ costs only the blocks it touches, and these are reported. A recording that was c
     evnt         JSON of an event on the line, as the driver reported it
     note         JSON of the origin of what follows: the port, or the scenario, clip, seed, stations and rate
     answ         JSON of a command that a person sent, with the bytes and the decoded values of its answer
+    mark         JSON of the stretch of a capture that begins here and lasts to the next mark, such as
+                 {"stretch": "static"}; the stretch "" ends one
 """
 
 import json
@@ -15,17 +17,18 @@ import math
 import os
 import stat
 import time
-from collections.abc import Iterator, Mapping
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any
+from typing import Any, BinaryIO
 
 from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
-from harness.core.input_file import MEGABYTE, read_input_file
+from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten
@@ -34,6 +37,7 @@ from harness.stream.codec.blocks import (
     CONFIGURED,
     EVENT,
     FILE_HEADER,
+    MARK,
     MAX_PAYLOAD_BYTES,
     NOTE,
     RECEIVED,
@@ -53,6 +57,8 @@ EXPECTED_FILE = "a recording by `harness record`"
 _WRITABLE_FILE = "a file to record into"
 _MAX_ANSWER_BYTES = 8192
 """Most bytes of an answer that are repeated next to its decoded values."""
+_KIND_BYTES = 1 << 20
+"""Bytes in which the beginning of a recording whose header is damaged must have a whole block."""
 MAX_BYTES = 2048 * MEGABYTE
 """Largest recording that is read: some two days of a full serial line."""
 
@@ -72,17 +78,7 @@ class Recording:
     def damage(self) -> tuple[str, ...]:
         """Descriptions of the damaged or truncated parts, in file order."""
         out: list[str] = []
-        damaged: DamagedSpan | None = None
-        before_s = None
-        for entry in self._entries():
-            if isinstance(entry, DamagedSpan):
-                damaged = entry
-                continue
-            if damaged:
-                out.append(_damage_text(damaged, before_s, entry.monotonic_s))
-            damaged, before_s = None, entry.monotonic_s
-        if damaged:
-            out.append(_truncation_text(damaged, before_s))
+        deque(describe_damage(self._entries(), out), maxlen=0)
         return tuple(out)
 
     @cached_property
@@ -94,7 +90,7 @@ class Recording:
     def note(self) -> dict[str, Any]:
         """The latest note on the origin of the recording; empty when there is none."""
         notes = [block for block in self.blocks() if block.kind == NOTE]
-        return self._json(notes[-1]) if notes else {}
+        return self.parse_json(notes[-1]) if notes else {}
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -103,14 +99,20 @@ class Recording:
         return [{"monotonic_s": block.monotonic_s, **self._event(block)} for block in event_blocks]
 
     @property
+    def marks(self) -> list[dict[str, Any]]:
+        """Marks of stretches, with the time on the host's clock [s] at which each begins."""
+        blocks = [block for block in self.blocks() if block.kind == MARK]
+        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
+
+    @property
     def answers(self) -> list[dict[str, Any]]:
         """Commands that a person sent, with their answers and the time on the host's clock [s]."""
         blocks = [block for block in self.blocks() if block.kind == ANSWERED]
-        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in blocks]
+        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
 
     def format_of(self, configured: RecordingBlock) -> WireFormat:
         """Parse the wire format in a "conf" block. Raises BadFile."""
-        content = self._json(configured)
+        content = self.parse_json(configured)
         try:
             content["characters"] = str(content.get("characters", "")).encode()
             wire = build(WireFormat, content, "wire format")
@@ -121,12 +123,13 @@ class Recording:
             raise BadFile(self.path, f"an unusable wire format ({error})", EXPECTED_FILE, "") from error
 
     def _event(self, block: RecordingBlock) -> dict[str, str]:
-        content = self._json(block)
+        content = self.parse_json(block)
         if not all(isinstance(content.get(name), str) for name in ("kind", "text")):
             raise BadFile(self.path, "an event without kind and text", EXPECTED_FILE, "Record again.")
         return {name: shorten(content[name]) for name in ("kind", "text")}
 
-    def _json(self, block: RecordingBlock) -> dict[str, Any]:
+    def parse_json(self, block: RecordingBlock) -> dict[str, Any]:
+        """Parse a block of JSON; an empty mapping for JSON of another kind. Raises BadFile."""
         try:
             content = parse_json(block.payload.decode("utf-8"))
         except ValueError as error:
@@ -148,6 +151,37 @@ def read_recording(path: Path | str) -> Recording:
         raise BadFile(path, "an empty file", EXPECTED_FILE, "Nothing was recorded into it.")
     _check_kind(path, data)
     return Recording(path, data)
+
+
+def open_recording(path: Path) -> BinaryIO:
+    """Open a recording at its first block, to read it in pieces. Raises BadFile as `read_recording`."""
+    file = open_input_file(path, EXPECTED_FILE, MAX_BYTES, "`harness record PORT FILE` makes one.")
+    head = file.read(_KIND_BYTES)
+    try:
+        if not head:
+            raise BadFile(path, "an empty file", EXPECTED_FILE, "Nothing was recorded into it.")
+        _check_kind(path, head)
+    except BadFile:
+        file.close()
+        raise
+    file.seek(len(FILE_HEADER) if read_version(head) else 0)
+    return file
+
+
+def describe_damage(entries: Iterable[RecordingBlock | DamagedSpan], damage: list[str]) -> Iterator[RecordingBlock]:
+    """Yield the whole blocks, and append a description of each damaged part between them to `damage`."""
+    damaged: DamagedSpan | None = None
+    before_s = None
+    for entry in entries:
+        if isinstance(entry, DamagedSpan):
+            damaged = entry
+            continue
+        if damaged:
+            damage.append(_damage_text(damaged, before_s, entry.monotonic_s))
+        damaged, before_s = None, entry.monotonic_s
+        yield entry
+    if damaged:
+        damage.append(_truncation_text(damaged, before_s))
 
 
 def _check_kind(path: Path, data: bytes) -> None:
@@ -175,8 +209,8 @@ class RecordingWriter:
     def __init__(self, path: Path | str, note: Mapping[str, Any] | None = None) -> None:
         """Check the file. `note` describes the origin of the recording."""
         self.path = Path(path)
-        self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT, ANSWERED), 0)
-        """Bytes received and sent, and numbers of configurations, events and answers, by block kind."""
+        self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT, ANSWERED, MARK), 0)
+        """Bytes received and sent, and numbers of configurations, events, answers and marks, by block kind."""
         self._note = dict(note or {})
         existing = self._existing_recording()
         self._new = existing is None
@@ -218,6 +252,13 @@ class RecordingWriter:
         """Write an event on the line."""
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
+
+    def on_mark(
+        self, content: Mapping[str, Any], monotonic_s: float | None = None, wall_s: float | None = None
+    ) -> None:
+        """Write a mark: from here on the capture is the stretch that `content` names under "stretch"."""
+        self._append_json(MARK, content, monotonic_s, wall_s)
+        self.counts[MARK] += 1
 
     def on_answer(self, content: Mapping[str, Any]) -> None:
         """Write a command with its answer (`Exchange.as_dict`), as much of it as fits; `recv` blocks have all of it."""
