@@ -82,21 +82,17 @@ def start_values(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> F
     The variance of differences grows from twice the white noise at a lag of one sample to the sum of both at 4 s.
     """
 
-    def spreads(columns: slice, name: str) -> tuple[float, float]:
+    def spreads(name: str, *columns: int) -> tuple[float, float]:
         short, long = [], []
         for one, mask in zip(series, left_out, strict=True):
-            values = np.where((one.valid & ~mask)[:, None], getattr(one, name)[:, columns], np.nan)
+            values = np.where((one.valid & ~mask)[:, None], getattr(one, name)[:, list(columns)], np.nan)
             lag = max(round(4.0 * one.rate_hz), 2)
             short.append(values[1:] - values[:-1])
             long.append(values[lag:] - values[:-lag])
-        return tuple(
-            float(np.nanmedian(np.abs(np.concatenate(parts)))) / 0.6745 / np.sqrt(2.0) for parts in (short, long)
-        )  # type: ignore[return-value]
+        near, far = (float(np.nanmedian(np.abs(np.concatenate(parts)))) for parts in (short, long))
+        return near / 0.6745 / np.sqrt(2.0), far / 0.6745 / np.sqrt(2.0)
 
-    position, tilt, yaw = (
-        spreads(*at)
-        for at in ((slice(0, 3), "position_m"), (slice(0, 2), "rotation_rad"), (slice(2, 3), "rotation_rad"))
-    )
+    position, tilt, yaw = spreads("position_m", 0, 1, 2), spreads("rotation_rad", 0, 1), spreads("rotation_rad", 2)
     drift = [np.sqrt(max(long**2 - short**2, (0.1 * short) ** 2)) for short, long in (position, tilt, yaw)]
     values = np.array([0.9 * position[0], drift[0], 0.9 * tilt[0], drift[1], drift[2], 1.0])
     out: Floats = np.clip(np.log(np.maximum(values, 1e-12)), _LEAST + 1e-3, _MOST - 1e-3)
@@ -147,7 +143,8 @@ def _measured(logarithm: float, deviation: float, samples: int) -> Measured:
     if not 0.0 < deviation < 1.0:
         return Measured.missing("The noise of this capture does not show it.")
     half = NORMAL_QUANTILE * deviation
-    return Measured(*(float(np.exp(logarithm + shift)) for shift in (0.0, -half, half)), samples)
+    value, low, high = (float(np.exp(logarithm + shift)) for shift in (0.0, -half, half))
+    return Measured(value, low, high, samples)
 
 
 def _second_derivatives(cost: Callable[[Floats], float], at: Floats, free: Ints) -> Floats:

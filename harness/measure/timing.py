@@ -1,0 +1,265 @@
+"""Timing of a device and its line: rate, lost and repeated records, and the device's clock against the host's.
+
+The host may read a byte late, never early. The clock ratio therefore comes from the least difference of the two clocks
+in each of many stretches of time, by the slope of Theil and Sen, which ignores stretches in which every record came
+late.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.measure.measured import Measured
+from harness.stream.recording.station_readings import CaptureBlock, StationReadings
+
+TIMING_KEYS = (
+    "timing.rate_hz",
+    "timing.jitter_s",
+    "timing.delay_s",
+    "timing.lost_share",
+    "timing.duplicate_share",
+    "timing.stamp_resolution_s",
+    "timing.clock_age_s",
+    "components.clock.drift_ppm",
+)
+"""Names of the measured numbers.
+
+Jitter is the standard deviation of a station's period by the device's clock. Delay is the mean time by which records
+arrive later than the earliest one of the same second. Clock age is the reading of the device's clock when it was set
+up, which should be zero.
+"""
+_BIN_S = 1.0
+_MOST_BINS = 120
+_FEWEST_BINS = 8
+_LAST_STAMPS = 500
+"""Stamps of each station at the end of a capture whose resolution is measured."""
+_AGE_TOLERANCE_S = 0.5
+"""Half width of the interval of the clock's age [s]: the set-up of a device takes that long [choice]."""
+
+
+@dataclass
+class _StationCounts:
+    records: int = 0
+    duplicates: int = 0
+    lost: int = 0
+    steps: int = 0
+    """Periods between the records that were compared."""
+    elapsed_s: float = 0.0
+    """Sum of the times between them, by the device's clock [s]."""
+    squares_s2: float = 0.0
+    """Sum of the squared deviations of single periods from the nominal one [s^2]."""
+    deviations_s: float = 0.0
+    singles: int = 0
+    last: StationReadings | None = None
+    """The last record, to compare the next block with it."""
+
+
+@dataclass
+class _SessionClocks:
+    """Least difference of host and device clock in each second of one session of the line."""
+
+    least_s: dict[int, tuple[float, float]] = field(default_factory=dict)
+    """Number of the second -> difference and device time [s]."""
+
+
+@dataclass(frozen=True)
+class TimingMeasurement:
+    """Numbers by `TIMING_KEYS`, of all stations together and of each."""
+
+    all_stations: Mapping[str, Measured]
+    by_station: Mapping[str, Mapping[str, Measured]]
+    expected_resolution_s: float
+    """Resolution of stamps in the wire format at the length of the capture, had the clock been zero at set-up [s]."""
+
+
+class TimingAccumulator:
+    """Collects the timing of a capture, block by block."""
+
+    def __init__(self, rate_hz: float) -> None:
+        """`rate_hz` is the nominal rate of each station [Hz]."""
+        self._rate_hz = rate_hz
+        self._counts: dict[str, _StationCounts] = {}
+        self._clocks: dict[int, _SessionClocks] = {}
+        self._delays_s: list[float] = []
+        """Mean delay of each second of each station [s]."""
+        self._tails_s: dict[str, Floats] = {}
+        """The latest stamps of each station [s]."""
+        self._seconds_per_tick = 1e-3
+        self._age_s, self._longest_s = math.nan, 0.0
+        self._session = -1
+
+    def add(self, block: CaptureBlock) -> None:
+        """Add the readings of a block; blocks come in the order of the capture."""
+        if block.session != self._session:
+            self._session = block.session
+            for counts in self._counts.values():
+                counts.last = None
+        self._seconds_per_tick = block.wire.settings.seconds_per_tick
+        for station, readings in block.stations.items():
+            self._add_station(station, readings)
+            self._add_clocks(block, station, readings)
+
+    def measure(self) -> TimingMeasurement:
+        """The numbers of everything that was added."""
+        clock, span_s = self._clock_drift_ppm()
+        resolution_s = self._resolution_s()
+        together = _merge(self._counts)
+        all_stations = {
+            **self._numbers(together, resolution_s),
+            "timing.delay_s": _mean(np.array(self._delays_s)),
+            "timing.stamp_resolution_s": _exact(
+                resolution_s, sum(map(len, self._tails_s.values())), "No record has a stamp."
+            ),
+            "timing.clock_age_s": Measured.missing("No record has a stamp.")
+            if math.isnan(self._age_s)
+            else Measured(self._age_s, self._age_s - _AGE_TOLERANCE_S, self._age_s + _AGE_TOLERANCE_S, 1),
+            "components.clock.drift_ppm": clock,
+        }
+        by_station = {name: self._numbers(counts, resolution_s) for name, counts in self._counts.items()}
+        ticks = max(self._longest_s, span_s, 1.0) / self._seconds_per_tick
+        expected_s = float(np.spacing(np.float32(ticks))) * self._seconds_per_tick
+        return TimingMeasurement(all_stations, by_station, expected_s)
+
+    def _add_station(self, station: str, readings: StationReadings) -> None:
+        counts = self._counts.setdefault(station, _StationCounts())
+        if not len(readings):
+            return
+        joined = readings if counts.last is None else _append(counts.last, readings)
+        repeated = _repeats(joined)
+        counts.records += len(readings)
+        counts.duplicates += int(repeated.sum())
+        times_s = joined.measured_s[~repeated & np.isfinite(joined.measured_s)]
+        step_s = np.diff(times_s)
+        periods = np.round(step_s * self._rate_hz)
+        ahead = periods >= 1.0
+        counts.lost += int(np.sum(periods[ahead] - 1.0))
+        counts.steps += int(periods[ahead].sum())
+        counts.elapsed_s += float(step_s[ahead].sum())
+        single = step_s[periods == 1.0] - 1.0 / self._rate_hz
+        counts.squares_s2 += float(np.sum(single**2))
+        counts.deviations_s += float(single.sum())
+        counts.singles += len(single)
+        counts.last = _row(readings, -1)
+
+    def _add_clocks(self, block: CaptureBlock, station: str, readings: StationReadings) -> None:
+        known = np.isfinite(readings.measured_s)
+        if not known.any():
+            return
+        device_s, host_s = readings.measured_s[known], readings.received_s[known]
+        difference_s = host_s - device_s
+        clocks = self._clocks.setdefault(block.session, _SessionClocks())
+        second = (device_s // _BIN_S).astype(np.int64)
+        order = np.lexsort((difference_s, second))
+        _, first = np.unique(second[order], return_index=True)
+        for row in order[first].tolist():
+            least, number = (float(difference_s[row]), float(device_s[row])), int(second[row])
+            if least < clocks.least_s.get(number, (math.inf, 0.0)):
+                clocks.least_s[number] = least
+        _, group = np.unique(second, return_inverse=True)
+        late_s = np.bincount(group, difference_s - difference_s[order[first]][group]) / np.bincount(group)
+        self._delays_s += late_s.tolist()
+        stamps_s = readings.stamp_s[np.isfinite(readings.stamp_s)]
+        self._tails_s[station] = np.concatenate([self._tails_s.get(station, stamps_s[:0]), stamps_s])[-_LAST_STAMPS:]
+        if math.isnan(self._age_s):
+            self._age_s = float(readings.stamp_s[known][0] - (host_s[0] - block.configured_s))
+        self._longest_s = max(self._longest_s, float(host_s[-1] - block.configured_s))
+
+    def _numbers(self, counts: _StationCounts, resolution_s: float) -> dict[str, Measured]:
+        if not counts.steps:
+            reason = "No two records have a stamp."
+            return dict.fromkeys(TIMING_KEYS[:2] + TIMING_KEYS[3:5], Measured.missing(reason))
+        rate_hz = counts.steps / counts.elapsed_s
+        half_hz = rate_hz * resolution_s / counts.elapsed_s
+        mean_s = counts.deviations_s / max(counts.singles, 1)
+        jitter_s = math.sqrt(max(counts.squares_s2 / max(counts.singles, 1) - mean_s**2, 0.0))
+        spread = jitter_s / math.sqrt(2.0 * max(counts.singles, 1))
+        return {
+            "timing.rate_hz": Measured(rate_hz, rate_hz - half_hz, rate_hz + half_hz, counts.steps),
+            "timing.jitter_s": Measured.normal(jitter_s, spread, counts.singles, least=0.0),
+            "timing.lost_share": count_share(counts.lost, counts.steps),
+            "timing.duplicate_share": count_share(counts.duplicates, counts.records),
+        }
+
+    def _clock_drift_ppm(self) -> tuple[Measured, float]:
+        """Rate error of the device's clock [1e-6] from the longest session, and the length of it [s]."""
+        from scipy import stats
+
+        clocks = max(self._clocks.values(), key=lambda one: len(one.least_s), default=None)
+        points = np.array(list(clocks.least_s.values())) if clocks else np.zeros((0, 2))
+        if len(points) < _FEWEST_BINS:
+            return Measured.missing(f"The clock needs {_FEWEST_BINS} s of records with stamps."), 0.0
+        points = points[np.argsort(points[:, 1])]
+        size = -(-len(points) // _MOST_BINS)
+        least = np.array([part[np.argmin(part[:, 0])] for part in np.split(points, range(size, len(points), size))])
+        span_s = float(least[-1, 1] - least[0, 1])
+        slope, _, low, high = stats.theilslopes(least[:, 0], least[:, 1], 0.95)
+        margin = self._resolution_s() / span_s  # rounding of the stamps is no independent noise
+        drift, fast, slow = (float(1e6 * (1.0 / (1.0 + one) - 1.0)) for one in (slope, low - margin, high + margin))
+        return Measured(drift, slow, fast, len(least)), span_s
+
+    def _resolution_s(self) -> float:
+        """The largest power of two of the stamp's unit that divides every stamp of the capture's end [s]."""
+        tails_s = np.concatenate([np.zeros(0), *self._tails_s.values()])
+        ticks = (tails_s / self._seconds_per_tick).astype(np.float32).astype(float)
+        ticks = ticks[ticks > 0.0]
+        if not len(ticks):
+            return math.nan
+        exponent = 10
+        while exponent > -24 and np.any(np.mod(ticks, 2.0**exponent)):
+            exponent -= 1
+        return float(2.0**exponent * self._seconds_per_tick)
+
+
+def count_share(count: int, total: int) -> Measured:
+    """Share of independent events among all, with the exact interval of Clopper and Pearson 1934."""
+    from scipy import special
+
+    if not total:
+        return Measured.missing("There is no record.")
+    low = float(special.betaincinv(count, total - count + 1, 0.025)) if count else 0.0
+    high = float(special.betaincinv(count + 1, total - count, 0.975)) if count < total else 1.0
+    return Measured(count / total, low, high, count)
+
+
+def _repeats(readings: StationReadings) -> Bools:
+    """(N,) whether a record has the stamp and the content of the station's record before it."""
+    out = np.zeros(len(readings), bool)
+    if len(readings) > 1:
+        same = readings.stamp_s[1:] == readings.stamp_s[:-1]
+        for name in ("position_m", "tracker_from_station", "quality"):
+            column = getattr(readings, name).reshape(len(readings), -1)
+            equal = (column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1]))
+            same &= equal.all(axis=1)
+        out[1:] = same
+    return out
+
+
+def _row(readings: StationReadings, row: int) -> StationReadings:
+    rows = slice(row, row + 1 or None)
+    return StationReadings(*(getattr(readings, name)[rows] for name in StationReadings.__dataclass_fields__))
+
+
+def _append(first: StationReadings, second: StationReadings) -> StationReadings:
+    names = StationReadings.__dataclass_fields__
+    return StationReadings(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+
+
+def _merge(counts: Mapping[str, _StationCounts]) -> _StationCounts:
+    total = _StationCounts()
+    for one in counts.values():
+        for name in ("records", "duplicates", "lost", "steps", "elapsed_s", "squares_s2", "deviations_s", "singles"):
+            setattr(total, name, getattr(total, name) + getattr(one, name))
+    return total
+
+
+def _mean(values: Floats) -> Measured:
+    if len(values) < 2:
+        return Measured.missing("No record has a stamp.")
+    return Measured.normal(float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values))), len(values), 0.0)
+
+
+def _exact(value: float, count: int, reason: str) -> Measured:
+    return Measured.missing(reason) if math.isnan(value) else Measured(value, value, value, count)
