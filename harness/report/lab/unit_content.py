@@ -23,6 +23,8 @@ class StretchSummary:
     duration_s: float
     records: int
     """Number of records of all stations."""
+    begin_s: float = float("nan")
+    """Time since the start of the capture [s]; NaN: not known."""
 
 
 @dataclass(frozen=True)
