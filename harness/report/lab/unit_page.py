@@ -11,6 +11,7 @@ from harness.report.kit.document import Section, chart_figure, document
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
 from harness.report.kit.style import Chart
 from harness.report.kit.table import html_table
+from harness.report.lab.stacked_intervals import stack_intervals
 from harness.report.lab.unit_charts import charts
 from harness.report.lab.unit_content import ParameterRow, UnitReport
 from harness.report.lab.unit_tables import (
@@ -29,7 +30,8 @@ from harness.report.lab.unit_tables import (
 from harness.report.lab.unit_wording import advice_text, answer, departure_text, description
 
 _INTERVALS = (
-    "Intervals hold the true value in 95 of 100 captures. From: the number of events or of independent samples."
+    "Below the numbers: intervals that hold the true value in 95 of 100 captures. From: the number of events or of "
+    "independent samples."
 )
 _DEPARTURES = (
     "A departure is a number that differs from the expected one by more than chance explains: p after Holm's "
@@ -91,7 +93,11 @@ def _lead(report: UnitReport) -> Markup:
 def _checks(report: UnitReport, drawn: Mapping[str, Chart]) -> Markup:
     if not report.checks:
         return Markup()
-    table = html_table(departures_table(report.checks), "The least likely first.", label="checks")
+    table = html_table(
+        stack_intervals(departures_table(report.checks)),
+        "The least likely first. Below the numbers: 95 % intervals.",
+        label="checks",
+    )
     unfolded = details(f"All {count_noun(len(report.checks), 'check')}", table) if "checks" in drawn else table
     chart = chart_figure(drawn["checks"]) if "checks" in drawn else None
     return join(tag("p", _DEPARTURES), chart, unfolded)
@@ -102,7 +108,7 @@ def _parameters(rows: Sequence[ParameterRow], label: str) -> Markup:
         return Markup()
     why = bullet_list(reasons(rows))
     return join(
-        html_table(parameters_table(rows), _INTERVALS, label=label),
+        html_table(stack_intervals(parameters_table(rows)), _INTERVALS, label=label),
         tag("p", "Not measured, and why:", class_="caption") if why else None,
         why,
     )
@@ -160,7 +166,11 @@ def _pairs(report: UnitReport, drawn: Mapping[str, Chart]) -> Markup:
     parts = []
     for n, pair in enumerate(report.rigid_pairs):
         names = " and ".join(pair.stations)
-        table = html_table(pair_table(pair), "Errors of both stations together.", label=f"bar of {names}")
+        table = html_table(
+            stack_intervals(pair_table(pair)),
+            "Errors of both stations together. Below the numbers: 95 % intervals.",
+            label=f"bar of {names}",
+        )
         parts.append(_with_chart(drawn, f"pair_{n}", table))
     return join(*parts) if parts else Markup()
 

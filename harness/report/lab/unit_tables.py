@@ -11,6 +11,7 @@ from harness.measure.rigid_pair import RigidPair
 from harness.report.kit.markup import Markup
 from harness.report.kit.table import stacked_cell
 from harness.report.lab.quantities import format_ends, format_plain, format_value, quantity
+from harness.report.lab.stacked_intervals import INTERVAL
 from harness.report.lab.unit_content import (
     EPISODE_KINDS,
     STATION_FIGURES,
@@ -46,7 +47,7 @@ def departures_table(checks: Sequence[DepartureCheck]) -> Table:
                 format_p_value(check.p_holm),
             ]
         )
-    return Table(["number", "station", "measured", "95 % interval", "expected", "p", "p (Holm)"], rows, 2)
+    return Table(["number", "station", "measured", INTERVAL, "expected", "p", "p (Holm)"], rows, 2)
 
 
 def parameters_table(parameters: Sequence[ParameterRow]) -> Table:
@@ -64,7 +65,7 @@ def parameters_table(parameters: Sequence[ParameterRow]) -> Table:
                 row.status,
             ]
         )
-    return Table(["number", "measured", "95 % interval", "from", "default", "in the unit file"], rows)
+    return Table(["number", "measured", INTERVAL, "from", "default", "in the unit file"], rows)
 
 
 def reasons(parameters: Sequence[ParameterRow]) -> list[str]:
@@ -208,7 +209,7 @@ def pair_table(pair: RigidPair) -> Table:
             for one in pair.speeds
         ),
     ]
-    return Table([" and ".join(pair.stations), "measured", "95 % interval"], rows)
+    return Table([" and ".join(pair.stations), "measured", INTERVAL], rows)
 
 
 def _both(number: Measured, key: str) -> list[str]:
