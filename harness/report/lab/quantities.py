@@ -137,9 +137,8 @@ def format_both(number: Measured, shown: Quantity) -> str:
 
 def format_plain(value: float, shown: Quantity) -> str:
     """A number that is known exactly, with its unit, in at most four significant digits."""
-    return with_unit_of(
-        format_fixed(float(f"{shown.factor * value:.4g}"), _plain_decimals(shown.factor * value)), shown
-    )
+    rounded = float(f"{shown.factor * value:.4g}")
+    return with_unit_of(format_fixed(rounded, _plain_decimals(rounded), grouped=True), shown)
 
 
 def with_unit_of(text: str, shown: Quantity) -> str:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_HEIGHT_IN, _ROW_IN, _FRAME_IN = 3.6, 0.3, 0.75
+_HEIGHT_IN, _ROW_IN, _FRAME_IN, _LANE_IN = 3.6, 0.3, 0.75, 0.16
 _MODEL: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
 _MOST_MARKS = 3000
 """Episodes of one kind and station that are drawn; of more the largest."""
@@ -201,7 +201,7 @@ def _episodes(report: UnitReport) -> Chart:
         f"When each station left its place or was lost. A short episode is drawn as a tick. There are {counts}.",
         f"Time line of the episodes of each station: {counts}; the numbers are in the table below.",
         lambda figure: _draw_episodes(figure, report.episodes, report.capture, kinds),
-        _FRAME_IN + 0.2 + (0.16 * len(kinds) + 0.14) * len(stations),
+        _FRAME_IN + 0.45 + (_LANE_IN * len(kinds) + 0.14) * len(stations),
     )
 
 
@@ -225,7 +225,7 @@ def _draw_episodes(
                 begin = one.begin_s / scale
                 segments.append([(begin, y), (begin + max(one.duration_s / scale, least), y)])
         colour = COLOURS[k]
-        height_pt = 0.75 * 72.0 * 0.16
+        height_pt = 0.75 * 72.0 * _LANE_IN
         axes.add_collection(LineCollection(segments, colors=colour, linewidths=height_pt, capstyle="butt"))
         axes.plot([], [], color=colour, linewidth=height_pt, label=kind)
     label_rows(axes, stations)
