@@ -230,7 +230,7 @@ def _draw_episodes(
         axes.plot([], [], color=colour, linewidth=height_pt, label=kind)
     label_rows(axes, stations)
     for stretch in capture.stretches:
-        if stretch.name and np.isfinite(stretch.begin_s):
+        if stretch.name and 0.0 <= stretch.begin_s < until_s:
             begin = stretch.begin_s / scale
             axes.axvline(begin, color=FAINT, linewidth=0.9)
             axes.annotate(
