@@ -49,7 +49,7 @@ MEASURED = {
 }
 TIMING = {
     "timing.rate_hz": (number(40.0, 0.0001, 288_000), 40.0),
-    "timing.clock_ppm": (Measured(-21.0, -23.5, -18.5, 900), 20.0),
+    "components.clock.drift_ppm": (Measured(-21.0, -23.5, -18.5, 900), 20.0),
     "timing.duplicate_share": (exact(0.0), 0.0),
     "timing.stamp_resolution_s": (exact(6.1e-5), None),
 }

@@ -139,7 +139,7 @@ def _share_sentence(values: dict[str, Measured]) -> str:
 
 def _timing_sentence(values: dict[str, Measured]) -> str:
     rate = values.get("tracker.rate_hz") or values.get("timing.rate_hz")
-    clock = values.get("components.clock.drift_ppm") or values.get("timing.clock_ppm")
+    clock = values.get("components.clock.drift_ppm")
     parts = []
     if rate:
         parts.append(f"records of a station come at {format_value(rate, quantity('tracker.rate_hz'))}")

@@ -4,7 +4,9 @@ import math
 
 import pytest
 
+from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.measured import Measured
+from harness.measure.timing import TIMING_KEYS
 from harness.report.lab.quantities import (
     Quantity,
     format_both,
@@ -19,8 +21,8 @@ from harness.report.lab.unit_content import STATION_FIGURES
 from harness.study.trust.expected_values import preset_values
 
 
-def test_every_number_of_the_preset_has_a_name() -> None:
-    assert [key for key in preset_values() if not is_known(key)] == []
+def test_every_number_that_is_measured_has_a_name() -> None:
+    assert [key for key in (*preset_values(), *NOISE_KEYS, *TIMING_KEYS) if not is_known(key)] == []
     assert all(is_known(f"station.{name}") for name in STATION_FIGURES)
 
 
