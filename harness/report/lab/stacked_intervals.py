@@ -4,12 +4,12 @@ from harness.core.text_table import Table
 from harness.report.kit.table import stacked_cell
 
 INTERVAL = "95 % interval"
-"""Head of a column of intervals; the column before it has the numbers."""
+"""Head of a column of intervals of the usual level; the column before it has the numbers."""
 
 
 def stack_intervals(table: Table) -> Table:
     """The table with each interval below its number, in small type, and without the columns of intervals."""
-    columns = [n for n, head in enumerate(table.head) if head == INTERVAL]
+    columns = [n for n, head in enumerate(table.head) if str(head).endswith("% interval")]
     kept = [n for n in range(len(table.head)) if n not in columns]
 
     def cell(row: list[object], n: int) -> object:
