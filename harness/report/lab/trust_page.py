@@ -32,6 +32,7 @@ from harness.report.lab.trust_wording import (
     correlation_text,
     count_pairs,
     metric_title,
+    simulated_with,
     sort_pairs,
     verdict_sentence,
 )
@@ -95,7 +96,7 @@ def _facts(found: TrustFindings) -> dict[str, str]:
     facts = {
         "Methods": list_first(found.arms, 8),
         "Motion": f"{count_noun(len(names), 'clip')}: {list_first(names, 4)}" if names else "none",
-        "Simulated with": found.unit + (f", digest {found.unit_digest[:12]}" if found.unit_digest else ""),
+        "Simulated with": simulated_with(found),
         "Scenario": found.scenario,
         "Ranked by": metric_title(found.ranked_metric),
         "Plan": f"digest {found.plan_digest[:12]}",

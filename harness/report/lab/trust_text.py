@@ -11,7 +11,13 @@ from harness.report.lab.trust_tables import (
     health_table,
     pairs_table,
 )
-from harness.report.lab.trust_wording import EXPLORATORY, correlation_text, metric_title, verdict_sentence
+from harness.report.lab.trust_wording import (
+    EXPLORATORY,
+    correlation_text,
+    metric_title,
+    simulated_with,
+    verdict_sentence,
+)
 from harness.results.trust_findings import TrustFindings
 
 _WIDTH = 118
@@ -43,10 +49,9 @@ def format_trust(report: TrustReport) -> str:
 
 def _head(found: TrustFindings) -> list[str]:
     """Plan, simulation and captures."""
-    unit = f"{found.unit} ({found.unit_digest[:12]})" if found.unit_digest else f"noise {found.unit}"
     counts = ((len(found.captures), "capture"), (len(found.arms), "arm"), (len(found.seeds), "seed"))
     return [
-        f"{found.title}: plan {found.plan_digest[:12]}, scenario {found.scenario}, simulated with {unit}",
+        f"{found.title}: plan {found.plan_digest[:12]}, scenario {found.scenario}, simulated with {simulated_with(found)}",
         f"{', '.join(count_noun(count, noun) for count, noun in counts)}, level {found.level:g}",
     ]
 

@@ -86,6 +86,13 @@ def interval_title(findings: TrustFindings) -> str:
     return f"{100.0 * (1.0 - 2.0 * findings.level):g} % interval"
 
 
+def simulated_with(findings: TrustFindings) -> str:
+    """The unit file with its digest, or the noise preset."""
+    if findings.unit_digest:
+        return f"{findings.unit}, digest {findings.unit_digest[:12]}"
+    return f"noise {findings.unit}"
+
+
 def clips(findings: TrustFindings) -> list[str]:
     """The clips that were captured, each once."""
     return list(dict.fromkeys(capture.clip for capture in findings.captures))
@@ -130,8 +137,9 @@ def _side_decimals(side: SideDifference) -> int:
 
 
 def equivalence_decimals(row: Equivalence) -> int:
-    """Decimals that show two digits of the margin."""
-    return decimals_for(row.margin, digits=2, most=_MOST_DECIMALS)
+    """Decimals that show two digits of the interval's width, or of the margin where that is smaller."""
+    width = row.high - row.low if row.low is not None and row.high is not None else None
+    return decimals_for(width, row.margin, digits=2, most=_MOST_DECIMALS)
 
 
 def correlation_text(one: RankCorrelation) -> str:

@@ -27,6 +27,7 @@ def test_the_verdict_is_the_first_thing(page: Path) -> None:
     word, sentence = text.index("Contradicted"), text.index(verdict_sentence(made_up_trust().findings))
     assert word < sentence < text.index("One pair contradicts") < text.index("1 ✗ contradict both sides")
     assert "4 ✓ agree" in text
+    assert "Simulated with unit.toml, digest ab12ab12ab12" in text
     assert "Plan digest 5d1f5d1f5d1f Level" in text
     assert "Exploratory" not in text
 
@@ -42,6 +43,8 @@ def test_an_exploratory_study_says_so(tmp_path: Path) -> None:
     text = text_of(write_trust_page(tmp_path / "page.html", trust_of(Outcome.PASS, exploratory=True, plan_digest="aa")))
     assert "Exploratory: captures were not made for this plan" in text
     assert "2,400 another plan 0f0f0f0f0f0f" in text
+    preset = trust_of(Outcome.PASS, unit="default", unit_digest="")
+    assert "Simulated with noise default Scenario" in text_of(write_trust_page(tmp_path / "preset.html", preset))
 
 
 def test_sections_with_charts_and_numbers(page: Path) -> None:
@@ -63,7 +66,7 @@ def test_both_sides_of_a_pair_stand_side_by_side(page: Path) -> None:
 
 def test_numbers_of_the_other_sections(page: Path) -> None:
     text = text_of(page)
-    assert "dynamic_map joint angle error [deg] ✗ beyond the margin 9.8 8.4 −1.4 −1.7 to −1.1 1.0 8" in text
+    assert "dynamic_map joint angle error [deg] ✗ beyond the margin 9.80 8.40 −1.40 −1.70 to −1.10 1.00 8" in text
     assert "left_wrist position error [mm] 0.91 0.35 0.006 40 and 200 of 5.2 s differs" in text
     assert "head orientation error [deg] 0.0115 0.0286 0.006 40 and 200 of 5.2 s differs by less than halves" in text
     assert "right_wrist position error [mm] −0.02" in text
@@ -85,7 +88,7 @@ def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pyt
     text = text_of(page)
     assert "matplotlib is not installed" in text
     assert "Numbers of this chart" not in text
-    assert "−1.7 to −1.1" in text
+    assert "−1.70 to −1.10" in text
     assert not any(name in ("img", "svg") for name, _ in read(page).found)
 
 
