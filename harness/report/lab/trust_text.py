@@ -51,7 +51,8 @@ def _head(found: TrustFindings) -> list[str]:
     """Plan, simulation and captures."""
     counts = ((len(found.captures), "capture"), (len(found.arms), "arm"), (len(found.seeds), "seed"))
     return [
-        f"{found.title}: plan {found.plan_digest[:12]}, scenario {found.scenario}, simulated with {simulated_with(found)}",
+        f"{found.title}: plan {found.plan_digest[:12]}, scenario {found.scenario}",
+        f"simulated with {simulated_with(found)}",
         f"{', '.join(count_noun(count, noun) for count, noun in counts)}, level {found.level:g}",
     ]
 
