@@ -10,12 +10,11 @@ from harness.measure.rigid_pair import RigidPair
 from harness.report.kit.chart import add_legend, decimate, draw_chart
 from harness.report.kit.rows import label_rows
 from harness.report.kit.scales import set_log_scale
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, series_style
-from harness.report.lab.quantities import format_both, quantity
+from harness.report.kit.style import COLOURS, FAINT, INK, Chart, series_style
+from harness.report.lab.check_chart import check_chart
 from harness.report.lab.unit_content import (
     CaptureSummary,
     DensityCurve,
-    DepartureCheck,
     DeviationCurve,
     EpisodeMark,
     QualityClass,
@@ -27,18 +26,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_HEIGHT_IN, _ROW_IN, _FRAME_IN, _LANE_IN = 3.6, 0.3, 0.75, 0.16
+_HEIGHT_IN, _FRAME_IN, _LANE_IN = 3.6, 0.75, 0.16
 _MODEL: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
 _MOST_MARKS = 3000
 """Episodes of one kind and station that are drawn; of more the largest."""
-_LEAST_RATIO, _MOST_RATIO = 0.02, 50.0
-"""Ends of the axis of ratios."""
 
 
 def charts(report: UnitReport) -> dict[str, Chart]:
     """Name of the section -> its chart; a chart without anything to show is left out."""
     drawn = {
-        "checks": _checks(report) if _with_ratio(report.checks) else None,
+        "checks": check_chart(report.checks, report.expected_from),
         "allan": _allan(report) if report.allan_position or report.allan_orientation else None,
         "spectrum": _spectrum(report) if report.spectra else None,
         "episodes": _episodes(report) if report.episodes else None,
@@ -46,65 +43,6 @@ def charts(report: UnitReport) -> dict[str, Chart]:
         **{f"pair_{n}": _pair(pair, n) for n, pair in enumerate(report.rigid_pairs) if pair.speeds},
     }
     return {name: chart for name, chart in drawn.items() if chart is not None}
-
-
-def _with_ratio(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
-    """The checks whose numbers have a ratio, those of all stations and those that are named."""
-    return [
-        check
-        for check in checks
-        if (not check.departure.station or check.is_named)
-        and check.departure.expected.value > 0.0
-        and check.departure.measured.value > 0.0
-    ]
-
-
-def _checks(report: UnitReport) -> Chart:
-    checks = _with_ratio(report.checks)
-    names = [_check_name(check) for check in checks]
-    texts = "; ".join(
-        f"{name} {format_both(check.departure.measured, quantity(check.departure.key))}"
-        f"{', a departure' if check.is_named else ''}"
-        for name, check in zip(names, checks, strict=True)
-    )
-    return draw_chart(
-        "checks",
-        "Measured over expected",
-        f"Each number over that of {report.expected_from}, with its 95 % interval. Orange triangles: departures, after "
-        "Holm's correction over all checks. Hollow: no departure. A number with nothing expected has no place here.",
-        f"Measured over expected: {texts}.",
-        lambda figure: _draw_checks(figure, checks, names),
-        _FRAME_IN + _ROW_IN * len(checks),
-    )
-
-
-def _check_name(check: DepartureCheck) -> str:
-    label = quantity(check.departure.key).label
-    return f"{label}, {check.departure.station}" if check.departure.station else label
-
-
-def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequence[str]) -> None:
-    axes = figure.subplots()
-    ends = []
-    for row, check in enumerate(checks):
-        one = check.departure
-        ratio, low, high = (
-            end / one.expected.value for end in (one.measured.value, one.measured.low, one.measured.high)
-        )
-        colour = COLOURS[0] if check.is_named else FAINT
-        low, high = max(low, _LEAST_RATIO), min(high, _MOST_RATIO)
-        axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt")
-        marker = (">" if ratio > 1.0 else "<") if check.is_named else "o"
-        face = colour if check.is_named else PAPER
-        axes.plot(
-            np.clip(ratio, _LEAST_RATIO, _MOST_RATIO), row, marker, color=colour, markerfacecolor=face, markersize=6
-        )
-        ends += [low, high]
-    axes.axvline(1.0, color=INK, linewidth=0.9, zorder=1)
-    label_rows(axes, names)
-    set_log_scale(axes, "x")
-    axes.set_xlim(min(0.8, 0.9 * min(ends)), max(1.25, 1.1 * max(ends)))
-    axes.set_xlabel("measured over expected")
 
 
 def _allan(report: UnitReport) -> Chart:

@@ -11,13 +11,14 @@ from harness.report.kit.document import Section, chart_figure, document
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
 from harness.report.kit.style import Chart
 from harness.report.kit.table import html_table
+from harness.report.lab.check_table import departures_table
+from harness.report.lab.departure_wording import departure_text
 from harness.report.lab.stacked_intervals import stack_intervals
 from harness.report.lab.unit_charts import charts
 from harness.report.lab.unit_content import ParameterRow, UnitReport
 from harness.report.lab.unit_tables import (
     allan_table,
     capture_text,
-    departures_table,
     episodes_table,
     pair_table,
     parameters_table,
@@ -27,7 +28,7 @@ from harness.report.lab.unit_tables import (
     stations_page_table,
     stretches_table,
 )
-from harness.report.lab.unit_wording import advice_text, answer, departure_text, description
+from harness.report.lab.unit_wording import advice_text, answer, description
 
 _INTERVALS = (
     "Below the numbers: intervals that hold the true value in 95 of 100 captures. From: the number of events or of "

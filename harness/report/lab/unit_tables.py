@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_p_value, format_share
+from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
 from harness.core.text_table import Table
 from harness.measure.measured import Measured
 from harness.measure.rigid_pair import RigidPair
@@ -17,7 +17,6 @@ from harness.report.lab.unit_content import (
     STATION_FIGURES,
     CaptureSummary,
     DensityCurve,
-    DepartureCheck,
     DeviationCurve,
     EpisodeMark,
     ParameterRow,
@@ -25,29 +24,8 @@ from harness.report.lab.unit_content import (
     StationFigures,
 )
 
-ALL_STATIONS = "all"
 _FREQUENCIES, _TAUS = 8, 8
 """Rows of the tables of spectra and of Allan deviations."""
-
-
-def departures_table(checks: Sequence[DepartureCheck]) -> Table:
-    """Measured and expected numbers of checks, the least likely first."""
-    rows = []
-    for check in sorted(checks, key=lambda check: (check.p_holm, check.departure.p)):
-        one = check.departure
-        shown = quantity(one.key)
-        rows.append(
-            [
-                shown.label,
-                one.station or ALL_STATIONS,
-                format_value(one.measured, shown),
-                format_ends(one.measured, shown),
-                format_plain(one.expected.value, shown),
-                format_p_value(one.p),
-                format_p_value(check.p_holm),
-            ]
-        )
-    return Table(["number", "station", "measured", INTERVAL, "expected", "p", "p (Holm)"], rows, 2)
 
 
 def parameters_table(parameters: Sequence[ParameterRow]) -> Table:

@@ -1,10 +1,11 @@
 """A measured unit as text for the terminal: its faults first, then tables."""
 
 from harness.core.text_table import Table
+from harness.report.lab.check_table import departures_table
+from harness.report.lab.departure_wording import departure_text
 from harness.report.lab.unit_content import UnitReport
 from harness.report.lab.unit_tables import (
     capture_text,
-    departures_table,
     episodes_table,
     pair_table,
     parameters_table,
@@ -12,7 +13,7 @@ from harness.report.lab.unit_tables import (
     stations_table,
     stretches_table,
 )
-from harness.report.lab.unit_wording import advice_text, answer, departure_text, description
+from harness.report.lab.unit_wording import advice_text, answer, description
 
 _WIDTH = 118
 

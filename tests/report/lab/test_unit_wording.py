@@ -6,8 +6,9 @@ import numpy as np
 
 from harness.measure.departures import compare_with_expected
 from harness.measure.measured import Measured
+from harness.report.lab.departure_wording import departure_text
 from harness.report.lab.unit_content import DepartureCheck, ParameterRow, RecordingAdvice
-from harness.report.lab.unit_wording import advice_text, answer, departure_text, description
+from harness.report.lab.unit_wording import advice_text, answer, description
 from tests.report.fabricate_lab import exact, made_up_unit, number, without_content, without_faults
 
 
