@@ -1,0 +1,107 @@
+"""The charts of a validated capture: the two time offsets, and the errors of each station over time."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.report.kit.chart import draw_chart, insert_gaps
+from harness.report.kit.rows import label_rows
+from harness.report.kit.style import COLOURS, FAINT, Chart
+from harness.report.lab.quantities import format_both, quantity
+from harness.report.lab.validation_content import RegistrationNumber, ResidualSeries, ValidationReport
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_OFFSETS = ("registration.offset_orientation_s", "registration.offset_position_s")
+_ROW_IN, _FRAME_IN, _SERIES_IN = 0.34, 0.75, 0.95
+_MOST_POINTS = 1200
+"""Points of one curve; more are averaged in pairs, fours and so on: the largest is drawn."""
+
+
+def charts(report: ValidationReport) -> dict[str, Chart]:
+    """Name of the section -> its chart; a chart without anything to show is left out."""
+    offsets = [one for one in report.numbers if one.key in _OFFSETS and one.measured.is_measured]
+    drawn = {
+        "registration": _offsets(offsets) if len(offsets) > 1 else None,
+        "residuals": _residuals(report) if report.residuals else None,
+    }
+    return {name: chart for name, chart in drawn.items() if chart is not None}
+
+
+def _offsets(offsets: list[RegistrationNumber]) -> Chart:
+    names = [_name(one) for one in offsets]
+    texts = "; ".join(
+        f"{name} {format_both(one.measured, quantity(one.key))}" for name, one in zip(names, offsets, strict=True)
+    )
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.subplots()
+        for row, one in enumerate(offsets):
+            colour = COLOURS[1] if one.key == _OFFSETS[0] else COLOURS[0]
+            number = one.measured
+            axes.plot([1e3 * number.low, 1e3 * number.high], [row, row], color=colour, linewidth=2.2)
+            axes.plot(1e3 * number.value, row, "o", color=colour, markersize=6)
+        label_rows(axes, names)
+        axes.set_xlabel("time offset [ms]")
+
+    return draw_chart(
+        "offsets",
+        "Time offset by orientation and by position",
+        "How much later the stream is than its reference, with its 95 % interval. The two are estimated apart. Their "
+        "difference is an error of the position along the velocity: positions that are not of the moment of the stamp.",
+        f"Time offsets: {texts}.",
+        draw,
+        _FRAME_IN + _ROW_IN * len(offsets),
+    )
+
+
+def _name(one: RegistrationNumber) -> str:
+    label = quantity(one.key).label.removeprefix("time offset ")
+    return f"{label}, {one.station}" if one.station else label
+
+
+def _residuals(report: ValidationReport) -> Chart:
+    series = report.residuals
+    return draw_chart(
+        "residuals",
+        "Errors of each station over time",
+        "Distance of the position (left) and angle of the orientation (right) from the reference, after the "
+        "registration. A curve shows the largest error of each short stretch. A gap is a stretch without a reading.",
+        f"Errors over time of {', '.join(one.station for one in series)}; the numbers are in the table of accuracy.",
+        lambda figure: _draw_residuals(figure, series),
+        _FRAME_IN + _SERIES_IN * len(series),
+    )
+
+
+def _draw_residuals(figure: "Figure", series: tuple[ResidualSeries, ...]) -> None:
+    panels = figure.subplots(len(series), 2, sharex=True, sharey="col", squeeze=False)
+    for (left, right), one in zip(panels, series, strict=True):
+        _draw_errors(left, one.time_s, 1e3 * one.position_m, COLOURS[1])
+        _draw_errors(right, one.time_s, np.degrees(one.angle_rad), COLOURS[0])
+        left.set_title(one.station)
+    panels[0, 0].set_title(f"{series[0].station}: position [mm]")
+    panels[0, 1].set_title("orientation [deg]")
+    for axes in panels[-1]:
+        axes.set_xlabel("time since the start [s]")
+
+
+def _draw_errors(axes: "Axes", time_s: Floats, values: Floats, colour: str) -> None:
+    times, largest = insert_gaps(*largest_of_stretches(time_s, values))
+    axes.plot(times, largest, color=colour, linewidth=0.9)
+    finite = values[np.isfinite(values)]
+    if len(finite):
+        axes.axhline(float(np.median(finite)), color=FAINT, linewidth=0.9)
+        axes.set_ylim(bottom=0.0)
+
+
+def largest_of_stretches(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """At most `_MOST_POINTS` times, and the largest value from each to the next; NaN where there is no reading."""
+    every = -(-len(time_s) // _MOST_POINTS) if len(time_s) else 1
+    starts = np.arange(0, len(time_s), every)
+    if not len(starts):
+        return time_s, values
+    out: Floats = np.fmax.reduceat(values, starts)
+    return time_s[starts], out

@@ -1,0 +1,98 @@
+"""A made-up validation of a capture: six stations, known offsets, a turned station and a late stream."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from harness.core.seeds import generator
+from harness.measure.departures import compare_with_expected
+from harness.measure.measured import Measured
+from harness.report.lab.unit_content import CaptureSummary, DepartureCheck, StretchSummary
+from harness.report.lab.validation_content import (
+    ROOM,
+    EstimatedPose,
+    ReconstructionScore,
+    RegistrationNumber,
+    ResidualSeries,
+    StationAccuracy,
+    ValidationReport,
+)
+from tests.report.fabricate_lab import STATIONS, exact, number
+
+NO_STAMPS = "The stream has no stamps."
+
+
+def made_up_validation() -> ValidationReport:
+    """A capture with two departures, and something to show in every section."""
+    rng = generator(1, "fabricate_validation")
+    return ValidationReport(
+        name="walk.is900rec",
+        command="harness validate walk.is900rec --truth boxing_p1_01 --page walk.html",
+        capture=CaptureSummary("walk.is900rec", 60.0, STATIONS, 40.0, (StretchSummary("motion", 60.0, 14_400),)),
+        truth="clip boxing_p1_01, 60.0 s at 120 Hz",
+        matched_frames=2390,
+        expected_frames=2400,
+        expected_from="the preset default",
+        numbers=(
+            RegistrationNumber("registration.offset_orientation_s", Measured(0.0240, 0.0236, 0.0244, 300)),
+            RegistrationNumber("registration.offset_position_s", Measured(0.0220, 0.0215, 0.0225, 300)),
+            RegistrationNumber("registration.offset_difference_s", Measured(0.0020, 0.0014, 0.0026, 300)),
+            RegistrationNumber("components.clock.drift_ppm", Measured(21.0, 14.0, 28.0, 300)),
+            RegistrationNumber("registration.scale", Measured(0.0009, -0.0001, 0.0019, 300)),
+            *(
+                RegistrationNumber("registration.heading_rad", Measured(0.001 * n, 0.001 * n - 0.01, 0.02), station)
+                for n, station in enumerate(STATIONS)
+            ),
+        ),
+        poses=tuple(_pose(name, n) for n, name in enumerate((ROOM, *STATIONS))),
+        accuracy=tuple(_accuracy(station, n) for n, station in enumerate(STATIONS)),
+        checks=(
+            DepartureCheck(
+                compare_with_expected("registration.latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9
+            ),
+            DepartureCheck(
+                compare_with_expected("registration.turn_rad", "head", Measured(0.052, 0.047, 0.057), exact(0.0)), 1e-6
+            ),
+            DepartureCheck(
+                compare_with_expected("registration.scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3
+            ),
+        ),
+        residuals=tuple(_residuals(station, rng) for station in STATIONS),
+        scores=(
+            ReconstructionScore("ik", "joint_angle_mean_deg", 5.31),
+            ReconstructionScore("ik", "mpjpe_mm", 41.2),
+            ReconstructionScore("local_pca", "joint_angle_mean_deg", 3.02),
+            ReconstructionScore("local_pca", "mpjpe_mm", None),
+        ),
+        notes=("Latency is known to 0.4 ms only if the clocks of both recordings agree.",),
+    )
+
+
+def without_truth_of_time() -> ValidationReport:
+    """A capture of which hardly anything could be told."""
+    full = made_up_validation()
+    missing = RegistrationNumber("registration.offset_position_s", Measured.missing(NO_STAMPS))
+    return replace(
+        full, numbers=(missing,), poses=(), accuracy=(), checks=(), residuals=(), scores=(), notes=(),
+        capture=replace(full.capture, stretches=()),
+    )  # fmt: skip
+
+
+def _pose(name: str, n: int) -> EstimatedPose:
+    position = tuple(Measured(value, value - 0.0015, value + 0.0015, 300) for value in (0.05 * n, -0.02, 2.5 - 0.4 * n))
+    body = "" if name == ROOM else f"{name}_bone"
+    return EstimatedPose(name, body, position, np.array([1.0, 0.0, 0.0, 0.0]), 0.0035)  # type: ignore[arg-type]
+
+
+def _accuracy(station: str, n: int) -> StationAccuracy:
+    figures = [number(value * (1.0 + 0.05 * n), 0.05) for value in (0.0025, 0.0032, 0.0071, 0.008, 0.010, 0.021)]
+    median, rms, high, turn_median, turn_rms, turn_high = figures
+    return StationAccuracy(station, rms, median, high, turn_rms, turn_median, turn_high, 2390, 0.004)
+
+
+def _residuals(station: str, rng: np.random.Generator) -> ResidualSeries:
+    time_s = np.arange(2400) / 40.0
+    position_m, angle_rad = (scale * np.abs(rng.normal(size=2400)) for scale in (0.003, 0.01))
+    position_m[800:840] = np.nan
+    position_m[1200:1320] += 0.02
+    return ResidualSeries(station, time_s, position_m, angle_rad)
