@@ -64,8 +64,15 @@ def made_up_validation() -> ValidationReport:
             ReconstructionScore("local_pca", "joint_angle_mean_deg", 3.02),
             ReconstructionScore("local_pca", "mpjpe_mm", None),
         ),
+        exchanged=("left_foot and right_foot are exchanged.",),
         notes=("Latency is known to 0.4 ms only if the clocks of both recordings agree.",),
     )
+
+
+def without_exchange() -> ValidationReport:
+    """A capture without a fault."""
+    full = made_up_validation()
+    return replace(full, exchanged=(), checks=tuple(replace(check, p_holm=1.0) for check in full.checks))
 
 
 def without_truth_of_time() -> ValidationReport:
@@ -73,7 +80,8 @@ def without_truth_of_time() -> ValidationReport:
     full = made_up_validation()
     missing = RegistrationNumber("registration.offset_position_s", Measured.missing(NO_STAMPS))
     return replace(
-        full, numbers=(missing,), poses=(), accuracy=(), checks=(), residuals=(), scores=(), notes=(),
+        full, numbers=(missing,), poses=(), accuracy=(), checks=(), residuals=(), scores=(), exchanged=(),
+        notes=(),
         capture=replace(full.capture, stretches=()),
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ from harness.report.comparison.writer import write_comparison_page
 from harness.report.coverage.page import coverage_page
 from harness.report.lab.trust_page import write_trust_page
 from harness.report.lab.unit_page import write_unit_page
+from harness.report.lab.validation_page import write_validation_page
 from harness.report.paper.writer import write_paper_page
 from harness.report.physics.writer import write_physics_page
 from harness.report.placement import writer as placement_writer
@@ -23,10 +24,11 @@ from tests.report.fabricate_physics import made_up as made_up_physics
 from tests.report.fabricate_placement import write_made_up
 from tests.report.fabricate_sweep import fabricate_sweep
 from tests.report.fabricate_trust import made_up_trust
+from tests.report.fabricate_validation import made_up_validation
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
-KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics", "coverage", "unit", "trust")
+KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics", "coverage", "unit", "trust", "validation")
 PRINTED_PX = 703
 """Width of an A4 page within margins of 12 mm, at 96 pixels an inch."""
 UNFOLD = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
@@ -58,6 +60,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "paper": write_paper_page(write_study(folder / "paper", liu())),
         "physics": write_physics_page(folder / "physics.html", made_up_physics()),
         "unit": write_unit_page(folder / "unit.html", made_up_unit()),
+        "validation": write_validation_page(folder / "validation.html", made_up_validation()),
         "trust": write_trust_page(folder / "trust.html", made_up_trust()),
     }
 
