@@ -118,7 +118,7 @@ def test_the_text_has_the_answer_first_and_fits_a_terminal() -> None:
     joined = "\n".join(lines)
     for title in ("registration", "room and mounts", "accuracy", "reconstruction", "checks against the preset default"):
         assert f"\n\n{title}\n" in joined
-    assert "head                2.50      3.20      7.10" in joined
+    assert "head                2.50      3.20       7.10" in joined
     assert "note: Latency is known to 0.4 ms" in joined
 
 
