@@ -24,6 +24,7 @@ from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
 from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.measure.static_series import StaticSeries
 from harness.measure.uniform_size import fit_uniform
+from harness.measure.vector_length import fit_length
 
 EPISODE_KEYS = (
     "components.excursion.onsets_per_min",
@@ -49,6 +50,8 @@ _APART_S = 1.5
 """Time to the nearest other excursion from which on size and duration of an excursion are certain [s]."""
 _BEFORE_S, _AFTER_S = 0.2, 0.6
 """Samples around an excursion that the noise fit leaves out [s]."""
+_STRAYS = 0.03
+"""Share of excursions that are expected to be confused with others although they seem alone."""
 _STAY_ERROR_S = 0.03
 """Error of the duration of an excursion [s]; seen on simulated captures with seeds that no table judges."""
 
@@ -223,12 +226,7 @@ def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Measured, noise: Excursi
         fitted = noise.white_m, noise.drift_m, noise.correlation_s
         own, deviation = leaked_tilt_rad(one.series, one.gaps.begin, coast_s.value, others, fitted)
         tilts.append(own)
-    squared = np.sum(np.concatenate(tilts) ** 2, axis=1) - 2.0 * deviation**2
-    if len(squared) < 10:
-        return Measured.missing(f"There are {len(squared)} undisturbed coastings, of at least 10.")
-    mean, spread = float(squared.mean()), float(squared.std(ddof=1)) / np.sqrt(len(squared))
-    ends = [float(np.sqrt(max(mean + sign * NORMAL_QUANTILE * spread, 0.0))) for sign in (-1.0, 0.0, 1.0)]
-    return Measured(ends[1], ends[0], ends[2], len(squared))
+    return fit_length(np.linalg.norm(np.concatenate(tilts), axis=1), deviation)
 
 
 def _fit_excursions(
@@ -237,8 +235,8 @@ def _fit_excursions(
     alone = [event for one in found for event in _isolated(one.excursions)]
     sizes_m, stays_s = np.array([event.size_m for event in alone]), np.array([event.stay_s for event in alone])
     errors_m = np.array([event.size_m / np.sqrt(event.score) for event in alone])
-    smallest, largest, mean_m = fit_uniform(sizes_m, float(np.median(errors_m)) if len(alone) else 0.0)
-    shortest, longest, mean_s = fit_uniform(stays_s, _STAY_ERROR_S)
+    smallest, largest, mean_m = fit_uniform(sizes_m, float(np.median(errors_m)) if len(alone) else 0.0, strays=_STRAYS)
+    shortest, longest, mean_s = fit_uniform(stays_s, _STAY_ERROR_S, strays=_STRAYS)
     ends_m = (smallest.value, largest.value) if smallest.is_measured else (0.005, 0.03)
     ends_s = (shortest.value, longest.value) if shortest.is_measured else (1.0, 5.0)
     parameters = {
@@ -306,7 +304,8 @@ def _recover(
 
     The dispersion is the variance of a count over its mean: 1 for a Poisson process that is counted without confusion.
     """
-    injected, recovered = [], []
+    injected: list[int] = []
+    recovered: list[int] = []
     rounds = 0
     while rounds < 2 or (rounds < _MOST_ROUNDS and sum(injected) < _INJECTED):
         for number, (one, search) in enumerate(zip(found, searches, strict=True)):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.compiled import compiled
 from harness.core.runs import find_runs
 from harness.measure.static_series import StaticSeries
 
@@ -157,14 +158,6 @@ class ExcursionDetector:
         out: Floats = np.clip(np.minimum(since_s, stay_s + ramp_s - since_s) / ramp_s, 0.0, 1.0)
         return out
 
-    def _template(self, onset: float, stay_s: float, valid: Bools) -> tuple[slice, Floats]:
-        """Rows of an excursion in a series, and the innovations (K,) of a displacement of 1 there."""
-        at = int(np.floor(onset))
-        shape = self._shape(stay_s, onset - at)
-        first, last = max(at, 0), min(at + len(shape), len(valid))
-        rows = slice(first, max(last, first))
-        return rows, self._filter(shape[rows.start - at : rows.stop - at, None], valid[rows])[:, 0]
-
     def _strongest(self, residual: Innovations) -> list[tuple[int, float]]:
         """Onsets and stays of the strongest excursions that do not touch each other."""
         from scipy import signal
@@ -220,16 +213,19 @@ class ExcursionDetector:
 
     def _fit(self, residual: Innovations, onset: float, stay_s: float) -> "_Fit":
         """The displacement of least squares of an excursion with this onset and stay."""
-        rows, template = self._template(onset, stay_s, residual.valid)
-        power = float(template @ template)
+        power, x, y, z = fit_trapezoid(residual.values, residual.valid, *self._timing(onset, stay_s))
         if power <= 0.0:
             return _Fit(onset, stay_s, np.zeros(3), 0.0)
-        size = template @ residual.values[rows] / power
+        size = np.array([x, y, z]) / power
         return _Fit(onset, stay_s, size, float(size @ size) * power)
 
     def _add(self, innovations: Innovations, onset: float, stay_s: float, size: Floats) -> None:
-        rows, template = self._template(onset, stay_s, innovations.valid)
-        innovations.values[rows] += template[:, None] * size
+        add_trapezoid(innovations.values, innovations.valid, *self._timing(onset, stay_s), size)
+
+    def _timing(self, onset: float, stay_s: float) -> tuple[float, float, float, int, float, float]:
+        """What the compiled functions need: onset, stay, ramp and tail in samples, and the two coefficients."""
+        ramp = max(self._ramp_s, 1e-6) * self._rate_hz
+        return onset, stay_s * self._rate_hz, ramp, round(_TAIL_S * self._rate_hz), self._ar, self._ma
 
     def _event(self, station: str, samples: int, fit: "_Fit") -> ExcursionEvent:
         length_m = self._sigma_m * float(np.sqrt(fit.size @ fit.size))
@@ -248,3 +244,56 @@ def _steady_state(ar: float, drift_m: float, white_m: float) -> tuple[float, flo
     half = 0.5 * (process - white * (1.0 - ar**2))
     predicted = half + np.sqrt(half**2 + process * white)
     return float(predicted / (predicted + white)), float(np.sqrt(predicted + white))
+
+
+@compiled
+def fit_trapezoid(
+    values: Floats, valid: Bools, onset: float, stay: float, ramp: float, tail: int, ar: float, ma: float
+) -> tuple[float, float, float, float]:
+    """Power of an excursion's innovations, and their products with innovations (N, 3); times are in samples.
+
+    Where a sample is not valid, the displacement is held, and the innovation does not count.
+    """
+    first = max(int(np.floor(onset)), 0)
+    last = min(int(np.floor(onset)) + int(np.ceil(stay + ramp)) + tail + 1, len(valid))
+    power, x, y, z = 0.0, 0.0, 0.0, 0.0
+    before, innovation = 0.0, 0.0
+    for i in range(first, last):
+        now = before
+        if valid[i]:
+            now = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0)
+        innovation = now - ar * before + ma * innovation
+        before = now
+        if valid[i]:
+            power += innovation * innovation
+            x += innovation * values[i, 0]
+            y += innovation * values[i, 1]
+            z += innovation * values[i, 2]
+    return power, x, y, z
+
+
+@compiled
+def add_trapezoid(
+    values: Floats,
+    valid: Bools,
+    onset: float,
+    stay: float,
+    ramp: float,
+    tail: int,
+    ar: float,
+    ma: float,
+    size: Floats,
+) -> None:
+    """Add an excursion of size (3,) to innovations (N, 3) in place; see `fit_trapezoid`."""
+    first = max(int(np.floor(onset)), 0)
+    last = min(int(np.floor(onset)) + int(np.ceil(stay + ramp)) + tail + 1, len(valid))
+    before, innovation = 0.0, 0.0
+    for i in range(first, last):
+        now = before
+        if valid[i]:
+            now = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0)
+        innovation = now - ar * before + ma * innovation
+        before = now
+        if valid[i]:
+            for axis in range(3):
+                values[i, axis] += innovation * size[axis]

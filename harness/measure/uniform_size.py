@@ -13,9 +13,11 @@ _CUT = 0.5 * 5.991
 ratio of an end has that distribution; with large ones it has one degree of freedom, and the interval is then wider."""
 
 
-def fit_uniform(values: Floats, deviation: float) -> tuple[Measured, Measured, Measured]:
+def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tuple[Measured, Measured, Measured]:
     """Lower end, upper end and mean of the uniform distribution behind (N,) values with errors of this deviation.
 
+    `strays` is the share of values that may be anywhere between zero and twice the largest value: they move the mean,
+    but not the ends.
     The ends are those of the largest likelihood, their intervals are of the profile likelihood.
     """
     from scipy import optimize, special
@@ -29,11 +31,14 @@ def fit_uniform(values: Floats, deviation: float) -> tuple[Measured, Measured, M
     mean = Measured.normal(float(values.mean()), spread / np.sqrt(count), count)
     width = max(float(np.ptp(values)), deviation)
 
+    floor = strays / (2.0 * float(np.abs(values).max()))
+
     def cost(low: float, high: float) -> float:
         if high - low < 1e-3 * deviation:
             return float(np.inf)
         inside = special.ndtr((values - low) / deviation) - special.ndtr((values - high) / deviation)
-        return count * float(np.log(high - low)) - float(np.sum(np.log(np.maximum(inside, 1e-300))))
+        density = (1.0 - strays) * inside / (high - low) + floor
+        return -float(np.sum(np.log(np.maximum(density, 1e-300))))
 
     step = width / count
     start = np.array([values.min(), values.max()]) + step * np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
