@@ -45,12 +45,12 @@ EPISODE_KEYS = (
 )
 _INJECTED = 400
 """Least number of excursions that are injected, if the capture has any."""
-_MOST_ROUNDS = 12
+_MOST_ROUNDS = 6
 _APART_S = 1.5
 """Time to the nearest other excursion from which on size and duration of an excursion are certain [s]."""
 _BEFORE_S, _AFTER_S = 0.2, 0.6
 """Samples around an excursion that the noise fit leaves out [s]."""
-_STRAYS = 0.03
+_STRAYS = 0.05
 """Share of excursions that are expected to be confused with others although they seem alone."""
 _STAY_ERROR_S = 0.03
 """Error of the duration of an excursion [s]; seen on simulated captures with seeds that no table judges."""

@@ -27,7 +27,7 @@ _TAIL_S = 0.5
 _SHORT_GAP, _AFTER_GAP = 8, 3
 """Longest gap after which nothing is left out, and samples that are left out after a longer one: the position may have
 drifted meanwhile."""
-_ROUNDS = 12
+_ROUNDS = 5
 
 
 @dataclass(frozen=True)
