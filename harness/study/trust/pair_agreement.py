@@ -123,10 +123,8 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
     are percentiles of 95 % over clips that are drawn again; resamples without a value are left out.
     """
     names = ("Kendall's tau-b", "sim-to-real correlation")
-    arms = [arm for arm in device if device[arm] and simulated.get(arm)]
-    means = [
-        {arm: {c: float(np.mean(v)) for c, v in side[arm].items()} for arm in arms} for side in (device, simulated)
-    ]
+    means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
+    arms = [arm for arm in device if means[0][arm] and means[1][arm]]
     clips = shared_clips(side[arm] for side in means for arm in arms)
     if len(arms) < MIN_ARMS or len(clips) < MIN_CLIPS:
         why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_CLIPS}"
