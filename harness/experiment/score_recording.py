@@ -21,7 +21,7 @@ from harness.core.progress import ProgressCallback
 from harness.core.text_table import Table
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_run import lag_and_sigma
+from harness.experiment.method_run import MethodAnswers, lag_and_sigma
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import load_scenario
@@ -87,7 +87,7 @@ def find_playback(
     Values given here take precedence over the recording's note, and that over what the driver read. BadInput when
     nothing names the scenario; UnknownName and BadFile as for a run of it.
     """
-    note = _checked_note(stream) if scenario is None else {}
+    note = checked_note(stream) if scenario is None else {}
     played = scenario or note.get("scenario")
     if played is None:
         raise BadInput(
@@ -117,8 +117,8 @@ def find_playback(
 _NOTE_TYPES = {"scenario": str, "clip": str, "noise": str, "rate_hz": float, "seed": int, "posing": bool}
 
 
-def _checked_note(stream: RecordingStream) -> dict[str, Any]:
-    """The recording's note; BadFile when an entry that names the playback has another type."""
+def checked_note(stream: RecordingStream) -> dict[str, Any]:
+    """A recording's note without empty entries; BadFile when one that names the playback has another type."""
     note = {name: value for name, value in stream.recording.note.items() if value is not None}
     try:
         check_entries(note, {name: kind for name, kind in _NOTE_TYPES.items() if name in note}, "note")
@@ -150,7 +150,7 @@ def name_recorded_stations(
 
 
 @dataclass(frozen=True, eq=False)
-class _LoopFrames:
+class LoopFrames:
     """Frames of one loop of the motion within one session of the line."""
 
     rows: Ints
@@ -170,10 +170,10 @@ class _MethodOutput:
     sigma_rad: Floats | None
     """(F, 48) standard deviations, if the method states them [rad]."""
 
-    def answered(self, loop: _LoopFrames) -> _LoopFrames:
+    def answered(self, loop: LoopFrames) -> LoopFrames:
         """The frames of a loop that the method has answered."""
         kept = loop.rows < len(self.qpos)
-        return _LoopFrames(loop.rows[kept], loop.index[kept])
+        return LoopFrames(loop.rows[kept], loop.index[kept])
 
 
 def _collect_output(estimates: Sequence[Estimate], step_ms: Sequence[float]) -> _MethodOutput:
@@ -201,7 +201,34 @@ def score_methods(
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
     loops = _split_into_loops(frames, zero_s, playback.samples)
-    return [_score_method(name, made[name], loops, playback) for name in methods]
+    truth = playback.tracker.rate_hz, playback.simulation.truth_qpos
+    return [_score_method(name, made[name], loops, playback, truth) for name in methods]
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedRecording:
+    """F frames of a recording, and the loops of those that have a truth."""
+
+    frames: tuple[TrackerFrame, ...]
+    loops: tuple[LoopFrames, ...]
+
+
+def match_recording(stream: RecordingStream, playback: Playback) -> MatchedRecording:
+    """Decode a recording once, for any number of methods; BadInput for another motion."""
+    frames, zero_s, _ = _run_methods(stream, {})
+    return MatchedRecording(tuple(frames), tuple(_split_into_loops(frames, zero_s, playback.samples)))
+
+
+def score_answers(
+    name: str, answers: MethodAnswers, loops: Sequence[LoopFrames], playback: Playback, truth: tuple[float, Floats]
+) -> RecordingScore:
+    """Score a method's answers to the frames of a recording, or of a simulation of the same motion.
+
+    `truth` is a rate [Hz] and the true configurations (E, 55) at that rate, to whose rows the loops refer.
+    """
+    by_frame, lag = answers.by_frame()
+    output = _MethodOutput(lag, by_frame.qpos, by_frame.status, by_frame.step_ms, by_frame.angle_sigma_rad)
+    return _score_method(name, output, loops, playback, truth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +287,7 @@ def _run_methods(
     return frames, np.array(zero_s), made
 
 
-def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: DeviceSamples) -> list[_LoopFrames]:
+def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: DeviceSamples) -> list[LoopFrames]:
     """Frames that have a truth, loop by loop; BadInput when the recording is of another motion."""
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
@@ -281,7 +308,7 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     rows = np.flatnonzero(played)
     turns = np.flatnonzero((np.diff(lap[rows]) != 0) | (np.diff(zero_s[rows]) != 0.0)) + 1
     return [
-        _LoopFrames(part_rows, index[part_rows])
+        LoopFrames(part_rows, index[part_rows])
         for part_rows in (_strictly_increasing_rows(part, index) for part in np.split(rows, turns))
     ]
 
@@ -301,8 +328,10 @@ def _row_medians(values: Floats) -> Floats:
     return out
 
 
-def _score_method(name: str, output: _MethodOutput, loops: Sequence[_LoopFrames], playback: Playback) -> RecordingScore:
-    rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
+def _score_method(
+    name: str, output: _MethodOutput, loops: Sequence[LoopFrames], playback: Playback, truth: tuple[float, Floats]
+) -> RecordingScore:
+    rate_hz, truth_qpos = truth
     skeleton, scores, expected, sigma = playback.body.skeleton, [], 0, list[SigmaSums]()
     for number, loop in enumerate(loops):
         first, last = int(loop.index[0]), int(loop.index[-1])

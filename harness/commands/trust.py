@@ -1,0 +1,55 @@
+"""The verb `trust`: tell whether the simulation ranks methods as a device does."""
+
+import argparse
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
+from harness.core.progress import ProgressBar
+from harness.errors import Outcome
+
+
+def add_trust(verbs: Verbs) -> None:
+    text = "tell whether the fitted simulation ranks methods as a device does; the same command resumes"
+    verb = add_verb(verbs, "trust", text, run_trust, "out", "mocap")
+    verb.add_argument("plan", type=Path, help="plan in TOML: methods, sets of stations, metrics with margins")
+    text = "recordings of the device that `harness record --plan` made, one for each clip or more"
+    verb.add_argument("captures", type=Path, nargs="+", metavar="CAPTURE", help=text)
+    text = "clip of each capture, in their order (default: the clip that the capture names)"
+    verb.add_argument("--truth", nargs="+", default=(), metavar="CLIP", help=text)
+    text = "also use captures of another plan, or of none; the result then confirms nothing"
+    verb.add_argument("--exploratory", action="store_true", help=text)
+    text = "captures computed at the same time (default 1)"
+    verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
+
+
+def run_trust(args: argparse.Namespace) -> Outcome:
+    from dataclasses import asdict
+
+    from harness.core.files import to_json_types
+    from harness.experiment.executors import process_executor
+    from harness.report.lab.trust_content import TrustReport
+    from harness.report.lab.trust_text import format_trust
+    from harness.study.trust.trust_study import run_trust_study
+
+    out = args.out or Path("results") / f"trust_{args.plan.stem}"
+    with (
+        progress_note(out),
+        process_executor(args.jobs) as executor,
+        ProgressBar("captures") as bar,
+        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
+    ):
+        study = run_trust_study(
+            args.plan,
+            args.captures,
+            out,
+            clips=args.truth,
+            folder=args.mocap,
+            exploratory=args.exploratory,
+            executor=executor,
+            progress=bar,
+        )
+    report = TrustReport(study.findings, this_command())
+    content = {**to_json_types(asdict(study.findings)), "out": str(out)}
+    return print_result(args, content, format_trust(report), outcome=study.findings.outcome)

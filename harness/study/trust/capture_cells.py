@@ -1,0 +1,312 @@
+"""Cells of one capture: every arm on the device's frames and on simulations of the same motion.
+
+The capture is decoded once, each simulation is made once, and each method is trained once for all of them. Finished
+cells are kept in the folder of the study, so that a stopped study goes on where it was.
+"""
+
+import hashlib
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.core.arrays import Floats, Ints
+from harness.core.calibration import Calibration
+from harness.core.fault_report import named_folder_fault
+from harness.core.seeds import generator
+from harness.core.split import ExampleLeak
+from harness.errors import BadFile, BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
+from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
+from harness.experiment.isolation import DEFAULT_ISOLATION
+from harness.experiment.method_process import MethodFailure
+from harness.experiment.remote_method import hash_method, resolve_method, run_over_frames
+from harness.experiment.scenario import Scenario, change_scenario, variants
+from harness.experiment.score_recording import (
+    LoopFrames,
+    checked_note,
+    find_playback,
+    match_recording,
+    score_answers,
+)
+from harness.mocap.library import LibraryFolders
+from harness.results.digests import read_result_json, write_result_json
+from harness.results.manifest import source_hash
+from harness.results.storage import cell_key
+from harness.simulate.noise import Noise
+from harness.simulate.simulation import sampling_times_s, simulate_tracker
+from harness.simulate.trajectory import Trajectory
+from harness.stream.frame import TrackerFrame, split_frames
+from harness.stream.recording.replay import RecordingStream
+from harness.study.trust.reading_errors import HealthCounts, count_health, ideal_readings, reading_errors
+
+_EXPECTED, _ADVICE = "the errors of a finished cell", "Delete the file and run again; finished cells are kept."
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A method with a set of stations, and the values of the parameters that the plan varies."""
+
+    method: str
+    set_name: str
+    stations: tuple[str, ...]
+    varied: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """Name in tables, such as "ik, six"."""
+        values = [f"{key.rpartition('.')[2]} = {value}" for key, value in self.varied.items()]
+        return ", ".join([self.method, self.set_name, *values])
+
+
+@dataclass(frozen=True)
+class CaptureTask:
+    """One capture with everything that a worker process needs."""
+
+    capture: Path
+    clip: str
+    """The clip that was performed; "" is the one that the capture names."""
+    scenario_file: Path
+    arms: tuple[Arm, ...]
+    parameters: Mapping[str, Any]
+    """As `Plan.parameters`."""
+    metrics: tuple[str, ...]
+    seeds: tuple[int, ...]
+    unit: Mapping[str, Any] | None
+    """Scenario keys and values of the fitted unit; None without one."""
+    out: Path
+    """Folder of the study; the cells are in `cells` there."""
+    folder: LibraryFolders | None
+
+
+@dataclass(eq=False)
+class CaptureResult:
+    """What one capture gave. Errors of readings are those of `reading_errors`."""
+
+    clip: str
+    sha256: str
+    note: Mapping[str, Any]
+    frames: int
+    damage: tuple[str, ...]
+    stations: tuple[str, ...]
+    rate_hz: float
+    device: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    """Arm -> metric -> error on the device."""
+    simulated: dict[str, list[dict[str, float | None]]] = field(default_factory=dict)
+    """Arm -> for each seed, metric -> error; no metrics where the cell failed."""
+    readings: tuple[dict[str, list[Floats]], ...] = ()
+    """Errors of the device's readings, and of those of the first seed."""
+    health: tuple[list[HealthCounts], ...] = ()
+    """Counts of each station, of the device and of the first seed."""
+    failures: dict[str, str] = field(default_factory=dict)
+    """Cell -> why it has no result."""
+    methods_s: float = 0.0
+    """Time that training and methods took [s]; not part of any stored result."""
+
+
+def run_capture(task: CaptureTask) -> CaptureResult:
+    """Run or read all cells of a capture.
+
+    BadFile, BadInput and UnknownName for a capture that is not of the scenario's motion and stations. A method that
+    fails costs its own cells.
+    """
+    return _CaptureRun(task).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _SideFrames:
+    """Frames of the device or of one simulation, with their truth."""
+
+    frames: tuple[TrackerFrame, ...]
+    loops: tuple[LoopFrames, ...]
+    rate_hz: float
+    truth_qpos: Floats
+
+    @cached_property
+    def _columns(self) -> list[NDArray[Any]]:
+        """The fields of all frames (F, S, ...)."""
+        return [np.array([getattr(frame, name) for frame in self.frames]) for name in TrackerFrame.__slots__]
+
+    def of_stations(self, rows: Ints) -> list[TrackerFrame]:
+        """New frames of the stations in these rows."""
+        received_s, *arrays = self._columns
+        return split_frames(received_s.tolist(), *(array[:, rows] for array in arrays))
+
+
+class _CaptureRun:
+    """The evaluation of one capture; each part is made when it is first needed."""
+
+    def __init__(self, task: CaptureTask) -> None:
+        self.task, self.stream = task, RecordingStream(task.capture)
+        self.note = checked_note(self.stream)
+        self.clip = task.clip or self.note.get("clip")
+        if not self.clip:
+            raise BadInput(f"Nothing says which clip {task.capture} is of.", "Name the clip of each with --truth.")
+        if self.note.get("posing"):
+            raise BadInput(f"{task.capture} is of calibration poses.", "Name captures of motion.")
+        self.playback = find_playback(
+            self.stream,
+            scenario=str(task.scenario_file),
+            clip=self.clip,
+            rate_hz=self.note.get("rate_hz"),
+            seed=self.note.get("seed"),
+            folder=task.folder,
+        )
+        for arm in task.arms:
+            for station in arm.stations:
+                if station not in self.playback.scenario.worn_stations:
+                    raise UnknownName(f"station in {task.capture}", station, self.playback.scenario.worn_stations)
+        self.sha256 = hashlib.sha256(self.stream.recording.data).hexdigest()
+        self.methods_s, self.failures = 0.0, dict[str, str]()
+
+    def run(self) -> CaptureResult:
+        """Cells of both sides, errors of readings and health."""
+        device = self._cells("device", {"capture": self.sha256}, lambda: self.device)
+        simulated = []
+        for seed in self.task.seeds:
+            load = cache(partial(self._simulate, seed))
+            simulated.append(self._cells(f"seed {seed}", self._identity(seed), load))
+            if seed == self.task.seeds[0]:
+                first = load()
+        ideal = [ideal_readings(self.playback, tracker_of(each)) for each in (self.playback.scenario, self.fitted)]
+        sides = (self.device, first)
+        return CaptureResult(
+            clip=str(self.clip),
+            sha256=self.sha256,
+            note=self.note,
+            frames=len(self.device.frames),
+            damage=self.stream.recording.damage,
+            stations=tuple(self.playback.scenario.worn_stations),
+            rate_hz=self.device.rate_hz,
+            device=device,
+            simulated={str(arm): [each.get(str(arm), {}) for each in simulated] for arm in self.task.arms},
+            readings=tuple(reading_errors(s.frames, s.loops, i) for s, i in zip(sides, ideal, strict=True)),
+            health=tuple(count_health(side.frames, side.loops, side.rate_hz) for side in sides),
+            failures=self.failures,
+            methods_s=self.methods_s,
+        )
+
+    @cached_property
+    def device(self) -> _SideFrames:
+        """The capture, decoded once."""
+        matched, tracker = match_recording(self.stream, self.playback), self.playback.tracker
+        trajectory = Trajectory(self.playback.body, self.playback.take)
+        time_s = sampling_times_s(trajectory.duration_s, tracker, len(self.stream.stations))
+        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, trajectory.qpos(time_s.mean(axis=1)))
+
+    @cached_property
+    def fitted(self) -> Scenario:
+        """The scenario of the simulated side: that of the playback with the errors of the unit."""
+        if self.task.unit is None:
+            return self.playback.scenario
+        return change_scenario(replace(self.playback.scenario, physics=None), self.task.unit, "unit")
+
+    @cached_property
+    def _noise(self) -> Noise:
+        return self.fitted.disturbance.add_to(noise_of(self.fitted), tuple(self.fitted.worn_stations))
+
+    def _identity(self, seed: int) -> dict[str, Any]:
+        """What tells the cells of one seed apart from others."""
+        tracker = asdict(tracker_of(self.fitted))
+        return {"seed": seed, "noise": asdict(self._noise), "tracker": tracker, "span_s": self._span_s}
+
+    def _simulate(self, seed: int) -> _SideFrames:
+        """A simulation of the same take, scored from the first frame that the device has to its last.
+
+        The seed of its errors is derived from the plan's, so that a capture of a simulated line with the same seed has
+        other errors.
+        """
+        mounts, tracker = self.playback.clip_evaluation.session.true_mounts, tracker_of(self.fitted)
+        drawn = int(generator(seed, "trust").integers(2**62))
+        found = simulate_tracker(self.playback.body, self.playback.take, mounts, tracker, self._noise, seed=drawn)
+        first, last = (time_s * tracker.rate_hz for time_s in self._span_s)
+        rows: Ints = np.flatnonzero((found.frame_index >= first - 0.5) & (found.frame_index <= last + 0.5))
+        loop = LoopFrames(rows, found.frame_index[rows])
+        return _SideFrames(found.frames, (loop,), tracker.rate_hz, found.truth_qpos)
+
+    @cached_property
+    def _span_s(self) -> tuple[float, float]:
+        """Times of the first and the last true frame of the device in the take [s]."""
+        loops, rate_hz = self.device.loops, self.device.rate_hz
+        first, last = min(int(loop.index[0]) for loop in loops), max(int(loop.index[-1]) for loop in loops)
+        return first / rate_hz, last / rate_hz
+
+    @cached_property
+    def _evaluations(self) -> list[tuple[dict[str, Any], ClipEvaluation]]:
+        """The evaluation for each combination of parameters, which differ in what methods learn."""
+        base = self.playback.clip_evaluation
+        if not self.task.parameters:
+            return [({}, base)]
+        scenario = replace(base.scenario, vary=dict(self.task.parameters))
+        return [
+            (varied, ClipEvaluation(variant, base.source, base.part, base.behaviour))
+            for varied, variant in variants(scenario)
+        ]
+
+    def _cells(
+        self, side: str, identity: Mapping[str, Any], load: Callable[[], _SideFrames]
+    ) -> dict[str, dict[str, float | None]]:
+        """Arm -> metric -> error of one side; arms that fail are left out and named in `failures`."""
+        found = {}
+        for arm in self.task.arms:
+            try:
+                found[str(arm)] = self._cell(arm, side, identity, load)
+            except (SystemFault, ExampleLeak):
+                raise
+            except (MethodFailure, HarnessError) as error:
+                self.failures[f"{arm} on {self.clip}, {side}"] = str(error)
+            except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
+                if was_interrupted(error):
+                    raise KeyboardInterrupt from error
+                self.failures[f"{arm} on {self.clip}, {side}"] = traceback.format_exc()
+        return found
+
+    def _cell(
+        self, arm: Arm, side: str, identity: Mapping[str, Any], load: Callable[[], _SideFrames]
+    ) -> dict[str, float | None]:
+        method = resolve_method(arm.method, DEFAULT_ISOLATION)
+        evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
+        described = {"name": arm.method, "options": repr(method), "source": hash_method(method)}
+        conditions = evaluation.conditions_of(method, "pos+ori")
+        content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
+        path = self.task.out / "cells" / f"{cell_key(content, described, source_hash())}.json"
+        if path.is_file():
+            return read_cell_errors(path, self.task.metrics)
+        frames, worn = load(), tuple(self.playback.scenario.worn_stations)
+        rows = np.array([worn.index(station) for station in arm.stations])
+        shown = frames.of_stations(rows)
+        start = time.perf_counter()
+        fitted = evaluation.fit_method(method, arm.method)
+        answers = run_over_frames(fitted, _select_stations(self.playback.calibration, rows), shown)
+        self.methods_s += time.perf_counter() - start
+        score = score_answers(arm.method, answers, frames.loops, self.playback, (frames.rate_hz, frames.truth_qpos))
+        errors = {metric: score.metrics[metric] for metric in self.task.metrics}
+        with named_folder_fault(self.task.out):
+            write_result_json(path, {"arm": str(arm), "clip": self.clip, "side": side, "errors": errors})
+        return errors
+
+
+def read_cell_errors(path: Path, metrics: Sequence[str]) -> dict[str, float | None]:
+    """Metric -> error of a finished cell; BadFile when it is damaged, edited or of other metrics."""
+    errors = read_result_json(path, _EXPECTED, _ADVICE).get("errors")
+    if not isinstance(errors, dict) or set(errors) != set(metrics):
+        raise BadFile(path, "errors of other metrics", _EXPECTED, _ADVICE)
+    for value in errors.values():
+        if value is not None and not (isinstance(value, float) and np.isfinite(value)):
+            raise BadFile(path, f"an error of {value!r}", _EXPECTED, _ADVICE)
+    return errors
+
+
+def _select_stations(calibration: Calibration, rows: Ints) -> Calibration:
+    """The calibration of the stations in these rows."""
+    return replace(
+        calibration,
+        stations=tuple(calibration.stations[row] for row in rows),
+        bones=tuple(calibration.bones[row] for row in rows),
+        mount_m=calibration.mount_m[rows],
+        bone_from_station=calibration.bone_from_station[rows],
+    )

@@ -1,0 +1,154 @@
+"""Agreement of the two sides on the order of pairs of arms, and correlations of the arms' mean errors.
+
+Both sides perform the same motions. What a motion does to the difference of two arms is therefore no error of the
+comparison, and the order is judged on these motions alone. The noise of a simulated difference is read off its seeds.
+That of the device is read off the scatter, clip by clip, of device minus simulation. The scatter is a little too large:
+it also holds the simulation's noise, and whatever the simulation gets wrong from clip to clip.
+
+Two arms agree or contradict only where both sides show a difference in the direction of their means. The p of a pair is
+the larger of two one-sided p values, and Holm's method corrects it for the number of pairs. Where a contradiction is
+false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+from scipy import special
+
+from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.ranking import shared_clips
+from harness.compare.significance import holm
+from harness.core.arrays import Floats
+from harness.core.seeds import generator
+from harness.results.trust_findings import PairAgreement, PairVerdict, RankCorrelation, SideDifference
+
+ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
+"""Arm -> clip -> errors: one for each capture of the device, or for each seed of the simulation; None: not measured."""
+RESAMPLES = 2000
+MIN_ARMS = 3
+"""Least number of arms with a rank correlation: two are always correlated by 1 or -1."""
+
+
+def judge_pairs(
+    device: ArmErrors, simulated: ArmErrors, level: float, pairs: Sequence[tuple[str, str]] | None = None
+) -> list[PairAgreement]:
+    """Judge pairs of arms, by default all, over the clips on which both arms have errors on both sides.
+
+    *Agree* and *contradict*: p after Holm is at most `level`, and the signs of the mean differences are equal or
+    opposite. Anything else, and fewer than `MIN_CLIPS` clips, is undecided.
+    """
+    chosen = list(combinations(device, 2)) if pairs is None else list(pairs)
+    measured = [_compare_sides(device, simulated, pair, level) for pair in chosen]
+    tested = [at for at, (_, sides) in enumerate(measured) if all(side.p is not None for side in sides)]
+    p = {at: max(side.p or 0.0 for side in measured[at][1]) for at in tested}
+    corrected = dict(zip(tested, holm([p[at] for at in tested]), strict=True))
+    judged = []
+    for at, ((a, b), (clips, sides)) in enumerate(zip(chosen, measured, strict=True)):
+        if at in corrected:
+            verdict, why = _verdict(sides, corrected[at], level, len(tested))
+        else:
+            verdict, why = "cannot tell", f"too few clips: {clips}, of at least {MIN_CLIPS}"
+        judged.append(PairAgreement(a, b, clips, *sides, p.get(at), corrected.get(at), verdict, why))
+    return judged
+
+
+def _verdict(
+    sides: tuple[SideDifference, SideDifference], p_holm: float, level: float, pairs: int
+) -> tuple[PairVerdict, str]:
+    device, simulated = sides
+    if p_holm <= level:
+        if np.sign(device.mean or 0.0) == np.sign(simulated.mean or 0.0):
+            return "agree", "both sides show the same order"
+        return "contradict", "each side shows the other order"
+    names = zip(("device", "simulation"), sides, strict=True)
+    weak = [name for name, side in names if side.p is not None and side.p > level]
+    if weak:
+        return "cannot tell", f"no significant difference on the {' and the '.join(weak)}"
+    return "cannot tell", f"not significant among {pairs} pairs"
+
+
+def _compare_sides(
+    device: ArmErrors, simulated: ArmErrors, pair: tuple[str, str], level: float
+) -> tuple[int, tuple[SideDifference, SideDifference]]:
+    """Number of clips, and the differences of both sides."""
+    found = [_differences(side, pair) for side in (device, simulated)]
+    clips = sorted(set(found[0]) & set(found[1]))
+    rows = [[side[clip] for clip in clips] for side in found]
+    means = [np.array([row.mean() for row in side]) for side in rows]
+    if len(clips) < MIN_CLIPS:
+        first, second = (SideDifference(float(m.mean()) if len(m) else None, None, None, None) for m in means)
+        return len(clips), (first, second)
+    of_device = float((means[0] - means[1]).var(ddof=1))
+    of_simulation, free = of_device, len(clips) - 1
+    if all(len(row) > 1 for row in rows[1]):
+        of_simulation = float(np.mean([row.var(ddof=1) / len(row) for row in rows[1]]))
+        free = sum(len(row) - 1 for row in rows[1])
+    first = _side_difference(means[0], of_device, len(clips) - 1, level)
+    return len(clips), (first, _side_difference(means[1], of_simulation, free, level))
+
+
+def _differences(side: ArmErrors, pair: tuple[str, str]) -> dict[str, Floats]:
+    """Clip -> differences of the captures or seeds in which both arms were measured; clips without any are left out."""
+    first, second = (side.get(arm, {}) for arm in pair)
+    rows = {clip: np.array(first[clip], float) - np.array(second[clip], float) for clip in first if clip in second}
+    return {clip: row[np.isfinite(row)] for clip, row in rows.items() if np.isfinite(row).any()}
+
+
+def clip_means(errors: Mapping[str, Sequence[float | None]]) -> dict[str, float]:
+    """Clip -> mean over the captures or seeds that were measured; clips without any are left out."""
+    known = {clip: [value for value in values if value is not None] for clip, values in errors.items()}
+    return {clip: sum(values) / len(values) for clip, values in known.items() if values}
+
+
+def _side_difference(values: Floats, variance: float, free: int, level: float) -> SideDifference:
+    """The mean of (n,) differences, whose noise has this variance, known with `free` degrees of freedom."""
+    mean, deviation = float(values.mean()), float(np.sqrt(variance / len(values)))
+    half = float(special.stdtrit(free, 1.0 - level)) * deviation
+    p = 0.0 if mean else 1.0
+    if deviation > 0.0:
+        p = float(special.stdtr(free, -abs(mean) / deviation))
+    return SideDifference(mean, mean - half, mean + half, p)
+
+
+def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrelation, RankCorrelation]:
+    """Kendall's tau-b and the sim-to-real correlation of the arms' mean errors.
+
+    The second is Pearson's correlation of performance in simulation and reality (SRCC, Kadian et al. 2020). Intervals
+    are percentiles of 95 % over clips that are drawn again; resamples without a value are left out.
+    """
+    names = ("Kendall's tau-b", "sim-to-real correlation")
+    means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
+    arms = [arm for arm in device if means[0][arm] and means[1][arm]]
+    clips = shared_clips(side[arm] for side in means for arm in arms)
+    if len(arms) < MIN_ARMS or len(clips) < MIN_CLIPS:
+        why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_CLIPS}"
+        first, second = (RankCorrelation(name, None, None, None, why) for name in names)
+        return first, second
+    sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]
+    drawn = generator(0, "rank correlation").integers(0, len(clips), (RESAMPLES, len(clips)))
+    found = []
+    for name, measure in zip(names, (kendall_tau_b, _pearson), strict=True):
+        value = measure(sides[0].mean(axis=1), sides[1].mean(axis=1))
+        resampled = np.array([measure(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
+        finite = resampled[np.isfinite(resampled)]
+        if not np.isfinite(value) or not len(finite):
+            found.append(RankCorrelation(name, None, None, None, "all arms have the same error on one side"))
+            continue
+        low, high = np.quantile(finite, (0.025, 0.975))
+        found.append(RankCorrelation(name, value, float(low), float(high)))
+    return found[0], found[1]
+
+
+def kendall_tau_b(x: Floats, y: Floats) -> float:
+    """Kendall's rank correlation of (n,) values with a correction of ties (tau-b); NaN if one side is constant."""
+    first, second = (np.sign(values[:, None] - values[None, :]) for values in (x, y))
+    scale = np.sqrt(float((first**2).sum()) * float((second**2).sum()))
+    return float((first * second).sum() / scale) if scale else float("nan")
+
+
+def _pearson(x: Floats, y: Floats) -> float:
+    """Pearson's correlation of (n,) values; NaN if one side is constant."""
+    first, second = x - x.mean(), y - y.mean()
+    scale = float(np.sqrt((first @ first) * (second @ second)))
+    return float(first @ second) / scale if scale else float("nan")
