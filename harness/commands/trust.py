@@ -30,6 +30,7 @@ def run_trust(args: argparse.Namespace) -> Outcome:
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.lab.trust_content import TrustReport
+    from harness.report.lab.trust_page import write_trust_page
     from harness.report.lab.trust_text import format_trust
     from harness.study.trust.trust_study import run_trust_study
 
@@ -51,5 +52,6 @@ def run_trust(args: argparse.Namespace) -> Outcome:
             progress=bar,
         )
     report = TrustReport(study.findings, this_command())
-    content = {**to_json_types(asdict(study.findings)), "out": str(out)}
-    return print_result(args, content, format_trust(report), outcome=study.findings.outcome)
+    page = write_trust_page(out / "report.html", report)
+    content = {**to_json_types(asdict(study.findings)), "out": str(out), "report": str(page)}
+    return print_result(args, content, format_trust(report), "", f"report: {page}", outcome=study.findings.outcome)

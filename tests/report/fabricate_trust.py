@@ -1,4 +1,7 @@
-"""Content of a page on trust with made-up values: every verdict, a gap without a duration, a damaged capture."""
+"""Made-up findings of a trust study: pairs, margins and distances of every verdict."""
+
+from dataclasses import replace
+from typing import Any
 
 from harness.errors import Outcome
 from harness.report.lab.trust_content import TrustReport
@@ -14,113 +17,94 @@ from harness.results.trust_findings import (
     TrustFindings,
 )
 
-ARMS = ("ik, all", "local_pca, all", "dynamic_map, all", "ik, four")
-CLIPS = ("walking_p1_01", "walking_p2_01", "boxing_p1_01", "boxing_p2_01", "jumping_p1_01", "golf_p1_01", "golf_p2_01")
+METRIC = "joint_angle_mean_deg"
+ARMS = ("ik", "local_pca", "dynamic_map", "kernel_cca")
+MEANS = {"ik": (14.2, 14.5), "local_pca": (9.1, 9.3), "dynamic_map": (9.8, 8.4), "kernel_cca": (11.6, 11.9)}
+"""Arm -> mean error on the device and in the simulation."""
+DIGEST = "5d1f" * 16
 
 
-def fabricate_trust(*, exploratory: bool = False, outcome: Outcome = Outcome.REGRESSED) -> TrustReport:
-    """A study of four arms on seven captures."""
+def made_up_trust() -> TrustReport:
+    """A study that contradicts in one pair and exceeds one margin."""
     return TrustReport(
         TrustFindings(
-            title="our IS-900, spring",
-            scenario="lab",
+            title="Walking with six stations",
+            scenario="walking",
             unit="unit.toml",
-            unit_digest="c" * 64,
-            plan_digest="a" * 64,
-            exploratory=exploratory,
+            unit_digest="ab12" * 16,
+            plan_digest=DIGEST,
+            exploratory=False,
             level=0.05,
-            ranked_metric="joint_angle_mean_deg",
+            ranked_metric=METRIC,
             seeds=(1, 2, 3, 4, 5),
             captures=tuple(
-                TrustCapture(f"{clip}.rec", clip, "b" * 64, "a" * 64, 320, ("12 bytes at byte 4,096",) if not k else ())
-                for k, clip in enumerate(CLIPS)
+                TrustCapture(f"walk_{n:02d}.is900rec", f"walking_p{n:02d}", "0f" * 32, DIGEST, 2400) for n in range(8)
             ),
             arms=ARMS,
-            health=(
+            health=tuple(
                 StationHealth(
-                    "head",
-                    StreamHealth(39.98, 0.012, 2.1, 0.35, 0.97, 0.001),
-                    StreamHealth(40.0, 0.01, 1.9, 0.31, 0.98, 0.0),
-                ),
-                StationHealth(
-                    "left_hand",
-                    StreamHealth(39.98, 0.0, 0.0, None, 0.99, 0.0),
-                    StreamHealth(40.0, 0.02, 3.4, 0.4, 0.9, 0.0),
-                ),
+                    station,
+                    StreamHealth(40.0, 0.012, 3.1, 0.21, 0.93, 0.001),
+                    StreamHealth(40.0, 0.010, 2.8, None, 0.94, 0.0),
+                )
+                for station in ("head", "left_wrist", "right_wrist")
             ),
             distances=(
-                ErrorDistance("head", "position error", "m", 0.00021, 0.00048, 0.31, 0.62, 1.9, (62, 62)),
-                ErrorDistance("head", "orientation error", "rad", 0.0031, 0.0007, 0.001, 0.004, 2.4, (50, 50)),
-                ErrorDistance("left_hand", "position error", "m", -0.00004, 0.0005, 0.7, 0.7, 1.1, (98, 98)),
-                ErrorDistance(
-                    "left_hand",
-                    "orientation error",
-                    "rad",
-                    None,
-                    None,
-                    None,
-                    None,
-                    0.0,
-                    (0, 0),
-                    "3 blocks of 900 samples",
-                ),
+                ErrorDistance("head", "position error", "m", 0.00012, 0.00030, 0.41, 1.0, 5.2, (40, 200)),
+                ErrorDistance("left_wrist", "position error", "m", 0.00091, 0.00035, 0.001, 0.006, 5.2, (40, 200)),
+                ErrorDistance("right_wrist", "position error", "m", -0.00002, 0.00033, 0.6, 1.0, 5.2, (40, 200)),
+                ErrorDistance("head", "orientation error", "rad", 0.0002, 0.0005, 0.001, 0.006, 5.2, (40, 200)),
+                ErrorDistance("pelvis", "orientation error", "rad", None, None, None, None, 5.2, (3, 200), "3 blocks"),
             ),
-            equivalences=(
-                _equivalence("ik, all", 0.5, 3.75, 3.56, (-0.35, -0.03), "equivalent"),
-                _equivalence("local_pca, all", 0.5, 2.32, 2.81, (0.31, 0.67), "cannot tell"),
-                _equivalence("dynamic_map, all", 0.5, 2.15, 3.02, (0.71, 1.03), "beyond the margin"),
-                _equivalence("ik, four", 0.5, 4.81, 4.7, (-0.2, 0.02), "equivalent"),
-            ),
-            pairs=(
-                _pair("ik, all", "local_pca, all", (1.4, 1.2, 1.6, 1e-6), (0.75, 0.5, 1.0, 1e-5), 4e-5, "agree"),
-                _pair(
-                    "local_pca, all",
-                    "dynamic_map, all",
-                    (0.17, 0.05, 0.29, 0.01),
-                    (-0.21, -0.3, -0.12, 1e-4),
-                    0.03,
-                    "contradict",
-                ),
-                _pair("ik, all", "dynamic_map, all", (1.6, 1.2, 2.0, 1e-5), (0.54, 0.3, 0.78, 0.001), 0.004, "agree"),
-                _pair("ik, all", "ik, four", (-1.06, -2.2, 0.1, 0.06), (-1.14, -1.4, -0.9, 1e-6), 0.06, "cannot tell"),
-            ),
+            equivalences=tuple(_equivalence(arm) for arm in ARMS),
+            pairs=tuple(_pair(a, b) for n, a in enumerate(ARMS) for b in ARMS[n + 1 :]),
             rank_correlations=(
                 RankCorrelation("Kendall's tau-b", 0.67, 0.33, 1.0),
-                RankCorrelation("sim-to-real correlation", 0.94, 0.81, 0.98),
+                RankCorrelation("sim-to-real correlation", None, None, None, "2 arms and 8 clips"),
             ),
-            outcome=outcome,
-            why="local_pca, all and dynamic_map, all contradict; and 1 more.",
-            notes=("2 errors were not measured: too few frames have an estimate.",),
+            outcome=Outcome.REGRESSED,
+            why="one pair contradicts",
+            notes=("Two stations of the scenario were not captured.",),
         ),
-        "harness trust plan.toml captures/*.rec --out results/trust",
-    )
+        "harness trust plan.toml walk_*.is900rec --page trust.html",
+    )  # fmt: skip
 
 
-def _equivalence(
-    arm: str, margin: float, device: float, simulated: float, interval: tuple[float, float], verdict: str
-) -> Equivalence:
-    why = {
-        "equivalent": "the whole interval lies within the margin",
-        "beyond the margin": "the whole interval lies beyond the margin",
-        "cannot tell": "the interval contains an end of the margin",
-    }[verdict]
+def trust_of(outcome: Outcome, **changes: Any) -> TrustReport:
+    """The study with another outcome, and other findings."""
+    report = made_up_trust()
+    return replace(report, findings=replace(report.findings, outcome=outcome, **changes))
+
+
+def empty_trust() -> TrustReport:
+    """A study in which nothing could be compared."""
+    parts = ("captures", "health", "distances", "equivalences", "pairs", "rank_correlations", "notes")
+    return trust_of(Outcome.NOT_COMPARABLE, why="no capture has a frame", **dict.fromkeys(parts, ()))
+
+
+def _equivalence(arm: str) -> Equivalence:
+    device, simulated = MEANS[arm]
     difference = simulated - device
-    metric = "joint_angle_mean_deg"
-    return Equivalence(arm, metric, margin, 7, device, simulated, difference, *interval, verdict, why)  # type: ignore[arg-type]
+    low, high = difference - 0.3, difference + 0.3
+    if arm == "dynamic_map":
+        return Equivalence(
+            arm, METRIC, 1.0, 8, device, simulated, difference, low, high, "beyond the margin", "outside"
+        )
+    if arm == "kernel_cca":
+        return Equivalence(arm, METRIC, 0.5, 8, device, simulated, difference, low, high, "cannot tell", "wide")
+    return Equivalence(arm, METRIC, 1.0, 8, device, simulated, difference, low, high, "equivalent", "inside")
 
 
-def _pair(
-    a: str,
-    b: str,
-    device: tuple[float, float, float, float],
-    simulated: tuple[float, float, float, float],
-    p_holm: float,
-    verdict: str,
-) -> PairAgreement:
-    why = {
-        "agree": "both sides show the same order",
-        "contradict": "each side shows the other order",
-        "cannot tell": "no significant difference on the device",
-    }[verdict]
-    sides = SideDifference(*device), SideDifference(*simulated)
-    return PairAgreement(a, b, 7, *sides, max(device[3], simulated[3]), p_holm, verdict, why)  # type: ignore[arg-type]
+def _pair(a: str, b: str) -> PairAgreement:
+    device, simulated = (MEANS[a][side] - MEANS[b][side] for side in (0, 1))
+    on_device = SideDifference(device, device - 0.4, device + 0.4, 0.004)
+    if (a, b) == ("local_pca", "kernel_cca"):
+        wide = SideDifference(simulated, simulated - 3.0, simulated + 3.0, 0.2)
+        why = "no significant difference on the simulation"
+        return PairAgreement(a, b, 8, on_device, wide, 0.2, 0.4, "cannot tell", why)
+    in_simulation = SideDifference(simulated, simulated - 0.4, simulated + 0.4, 0.004)
+    if device * simulated > 0.0:
+        return PairAgreement(a, b, 8, on_device, in_simulation, 0.004, 0.024, "agree", "both sides show the same order")
+    return PairAgreement(
+        a, b, 8, on_device, in_simulation, 0.004, 0.024, "contradict", "each side shows the other order"
+    )

@@ -7,6 +7,8 @@ import pytest
 
 from harness.report.comparison.writer import write_comparison_page
 from harness.report.coverage.page import coverage_page
+from harness.report.lab.trust_page import write_trust_page
+from harness.report.lab.unit_page import write_unit_page
 from harness.report.paper.writer import write_paper_page
 from harness.report.physics.writer import write_physics_page
 from harness.report.placement import writer as placement_writer
@@ -15,14 +17,16 @@ from harness.report.sweep.page import write_sweep_page
 from tests.report.fabricate import Plan, fabricate
 from tests.report.fabricate_comparison import comparison
 from tests.report.fabricate_coverage import fabricate_coverage
+from tests.report.fabricate_lab import made_up_unit
 from tests.report.fabricate_paper import liu, write_study
 from tests.report.fabricate_physics import made_up as made_up_physics
 from tests.report.fabricate_placement import write_made_up
 from tests.report.fabricate_sweep import fabricate_sweep
+from tests.report.fabricate_trust import made_up_trust
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
-KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics", "coverage")
+KINDS = ("run", "comparison", "sweep", "placement", "paper", "physics", "coverage", "unit", "trust")
 PRINTED_PX = 703
 """Width of an A4 page within margins of 12 mm, at 96 pixels an inch."""
 UNFOLD = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
@@ -53,6 +57,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "placement": placement,
         "paper": write_paper_page(write_study(folder / "paper", liu())),
         "physics": write_physics_page(folder / "physics.html", made_up_physics()),
+        "unit": write_unit_page(folder / "unit.html", made_up_unit()),
+        "trust": write_trust_page(folder / "trust.html", made_up_trust()),
     }
 
 

@@ -1,0 +1,82 @@
+"""The chart of checks: measured over expected numbers, departures in colour."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from harness.report.kit.chart import draw_chart
+from harness.report.kit.rows import label_rows
+from harness.report.kit.scales import set_log_scale
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
+from harness.report.lab.quantities import format_both, quantity
+from harness.report.lab.unit_content import DepartureCheck
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_ROW_IN, _FRAME_IN = 0.3, 0.75
+_LEAST_RATIO, _MOST_RATIO = 0.02, 50.0
+"""Ends of the axis of ratios."""
+
+
+def check_chart(every: Sequence[DepartureCheck], expected_from: str) -> Chart | None:
+    """Measured over expected number of each check, with its interval; None if no check has a ratio."""
+    checks = _with_ratio(every)
+    if not checks:
+        return None
+    names = [_check_name(check) for check in checks]
+    texts = "; ".join(
+        f"{name} {format_both(check.departure.measured, quantity(check.departure.key))}"
+        f"{', a departure' if check.is_named else ''}"
+        for name, check in zip(names, checks, strict=True)
+    )
+    return draw_chart(
+        "checks",
+        "Measured over expected",
+        f"Each number over that of {expected_from}, with its 95 % interval. Orange triangles: departures, after "
+        "Holm's correction over all checks. Hollow: no departure. A number with nothing expected has no place here.",
+        f"Measured over expected: {texts}.",
+        lambda figure: _draw_checks(figure, checks, names),
+        _FRAME_IN + _ROW_IN * len(checks),
+    )
+
+
+def _check_name(check: DepartureCheck) -> str:
+    label = quantity(check.departure.key).label
+    return f"{label}, {check.departure.station}" if check.departure.station else label
+
+
+def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequence[str]) -> None:
+    axes = figure.subplots()
+    ends = []
+    for row, check in enumerate(checks):
+        one = check.departure
+        ratio, low, high = (
+            end / one.expected.value for end in (one.measured.value, one.measured.low, one.measured.high)
+        )
+        colour = COLOURS[0] if check.is_named else FAINT
+        low, high = max(low, _LEAST_RATIO), min(high, _MOST_RATIO)
+        axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt")
+        marker = (">" if ratio > 1.0 else "<") if check.is_named else "o"
+        face = colour if check.is_named else PAPER
+        axes.plot(
+            np.clip(ratio, _LEAST_RATIO, _MOST_RATIO), row, marker, color=colour, markerfacecolor=face, markersize=6
+        )
+        ends += [low, high]
+    axes.axvline(1.0, color=INK, linewidth=0.9, zorder=1)
+    label_rows(axes, names)
+    set_log_scale(axes, "x")
+    axes.set_xlim(min(0.8, 0.9 * min(ends)), max(1.25, 1.1 * max(ends)))
+    axes.set_xlabel("measured over expected")
+
+
+def _with_ratio(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
+    """The checks whose numbers have a ratio, those of all stations and those that are named."""
+    return [
+        check
+        for check in checks
+        if (not check.departure.station or check.is_named)
+        and check.departure.expected.value > 0.0
+        and check.departure.measured.value > 0.0
+    ]

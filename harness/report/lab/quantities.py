@@ -1,0 +1,164 @@
+"""Names, units and decimals of the numbers that the lab's pages show, by their keys."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from harness.core.number_format import NOT_MEASURED, decimals_for, format_fixed
+from harness.measure.measured import Measured
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Name of a number and the unit that it is shown in."""
+
+    label: str
+    unit: str = ""
+    """Unit, as it stands behind the number; "" without one."""
+    factor: float = 1.0
+    """Number in this unit over that in SI units."""
+
+    @property
+    def title(self) -> str:
+        """The name with its unit, for the head of a column or an axis."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+
+_MM, _DEG, _MS, _PERCENT = ("mm", 1e3), ("deg", math.degrees(1.0)), ("ms", 1e3), ("%", 100.0)
+_NAMES: Mapping[str, Quantity] = {
+    "components.white.position_m": Quantity("white noise of the position", *_MM),
+    "components.white.orientation_rad": Quantity("white noise of the orientation", *_DEG),
+    "components.drift.position_m": Quantity("drift of the position", *_MM),
+    "components.drift.pitch_roll_rad": Quantity("drift of pitch and roll", *_DEG),
+    "components.drift.yaw_rad": Quantity("drift of yaw", *_DEG),
+    "components.drift.correlation_s": Quantity("correlation time of the drift", "s"),
+    "components.excursion.onsets_per_min": Quantity("rate of excursions", "/min"),
+    "components.excursion.size_m": Quantity("mean size of an excursion", *_MM),
+    "components.excursion.size_m.0": Quantity("smallest excursion", *_MM),
+    "components.excursion.size_m.1": Quantity("largest excursion", *_MM),
+    "components.excursion.stay_s": Quantity("mean duration of an excursion", "s"),
+    "components.excursion.stay_s.0": Quantity("shortest excursion", "s"),
+    "components.excursion.stay_s.1": Quantity("longest excursion", "s"),
+    "components.excursion.ramp_s": Quantity("rise of an excursion", "s"),
+    "components.echo.share": Quantity("share of echoes", *_PERCENT),
+    "components.echo.burst_records": Quantity("mean length of an echo burst", "records"),
+    "components.echo.burst_records.0": Quantity("shortest echo burst", "records"),
+    "components.echo.burst_records.1": Quantity("longest echo burst", "records"),
+    "components.echo.size_m": Quantity("mean size of an echo", *_MM),
+    "components.echo.size_m.0": Quantity("smallest echo", *_MM),
+    "components.echo.size_m.1": Quantity("largest echo", *_MM),
+    "components.dropout.share": Quantity("share of lost readings", *_PERCENT),
+    "components.dropout.gap_s": Quantity("mean length of a gap", "s"),
+    "components.dropout.gap_s.0": Quantity("shortest gap", "s"),
+    "components.dropout.gap_s.1": Quantity("longest gap", "s"),
+    "components.dropout.coast_s": Quantity("falling quality before a gap", "s"),
+    "components.dropout.tilt_rad": Quantity("tilt error before a gap", *_DEG),
+    "components.speed.ahead_s": Quantity("positions ahead of orientations", *_MS),
+    "components.session.scale": Quantity("scale error", *_PERCENT),
+    "components.session.station_offset_m": Quantity("offset of a station in its housing", *_MM),
+    "components.clock.drift_ppm": Quantity("error of the clock's rate", "ppm"),
+    "components.clock.offset_s": Quantity("clock at the start", "s"),
+    "tracker.rate_hz": Quantity("rate of a station", "Hz"),
+    "tracker.latency_s": Quantity("latency", *_MS),
+    "timing.rate_hz": Quantity("rate of a station", "Hz"),
+    "timing.jitter_s": Quantity("jitter of the stamps", *_MS),
+    "timing.lost_share": Quantity("share of lost records", *_PERCENT),
+    "timing.duplicate_share": Quantity("share of duplicate records", *_PERCENT),
+    "timing.delay_s": Quantity("mean delay of records on the line", *_MS),
+    "timing.stamp_resolution_s": Quantity("resolution of the stamps", *_MS),
+    "timing.clock_age_s": Quantity("clock at the set-up", "s"),
+    "station.spread_m": Quantity("spread of the position", *_MM),
+    "station.spread_rad": Quantity("spread of the orientation", *_DEG),
+    "station.white_m": Quantity("white noise", *_MM),
+    "station.slow_m": Quantity("drift", *_MM),
+    "station.slope_m_min": Quantity("drift of the mean", "mm/min", 1e3),
+    "station.excursions_per_min": Quantity("excursions", "/min"),
+    "station.excursion_size_m": Quantity("excursion size", *_MM),
+    "station.excursion_stay_s": Quantity("excursion duration", "s"),
+    "station.echo_share": Quantity("echoes", *_PERCENT),
+    "station.gap_share": Quantity("lost readings", *_PERCENT),
+    "station.rate_hz": Quantity("rate", "Hz"),
+    "station.jitter_s": Quantity("jitter", *_MS),
+    "station.lost_share": Quantity("lost records", *_PERCENT),
+    "station.duplicate_share": Quantity("duplicates", *_PERCENT),
+}
+_SUFFIXES: tuple[tuple[str, str, float], ...] = (
+    ("_m_min", "mm/min", 1e3),
+    ("_rad", *_DEG),
+    ("_ppm", "ppm", 1.0),
+    ("share", *_PERCENT),
+    ("_per_min", "/min", 1.0),
+    ("_hz", "Hz", 1.0),
+    ("_s", "s", 1.0),
+    ("_m", *_MM),
+)
+"""Ends of keys that have no name here, with their unit."""
+_MOST_DECIMALS = 6
+
+
+def quantity(key: str) -> Quantity:
+    """The name and unit of a key; an unknown key is its own name, with the unit that its end states."""
+    if key in _NAMES:
+        return _NAMES[key]
+    stem = re.sub(r"\.\d+$", "", key)
+    return next((Quantity(key, unit, factor) for end, unit, factor in _SUFFIXES if stem.endswith(end)), Quantity(key))
+
+
+def is_known(key: str) -> bool:
+    """Whether the key has a name of its own."""
+    return key in _NAMES
+
+
+def format_value(number: Measured, shown: Quantity, *, with_unit: bool = True) -> str:
+    """The estimate with as many decimals as its interval deserves; "not measured" without one."""
+    if not number.is_measured:
+        return NOT_MEASURED
+    text = format_fixed(shown.factor * number.value, measured_decimals(number, shown), grouped=True)
+    return with_unit_of(text, shown) if with_unit else text
+
+
+def format_ends(number: Measured, shown: Quantity) -> str:
+    """The interval, "1.48 to 1.53"; "exact" without a width, a dash where nothing was measured."""
+    if not number.is_measured:
+        return "–"
+    if number.low == number.high:
+        return "exact"
+    decimals = measured_decimals(number, shown)
+    return " to ".join(_end(shown.factor * end, decimals) for end in (number.low, number.high))
+
+
+def format_both(number: Measured, shown: Quantity) -> str:
+    """ "1.50 mm (1.48 to 1.53)"; the interval is left out where it has no width."""
+    if not number.is_measured or number.low == number.high:
+        return format_value(number, shown)
+    return f"{format_value(number, shown)} ({format_ends(number, shown)})"
+
+
+def format_plain(value: float, shown: Quantity) -> str:
+    """A number that is known exactly, with its unit, in at most four significant digits."""
+    rounded = float(f"{shown.factor * value:.4g}")
+    return with_unit_of(format_fixed(rounded, _plain_decimals(rounded), grouped=True), shown)
+
+
+def with_unit_of(text: str, shown: Quantity) -> str:
+    """A number with the unit of its quantity behind it."""
+    return f"{text} {shown.unit}" if shown.unit else text
+
+
+def measured_decimals(number: Measured, shown: Quantity) -> int:
+    """Decimals that show two digits of half the interval's width, or three of a value without an interval."""
+    half = 0.5 * shown.factor * (number.high - number.low)
+    if half > 0.0 and math.isfinite(half):
+        return decimals_for(half, digits=2, most=_MOST_DECIMALS)
+    return _plain_decimals(shown.factor * number.value)
+
+
+def _end(value: float, decimals: int) -> str:
+    return format_fixed(value, decimals, grouped=True) if math.isfinite(value) else "∞"
+
+
+def _plain_decimals(value: float) -> int:
+    """Decimals of a number without trailing zeros, in four significant digits."""
+    text = f"{value:.4g}"
+    return len(text.partition(".")[2]) if "e" not in text and "." in text else 0
