@@ -58,10 +58,10 @@ class _Piece:
     valid: Bools
 
 
-def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> NoiseFit:
+def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools], *, by_station: bool = True) -> NoiseFit:
     """Fit the noise of stations at rest; `left_out` masks samples (N,) of each series, such as excursions.
 
-    BadInput without any valid sample.
+    Without `by_station` only all stations together are fitted. BadInput without any valid sample.
     """
     pieces = _choose_pieces(series, left_out)
     samples = sum(int(piece.valid.sum()) for piece in pieces)
@@ -70,10 +70,11 @@ def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> Nois
             f"{samples} undisturbed samples at rest cannot show the noise.", "Record a longer static stretch."
         )
     together, logarithms = _fit(pieces, start_values(series, left_out))
-    by_station = {}
-    for station in dict.fromkeys(piece.station for piece in pieces):
-        by_station[station] = _fit([piece for piece in pieces if piece.station == station], logarithms)[0]
-    return NoiseFit(together, by_station, samples)
+    stations = dict.fromkeys(piece.station for piece in pieces) if by_station else {}
+    single = {
+        station: _fit([piece for piece in pieces if piece.station == station], logarithms)[0] for station in stations
+    }
+    return NoiseFit(together, single, samples)
 
 
 def start_values(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> Floats:

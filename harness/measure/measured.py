@@ -43,7 +43,7 @@ class Measured:
     def normal(cls, value: float, deviation: float, count: int = 0, least: float = -math.inf) -> "Measured":
         """An estimate with this standard deviation; the interval is cut at the least possible value."""
         half = NORMAL_QUANTILE * deviation
-        return cls(value, max(value - half, min(least, value)), value + half, count)
+        return cls(float(value), float(max(value - half, min(least, value))), float(value + half), count)
 
     @property
     def is_measured(self) -> bool:

@@ -14,8 +14,8 @@ MIN_REST_S = 5.0
 _WINDOW_S = 1.0
 _STILL_M, _STILL_RAD = 0.02, float(np.deg2rad(1.5))
 """Largest median distance from the median within a window: far above noise and drift at rest [choice]."""
-_STEP_M, _STEP_RAD = 0.04, float(np.deg2rad(3.0))
-"""Largest step of the median from one window to the next: an excursion of 3 cm is smaller [choice]."""
+_STEP_M, _STEP_RAD = 0.07, float(np.deg2rad(3.0))
+"""Largest step of the median from one window to the next: two opposite excursions of 3 cm are nearer [choice]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,9 +110,7 @@ class TimingAccumulator:
         all_stations = {
             **self._numbers(together, resolution_s),
             "timing.delay_s": _mean(np.array(self._delays_s)),
-            "timing.stamp_resolution_s": _exact(
-                resolution_s, sum(map(len, self._tails_s.values())), "No record has a stamp."
-            ),
+            "timing.stamp_resolution_s": _exact(resolution_s, sum(map(len, self._tails_s.values()))),
             "timing.clock_age_s": Measured.missing("No record has a stamp.")
             if math.isnan(self._age_s)
             else Measured(self._age_s, self._age_s - _AGE_TOLERANCE_S, self._age_s + _AGE_TOLERANCE_S, 1),
@@ -261,5 +259,5 @@ def _mean(values: Floats) -> Measured:
     return Measured.normal(float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values))), len(values), 0.0)
 
 
-def _exact(value: float, count: int, reason: str) -> Measured:
-    return Measured.missing(reason) if math.isnan(value) else Measured(value, value, value, count)
+def _exact(value: float, count: int) -> Measured:
+    return Measured.missing("No record has a stamp.") if math.isnan(value) else Measured(value, value, value, count)

@@ -39,11 +39,12 @@ class EnergyDistance:
 
 
 def correlation_samples(series: Sequence[Floats]) -> float:
-    """Integrated correlation time of vector series (N, D), in samples; at least 0.5, that of independent samples.
+    """Integrated correlation time of vector series (N, D), in samples; 1 where samples are independent.
 
-    The normalised autocorrelation is summed over pairs of lags as long as the sum of a pair is positive (Geyer 1992,
-    "initial positive sequence"), up to half of the longest series. A slow part of small variance is thus not missed. A
-    row with a NaN is left out. The mean over all series is subtracted. BadInput without any variance.
+    It is 1 plus twice the sum of the autocorrelation over the lags: so many samples count as one. The sum is over pairs
+    of lags as long as that of a pair is positive (Geyer 1992, "initial positive sequence"), up to half of the longest
+    series. A slow part of small variance is thus not missed. Rows with a NaN are left out. The mean over all series is
+    subtracted. BadInput without any variance.
     """
     rows = np.concatenate(series) if series else np.zeros((0, 1))
     seen = rows[np.isfinite(rows).all(axis=1)]
@@ -52,15 +53,17 @@ def correlation_samples(series: Sequence[Floats]) -> float:
     length = max(map(len, series))
     total, pairs = np.zeros(length), np.zeros(length)
     for each in series:
-        known = np.isfinite(each).all(axis=1)
-        centred = np.where(known[:, None], each - seen.mean(axis=0), 0.0)
-        total[: len(each)] += sum(_lagged_sums(column) for column in centred.T)
+        known: Bools = np.asarray(np.isfinite(each).all(axis=1))
+        centred: Floats = np.where(known[:, None], each - seen.mean(axis=0), 0.0)
+        for axis in range(each.shape[1]):
+            total[: len(each)] += _lagged_sums(centred[:, axis])
         pairs[: len(each)] += _lagged_sums(known.astype(np.float64))
-    count = max(length // 2, 1) // 2 * 2
-    correlation = total[:count] / np.maximum(pairs[:count], 0.5) / (total[0] / pairs[0])
-    sums = correlation.reshape(-1, 2).sum(axis=1)
-    ends = np.flatnonzero(sums <= 0.0)
-    return max(float(sums[: ends[0] if len(ends) else None].sum()) - 0.5, 0.5)
+    count = (length // 2 + 1) // 2 * 2
+    correlation = total[:count] / np.maximum(pairs[:count], 0.5) * (pairs[0] / total[0])
+    sums = correlation[::2] + correlation[1::2]
+    ends: Ints = np.flatnonzero(np.asarray(sums) <= 0.0)
+    positive = sums[: ends[0]] if len(ends) else sums
+    return max(2.0 * float(positive.sum()) - 1.0, 1.0)
 
 
 def _lagged_sums(values: Floats) -> Floats:

@@ -2,12 +2,12 @@
 
 Both sides perform the same motions. What a motion does to the difference of two arms is therefore no error of the
 comparison, and the order is judged on these motions alone. The noise of a simulated difference is read off its seeds.
-That of the device is read off the scatter, clip by clip, of device minus simulation, less the noise of the simulation.
-This scatter also holds whatever the simulation gets wrong from clip to clip.
+That of the device is read off the scatter, clip by clip, of device minus simulation. The scatter is a little too large:
+it also holds the simulation's noise, and whatever the simulation gets wrong from clip to clip.
 
-Two arms are said to agree or to contradict only where both sides show a difference in the direction of their means. The
-p of a pair is the larger of two one-sided p values, and Holm's method corrects it for the number of pairs. At least one
-of two opposite signs is wrong where a contradiction is false, so that at most the share `level` of the plans has one.
+Two arms agree or contradict only where both sides show a difference in the direction of their means. The p of a pair is
+the larger of two one-sided p values, and Holm's method corrects it for the number of pairs. Where a contradiction is
+false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,8 +28,6 @@ ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
 RESAMPLES = 2000
 MIN_ARMS = 3
 """Least number of arms with a rank correlation: two are always correlated by 1 or -1."""
-_LEAST_SHARE = 0.5
-"""Least share of the scatter of device minus simulation that counts as the device's noise."""
 
 
 def judge_pairs(
@@ -81,14 +79,11 @@ def _compare_sides(
     if len(clips) < MIN_CLIPS:
         first, second = (SideDifference(float(m.mean()) if len(m) else None, None, None, None) for m in means)
         return len(clips), (first, second)
-    scatter = float((means[0] - means[1]).var(ddof=1))
-    seeds = np.array([len(row) for row in rows[1]])
-    if seeds.min() > 1:
-        noise = np.array([row.var(ddof=1) / len(row) for row in rows[1]])
-        of_simulation, free = float(noise.mean()), int((seeds - 1).sum())
-    else:
-        of_simulation, free = scatter, len(clips) - 1
-    of_device = max(scatter - of_simulation, _LEAST_SHARE * scatter) if seeds.min() > 1 else scatter
+    of_device = float((means[0] - means[1]).var(ddof=1))
+    of_simulation, free = of_device, len(clips) - 1
+    if all(len(row) > 1 for row in rows[1]):
+        of_simulation = float(np.mean([row.var(ddof=1) / len(row) for row in rows[1]]))
+        free = sum(len(row) - 1 for row in rows[1])
     first = _side_difference(means[0], of_device, len(clips) - 1, level)
     return len(clips), (first, _side_difference(means[1], of_simulation, free, level))
 
@@ -123,10 +118,8 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
     are percentiles of 95 % over clips that are drawn again; resamples without a value are left out.
     """
     names = ("Kendall's tau-b", "sim-to-real correlation")
-    arms = [arm for arm in device if device[arm] and simulated.get(arm)]
-    means = [
-        {arm: {c: float(np.mean(v)) for c, v in side[arm].items()} for arm in arms} for side in (device, simulated)
-    ]
+    means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
+    arms = [arm for arm in device if means[0][arm] and means[1][arm]]
     clips = shared_clips(side[arm] for side in means for arm in arms)
     if len(arms) < MIN_ARMS or len(clips) < MIN_CLIPS:
         why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_CLIPS}"

@@ -1,0 +1,168 @@
+"""Planted worlds of a trust study: what its verdicts find where the answer is known. No method runs.
+
+A world has twelve clips, drawn with replacement from stored ones. The device gets the errors of one stored draw of the
+noise for each clip. The simulation gets those of others. Methods of one draw share it, as those on one capture do.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from harness.bench.lab.planted_errors import METRIC, load_planted_errors
+from harness.core.arrays import Floats
+from harness.core.seeds import generator
+from harness.report.physics.error_comparison import TruthRow
+from harness.study.trust.equivalence import judge_equivalence
+from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_pairs
+
+CLIPS = 12
+SIMULATED_SEEDS = 5
+LEVEL = 0.05
+SWAPPED = 1.05
+"""Ratio of the errors of two methods on the device; in the simulation it is the inverse."""
+MARGIN = 0.1
+"""Margin of the worlds of equivalence, relative to the mean error."""
+SEEDS = tuple(range(1, 101))
+"""Seeds of the plans."""
+METHODS = ("ik", "best_match+ik", "kernel_ridge", "local_pca", "dynamic_map")
+CHANGED = ("local_pca", "local_pca[neighbours=280]")
+"""A method and the same method with one constant changed."""
+RELATED = ("dynamic_map", "local_pca")
+"""The two different methods whose errors are nearest to each other."""
+
+
+def trust_rows(seeds: Sequence[int] = SEEDS) -> list[TruthRow]:
+    """The rows of the truth table on trust, one plan for each seed."""
+    return [same_profile_row(seeds), swapped_row(seeds), *further_swapped_rows(seeds), *equivalence_rows(seeds)]
+
+
+def same_profile_row(seeds: Sequence[int]) -> TruthRow:
+    """Plans of five methods, whose errors have one distribution on both sides."""
+    without = sum(
+        all(pair.verdict != "contradict" for pair in judge_pairs(*draw_world(seed, METHODS), LEVEL)) for seed in seeds
+    )
+    needed = _share(0.95, seeds)
+    return TruthRow(
+        "trust, same profile on both sides: no pair contradicts",
+        f"in {needed} of {len(seeds)} plans or more",
+        f"in {without}",
+        without >= needed,
+        "",
+        f"{len(METHODS)} methods, {CLIPS} clips, one capture of each, {SIMULATED_SEEDS} seeds",
+    )
+
+
+def swapped_row(seeds: Sequence[int]) -> TruthRow:
+    """Two different methods, which each plan draws anew, swapped by 5 %."""
+    pairs = list(combinations(METHODS, 2))
+    found = sum(
+        finds_swap(seed, pairs[generator(seed, "swapped pair").integers(len(pairs))], captures=1) for seed in seeds
+    )
+    needed, scatter = _share(0.8, seeds), typical_scatter()
+    note = (
+        f"the difference of two methods scatters by {scatter:.0%} of the error from one draw of the tracker's noise to "
+        f"the next, and {CLIPS} captures leave {scatter / np.sqrt(CLIPS):.1%}"
+    )
+    return TruthRow(
+        "trust, two methods swapped by 5 %: the pair contradicts",
+        f"in {needed} of {len(seeds)} plans or more",
+        f"in {found}",
+        found >= needed,
+        "",
+        note,
+    )
+
+
+def typical_scatter() -> float:
+    """Median over pairs of methods of the standard deviation over draws of their difference, relative to the error."""
+    stored = load_planted_errors()
+    found = []
+    for a, b in combinations(METHODS, 2):
+        difference = stored[a] / stored[a].mean() - stored[b] / stored[b].mean()
+        found.append(float(np.sqrt(difference.var(axis=1, ddof=1).mean())))
+    return float(np.median(found))
+
+
+def further_swapped_rows(seeds: Sequence[int]) -> list[TruthRow]:
+    """The same for pairs of given likeness and for two captures of each clip; without a verdict."""
+    cases = [
+        ("the same method with one constant changed", CHANGED, 1),
+        ("the two methods nearest to each other", RELATED, 1),
+        ("the same two methods, two captures of each clip", RELATED, 2),
+    ]
+    rows = []
+    for name, pair, captures in cases:
+        found = sum(finds_swap(seed, pair, captures) for seed in seeds)
+        title = f"the same, {name}"
+        rows.append(TruthRow(title, "", f"in {found} of {len(seeds)}", None, "", " and ".join(pair)))
+    return rows
+
+
+def equivalence_rows(seeds: Sequence[int]) -> list[TruthRow]:
+    """Equivalence where the true difference is the margin, and where it is zero."""
+    declared = {
+        shift: sum(declares_equivalence(seed, shift * (-1.0) ** seed) for seed in seeds) for shift in (1.0, 0.0)
+    }
+    most = len(seeds) // 10
+    return [
+        TruthRow(
+            "trust, true difference at the margin's edge: equivalence declared",
+            f"in {most} of {len(seeds)} plans or fewer",
+            f"in {declared[1.0]}",
+            declared[1.0] <= most,
+            "",
+            f"{RELATED[0]}, margin {MARGIN:.0%} of its mean error",
+        ),
+        TruthRow("the same, no true difference", "", f"in {declared[0.0]} of {len(seeds)}", None),
+    ]
+
+
+def _share(share: float, seeds: Sequence[int]) -> int:
+    return int(np.ceil(share * len(seeds) - 1e-9))
+
+
+def draw_world(
+    seed: int, methods: Sequence[str], *, ratios: tuple[float, float] | None = None, captures: int = 1
+) -> tuple[ArmErrors, ArmErrors]:
+    """Errors of the device and of the simulation in one world [deg].
+
+    With `ratios`, for two methods, the errors of the second are scaled so that its mean over clips and stored draws is
+    that of the first times the ratio: on the device, and in the simulation.
+    """
+    stored = load_planted_errors()
+    clips, draws = stored[methods[0]].shape
+    rng = generator(seed, "planted world", *methods)
+    chosen = rng.integers(0, clips, CLIPS)
+    shuffled = rng.permuted(np.tile(np.arange(draws), (CLIPS, 1)), axis=1)
+    parts = shuffled[:, :captures], shuffled[:, captures : captures + SIMULATED_SEEDS]
+    errors = {method: stored[method][chosen] for method in methods}
+    factors = [dict.fromkeys(methods, 1.0) for _ in parts]
+    if ratios is not None:
+        first, second = (float(errors[method].mean()) for method in methods)
+        for factor, ratio in zip(factors, ratios, strict=True):
+            factor[methods[1]] = ratio * first / second
+    device, simulated = (
+        {method: _by_clip(factor[method] * np.take_along_axis(errors[method], part, axis=1)) for method in methods}
+        for factor, part in zip(factors, parts, strict=True)
+    )
+    return device, simulated
+
+
+def _by_clip(errors: Floats) -> dict[str, list[float]]:
+    return {f"clip {number:02d}": row.tolist() for number, row in enumerate(errors)}
+
+
+def finds_swap(seed: int, pair: tuple[str, str], captures: int) -> bool:
+    """Whether a plan finds that two methods are swapped."""
+    world = draw_world(seed, pair, ratios=(SWAPPED, 1.0 / SWAPPED), captures=captures)
+    return judge_pairs(*world, LEVEL)[0].verdict == "contradict"
+
+
+def declares_equivalence(seed: int, shift: float) -> bool:
+    """Whether a plan declares equivalence where the simulation's error is larger by `shift` margins."""
+    method = RELATED[0]
+    device, simulated = (clip_means(side[method]) for side in draw_world(seed, (method,)))
+    margin = MARGIN * float(load_planted_errors()[method].mean())
+    shifted = {clip: error + shift * margin for clip, error in simulated.items()}
+    return judge_equivalence(method, METRIC, device, shifted, margin, LEVEL).verdict == "equivalent"

@@ -1,0 +1,367 @@
+"""Parameters of echoes, excursions and gaps from stations at rest, each with its interval.
+
+The rate of excursions is corrected by injection and recovery: excursions of known number are added to what is left of
+the capture without its own ones, and the same detector counts them. Some are missed, and near ones are confused.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.seeds import generator
+from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
+from harness.measure.excursions import (
+    DEFAULT_RAMP_S,
+    ExcursionDetector,
+    ExcursionEvent,
+    ExcursionNoise,
+    ExcursionSearch,
+    Innovations,
+)
+from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
+from harness.measure.measured import NORMAL_QUANTILE, Measured
+from harness.measure.static_series import StaticSeries
+from harness.measure.uniform_size import fit_uniform
+from harness.measure.vector_length import fit_length
+
+EPISODE_KEYS = (
+    "components.excursion.onsets_per_min",
+    "components.excursion.size_m.0",
+    "components.excursion.size_m.1",
+    "components.excursion.stay_s.0",
+    "components.excursion.stay_s.1",
+    "components.echo.share",
+    "components.echo.burst_records.0",
+    "components.echo.burst_records.1",
+    "components.echo.size_m.0",
+    "components.echo.size_m.1",
+    "components.dropout.share",
+    "components.dropout.gap_s.0",
+    "components.dropout.gap_s.1",
+    "components.dropout.coast_s",
+    "components.dropout.tilt_rad",
+)
+_INJECTED = 400
+"""Least number of excursions that are injected, if the capture has any."""
+_MOST_ROUNDS = 6
+_APART_S = 1.5
+"""Time to the nearest other excursion from which on size and duration of an excursion are certain [s]."""
+_BEFORE_S, _AFTER_S = 0.2, 0.6
+"""Samples around an excursion that the noise fit leaves out [s]."""
+_STRAYS = 0.05
+"""Share of excursions that are expected to be confused with others although they seem alone."""
+_STAY_ERROR_S = 0.03
+"""Error of the duration of an excursion [s]; seen on simulated captures with seeds that no table judges."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesEpisodes:
+    """What was found in one series."""
+
+    series: StaticSeries
+    echoes: EchoBursts
+    gaps: Gaps
+    excursions: tuple[ExcursionEvent, ...]
+    disturbed: Bools
+    """(N,) samples that show more than noise and drift."""
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeFit:
+    """Episodes of all series, and the parameters behind them."""
+
+    parameters: Mapping[str, Measured]
+    """Dotted key -> number, by `EPISODE_KEYS`."""
+    means: Mapping[str, Measured]
+    """Key without an index -> mean of a distribution of which the parameters are the ends."""
+    by_station: Mapping[str, Mapping[str, Measured]]
+    """Station -> rate of excursions, share of echoes and share of losses, by the same keys."""
+    found: tuple[SeriesEpisodes, ...]
+
+
+def find_episodes(
+    series: Sequence[StaticSeries], noise: ExcursionNoise
+) -> tuple[list[SeriesEpisodes], list[ExcursionSearch]]:
+    """Find the episodes of each series among noise of this size, and what the search for excursions leaves."""
+    limit_m = echo_limit_m(noise.white_m, noise.drift_m, noise.correlation_s)
+    detectors = {one.rate_hz: ExcursionDetector(one.rate_hz, noise) for one in series}
+    out, searches = [], []
+    for one in series:
+        echoes, gaps = find_echoes(one, limit_m), find_gaps_at_rest(one)
+        left_out = echoes.mask(len(one)) | gaps.coasting
+        detector = detectors[one.rate_hz]
+        search = detector.search(detector.innovations(one, left_out), one.station)
+        disturbed = left_out | gaps.lost
+        for event in search.events:
+            first = int((event.begin_s - _BEFORE_S) * one.rate_hz)
+            last = int((event.begin_s + event.stay_s + DEFAULT_RAMP_S + _AFTER_S) * one.rate_hz)
+            disturbed[max(first, 0) : max(last, 0)] = True
+        out.append(SeriesEpisodes(one, echoes, gaps, tuple(search.events), disturbed))
+        searches.append(search)
+    return out, searches
+
+
+def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> EpisodeFit:
+    """Find the episodes of stations at rest and fit their parameters."""
+    found, searches = find_episodes(series, noise)
+    parameters, means = _fit_echoes(found)
+    gap_parameters, gap_means = _fit_gaps(found, noise)
+    excursion_parameters, excursion_means = _fit_excursions(found, searches, noise)
+    by_station = {}
+    for station in dict.fromkeys(one.series.station for one in found):
+        own = [one for one in found if one.series.station == station]
+        by_station[station] = {
+            "components.excursion.onsets_per_min": _station_rate(own, excursion_parameters[EPISODE_KEYS[0]], found),
+            "components.echo.share": _echo_share(own),
+            "components.dropout.share": _lost_share(own),
+        }
+    return EpisodeFit(
+        {**excursion_parameters, **parameters, **gap_parameters},
+        {**excursion_means, **means, **gap_means},
+        by_station,
+        tuple(found),
+    )
+
+
+def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], dict[str, Measured]]:
+    lengths = np.concatenate([(one.echoes.end - one.echoes.begin)[one.echoes.whole] for one in found])
+    sizes_m = np.concatenate([one.echoes.size_m[one.echoes.whole] for one in found])
+    low, high, mean_m = fit_uniform(sizes_m, 0.001)
+    fewest, most, mean_records = _integer_ends(lengths)
+    parameters = {
+        "components.echo.share": _echo_share(found),
+        "components.echo.burst_records.0": fewest,
+        "components.echo.burst_records.1": most,
+        "components.echo.size_m.0": low,
+        "components.echo.size_m.1": high,
+    }
+    return parameters, {"components.echo.burst_records": mean_records, "components.echo.size_m": mean_m}
+
+
+def _integer_ends(values: Floats) -> tuple[Measured, Measured, Measured]:
+    """Ends and mean of a uniform distribution of whole numbers: the extremes, and what they leave possible."""
+    count = len(values)
+    if count < 10:
+        missing = Measured.missing(f"There are {count} whole bursts, of at least 10.")
+        return missing, missing, missing
+    low, high = int(values.min()), int(values.max())
+    slack = 0
+    while ((high - low + 1) / (high - low + 2 + slack)) ** count > 0.05:
+        slack += 1
+    mean = Measured.normal(float(values.mean()), float(values.std(ddof=1)) / np.sqrt(count), count)
+    return Measured(low, max(low - slack, 1), low, count), Measured(high, high, high + slack, count), mean
+
+
+def _echo_share(found: Sequence[SeriesEpisodes]) -> Measured:
+    """Share of valid readings that are echoes; bursts come independently of each other."""
+    lengths = np.concatenate([one.echoes.end - one.echoes.begin for one in found]).astype(float)
+    valid = sum(int(one.series.valid.sum()) for one in found)
+    return _compound_share(lengths, valid)
+
+
+def _lost_share(found: Sequence[SeriesEpisodes]) -> Measured:
+    lengths = np.concatenate([one.gaps.end - one.gaps.begin for one in found]).astype(float)
+    return _compound_share(lengths, sum(len(one.series) for one in found))
+
+
+def _compound_share(lengths: Floats, total: int) -> Measured:
+    """Share of samples in episodes of these lengths, whose number is nearly Poisson.
+
+    Without any episode the interval ends where three would be expected: the 95 % limit of a count of zero.
+    """
+    if not total:
+        return Measured.missing("There is no reading at rest.")
+    if not len(lengths):
+        return Measured(0.0, 0.0, 3.0 / total, 0)
+    share = float(lengths.sum()) / total
+    relative = (1.0 - share) * float(np.sqrt(np.sum(lengths**2))) / float(lengths.sum())
+    low, high = (share * float(np.exp(sign * NORMAL_QUANTILE * relative)) for sign in (-1.0, 1.0))
+    return Measured(share, low, min(high, 1.0), len(lengths))
+
+
+def _fit_gaps(
+    found: Sequence[SeriesEpisodes], noise: ExcursionNoise
+) -> tuple[dict[str, Measured], dict[str, Measured]]:
+    durations_s = np.concatenate(
+        [((one.gaps.end - one.gaps.begin) / one.series.rate_hz)[one.gaps.whole] for one in found]
+    )
+    period_s = 1.0 / found[0].series.rate_hz if found else 0.0
+    low, high, mean_s = fit_uniform(durations_s, period_s / np.sqrt(6.0))  # both ends fall between two samples
+    coasts_s = np.concatenate([one.gaps.coast_s for one in found])
+    coast_s = _typical(coasts_s[np.isfinite(coasts_s)])
+    parameters = {
+        "components.dropout.share": _lost_share(found),
+        "components.dropout.gap_s.0": low,
+        "components.dropout.gap_s.1": high,
+        "components.dropout.coast_s": coast_s,
+        "components.dropout.tilt_rad": _fit_tilt(found, coast_s, noise),
+    }
+    return parameters, {"components.dropout.gap_s": mean_s}
+
+
+def _typical(values: Floats) -> Measured:
+    """Median of values that are equal but for rounding, with a margin for it."""
+    if len(values) < 5:
+        return Measured.missing(f"There are {len(values)} losses with falling quality before, of at least 5.")
+    middle = float(np.median(values))
+    spread = 1.2533 * float(np.median(np.abs(values - middle))) / 0.6745 / np.sqrt(len(values))
+    return Measured.normal(middle, spread + 1e-4 * middle, len(values))
+
+
+def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Measured, noise: ExcursionNoise) -> Measured:
+    """Tilt error while coasting: the size of the displacements, beyond that of noise."""
+    if not coast_s.is_measured:
+        return Measured.missing(coast_s.reason)
+    tilts, deviation = [], 0.0
+    for one in found:
+        others = one.echoes.mask(len(one.series))
+        for event in one.excursions:
+            rows = slice(
+                max(int((event.begin_s - 0.3) * one.series.rate_hz), 0),
+                max(int((event.begin_s + event.stay_s + 0.6) * one.series.rate_hz), 0),
+            )
+            others[rows] = True
+        fitted = noise.white_m, noise.drift_m, noise.correlation_s
+        own, deviation = leaked_tilt_rad(one.series, one.gaps.begin, coast_s.value, others, fitted)
+        tilts.append(own)
+    return fit_length(np.linalg.norm(np.concatenate(tilts), axis=1), deviation)
+
+
+def _fit_excursions(
+    found: Sequence[SeriesEpisodes], searches: Sequence[ExcursionSearch], noise: ExcursionNoise
+) -> tuple[dict[str, Measured], dict[str, Measured]]:
+    alone = [event for one in found for event in _isolated(one.excursions)]
+    sizes_m, stays_s = np.array([event.size_m for event in alone]), np.array([event.stay_s for event in alone])
+    errors_m = np.array([event.size_m / np.sqrt(event.score) for event in alone])
+    smallest, largest, mean_m = fit_uniform(sizes_m, float(np.median(errors_m)) if len(alone) else 0.0, strays=_STRAYS)
+    shortest, longest, mean_s = fit_uniform(stays_s, _STAY_ERROR_S, strays=_STRAYS)
+    ends_m = (smallest.value, largest.value) if smallest.is_measured else (0.005, 0.03)
+    ends_s = (shortest.value, longest.value) if shortest.is_measured else (1.0, 5.0)
+    parameters = {
+        "components.excursion.onsets_per_min": _fit_rate(found, searches, noise, ends_m, ends_s),
+        "components.excursion.size_m.0": smallest,
+        "components.excursion.size_m.1": largest,
+        "components.excursion.stay_s.0": shortest,
+        "components.excursion.stay_s.1": longest,
+    }
+    return parameters, {"components.excursion.size_m": mean_m, "components.excursion.stay_s": mean_s}
+
+
+def _isolated(events: Sequence[ExcursionEvent]) -> list[ExcursionEvent]:
+    """Whole excursions without another one near."""
+    out = []
+    for event in events:
+        end_s = event.begin_s + event.stay_s
+        near = any(
+            other is not event
+            and other.begin_s < end_s + _APART_S
+            and other.begin_s + other.stay_s > event.begin_s - _APART_S
+            for other in events
+        )
+        if event.is_whole and not near:
+            out.append(event)
+    return out
+
+
+def _fit_rate(
+    found: Sequence[SeriesEpisodes],
+    searches: Sequence[ExcursionSearch],
+    noise: ExcursionNoise,
+    ends_m: tuple[float, float],
+    ends_s: tuple[float, float],
+) -> Measured:
+    """Onsets per minute of a station, corrected by injection and recovery."""
+    minutes = sum(one.series.duration_s for one in found) / 60.0
+    detected = sum(len(_counted(one.excursions)) for one in found)
+    if not detected:
+        return Measured(0.0, 0.0, 3.0 / minutes, 0)
+    recovery, spread = 1.0, 1.0 / np.sqrt(detected)
+    rate_per_min = detected / minutes
+    for _ in range(2):
+        recovery, relative, dispersion = _recover(found, searches, noise, rate_per_min, ends_m, ends_s)
+        rate_per_min = detected / minutes / recovery
+        spread = float(np.sqrt(dispersion / detected + relative**2))
+    low, high = (rate_per_min * float(np.exp(sign * NORMAL_QUANTILE * spread)) for sign in (-1.0, 1.0))
+    return Measured(rate_per_min, low, high, detected)
+
+
+def _counted(events: Sequence[ExcursionEvent]) -> list[ExcursionEvent]:
+    """Excursions that begin within the series."""
+    return [event for event in events if event.begin_s > 0.3]
+
+
+def _recover(
+    found: Sequence[SeriesEpisodes],
+    searches: Sequence[ExcursionSearch],
+    noise: ExcursionNoise,
+    rate_per_min: float,
+    ends_m: tuple[float, float],
+    ends_s: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Detected over injected excursions, the relative error of that ratio, and the dispersion of counts.
+
+    The dispersion is the variance of a count over its mean: 1 for a Poisson process that is counted without confusion.
+    """
+    injected: list[int] = []
+    recovered: list[int] = []
+    rounds = 0
+    while rounds < 2 or (rounds < _MOST_ROUNDS and sum(injected) < _INJECTED):
+        for number, (one, search) in enumerate(zip(found, searches, strict=True)):
+            rng = generator(0, "injected excursions", rounds, number)
+            detector = ExcursionDetector(one.series.rate_hz, noise)
+            displacement_m, onsets = _draw_displacement(rng, one.series, rate_per_min, ends_m, ends_s)
+            added = detector.innovations_of(displacement_m, search.residual.valid)
+            again = detector.search(Innovations(search.residual.values + added, search.residual.valid), "")
+            injected.append(onsets)
+            recovered.append(len(_counted(again.events)))
+        rounds += 1
+    given, seen = np.array(injected, float), np.array(recovered, float)
+    if not seen.sum():
+        return 1.0, 1.0, 1.0
+    ratio = float(seen.sum() / given.sum())
+    count = len(given)
+    relative = float(np.sqrt(np.sum((seen - ratio * given) ** 2) * count / max(count - 1, 1)) / seen.sum())
+    extra = float(np.sum((seen - ratio * given) ** 2) / max(seen.sum(), 1.0))
+    return ratio, relative, ratio + extra
+
+
+def _draw_displacement(
+    rng: np.random.Generator,
+    series: StaticSeries,
+    rate_per_min: float,
+    ends_m: tuple[float, float],
+    ends_s: tuple[float, float],
+) -> tuple[Floats, int]:
+    """Displacement (N, 3) of excursions of this rate, size and duration, and the number of those that begin in it."""
+    duration_s = series.duration_s
+    onsets_s = []
+    begin_s = -ends_s[1]
+    while (begin_s := begin_s + rng.exponential(60.0 / rate_per_min)) < duration_s:
+        onsets_s.append(begin_s)
+    time_s = np.arange(len(series)) / series.rate_hz
+    out = np.zeros((len(series), 3))
+    for begin_s in onsets_s:
+        stay_s, size_m, direction = rng.uniform(*ends_s), rng.uniform(*ends_m), rng.normal(size=3)
+        since_s = time_s - begin_s
+        share = np.clip(np.minimum(since_s, stay_s + DEFAULT_RAMP_S - since_s) / DEFAULT_RAMP_S, 0.0, 1.0)
+        out += share[:, None] * (size_m * direction / np.linalg.norm(direction))
+    size_m = np.linalg.norm(out, axis=1, keepdims=True)
+    largest_m = max(ends_m[1], 1e-9)
+    return out * (largest_m / np.maximum(size_m, largest_m)), sum(begin_s > 0.3 for begin_s in onsets_s)
+
+
+def _station_rate(own: Sequence[SeriesEpisodes], rate: Measured, found: Sequence[SeriesEpisodes]) -> Measured:
+    """Rate of one station: its count, with the correction of all stations and the interval of its count."""
+    from scipy import special
+
+    minutes = sum(one.series.duration_s for one in own) / 60.0
+    detected = sum(len(_counted(one.excursions)) for one in own)
+    everyone = sum(len(_counted(one.excursions)) for one in found)
+    total = sum(one.series.duration_s for one in found) / 60.0
+    correction = rate.value * total / everyone if everyone else 1.0
+    low = float(special.gammaincinv(detected, 0.025)) if detected else 0.0
+    high = float(special.gammaincinv(detected + 1, 0.975))
+    factor = correction / minutes
+    return Measured(factor * detected, factor * low, factor * high, detected)

@@ -1,0 +1,264 @@
+"""Profile of a unit: what a capture shows without a reference, each number with its interval.
+
+Stations at rest show noise, drift, excursions, echoes and losses; every part of a capture shows the timing of the line;
+two stations on one bar show errors in motion. Errors at rest are differences from the station's median pose, so that
+constant errors do not show.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.progress import ProgressCallback
+from harness.errors import BadFile, BadInput
+from harness.measure.episode_fit import EpisodeFit, find_episodes, fit_episodes
+from harness.measure.excursions import ExcursionNoise
+from harness.measure.gauss_markov import NoiseFit, fit_noise, start_values
+from harness.measure.measured import Measured
+from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
+from harness.measure.static_series import StaticSeries, find_rest, static_series
+from harness.measure.timing import TimingAccumulator, TimingMeasurement
+from harness.stream.recording.station_readings import CaptureBlock, CaptureReader, StationReadings
+
+STATIC_CORRELATIONS = 10.0
+"""Least length of a rest, in correlation times of the drift."""
+REST_STRETCHES = ("", "static")
+"""Stretches in which rates of errors are measured; a station that is covered on purpose is left out."""
+MOST_REST_SAMPLES = 2_000_000
+"""Samples at rest that are analysed: 46 minutes of six stations at 120 Hz. It bounds the memory."""
+QUALITY_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Edges of the classes of quality."""
+_CAPTURE = "a capture with stations at rest"
+
+
+@dataclass(frozen=True)
+class StretchLength:
+    """A part of a capture."""
+
+    name: str
+    """Name of its mark; "" without one."""
+    duration_s: float
+    records: int
+
+
+@dataclass(frozen=True)
+class QualityError:
+    """Errors at rest of the readings in one class of quality."""
+
+    above: float
+    to: float
+    """Ends of the class; the upper one belongs to it."""
+    share: float
+    """Share of all readings."""
+    median_m: float
+    quantile95_m: float
+    """Median and 95 % quantile of the distance from the resting place [m]; NaN without a reading."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitProfile:
+    """What a capture shows of a unit."""
+
+    stations: tuple[str, ...]
+    rate_hz: float
+    """Nominal rate of each station [Hz]."""
+    items: tuple[int, ...]
+    """Output list of the stations."""
+    note: Mapping[str, Any]
+    stretches: tuple[StretchLength, ...]
+    damage: tuple[str, ...]
+    garbage_bytes: int
+    timing: TimingMeasurement
+    noise: NoiseFit
+    episodes: EpisodeFit
+    quality: tuple[QualityError, ...]
+    rigid: RigidPair | None
+    limits: tuple[str, ...]
+    """What this capture cannot show, a sentence each."""
+
+    @property
+    def rest(self) -> tuple[StaticSeries, ...]:
+        """The stations at rest that were analysed."""
+        return tuple(one.series for one in self.episodes.found)
+
+    @property
+    def parameters(self) -> dict[str, Measured]:
+        """Dotted key of a scenario -> number."""
+        speed = self.rigid.ahead_s if self.rigid else Measured.missing("Two stations on a bar show it: --rigid A,B.")
+        return {
+            **self.noise.all_stations,
+            **self.episodes.parameters,
+            "components.clock.drift_ppm": self.timing.all_stations["components.clock.drift_ppm"],
+            "components.speed.ahead_s": speed,
+        }
+
+
+def measure_profile(
+    path: Path,
+    *,
+    rigid: tuple[str, str] | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> UnitProfile:
+    """Measure a unit from a capture.
+
+    BadFile for a file that is no recording, and for one without a rest of at least ten correlation times. BadInput for
+    a station of `rigid` that is not in it.
+    """
+    reader = CaptureReader(path)
+    _check_pair(rigid, reader.wire.stations)
+    collected = _Collected(reader, rigid)
+    for number, block in enumerate(reader.blocks()):
+        progress("reading", number, number + 1)
+        collected.add(block)
+    if not collected.rest:
+        advice = "Let all stations lie still for a minute or more, in sight of the emitters."
+        raise BadFile(path, "no stretch in which a station rests", _CAPTURE, advice)
+    progress("finding episodes", 0, 3)
+    noise, episodes = _fit(collected.rest, progress)
+    correlation = noise.all_stations["components.drift.correlation_s"]
+    longest_s = max(one.duration_s for one in collected.rest)
+    if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
+        found = f"a rest of {longest_s:.3g} s, with errors that are correlated over {correlation.value:.3g} s"
+        expected = f"a rest of {STATIC_CORRELATIONS * correlation.value:.3g} s or more"
+        raise BadFile(path, found, expected, "Let the stations lie still for longer.")
+    return UnitProfile(
+        reader.wire.stations,
+        reader.wire.rate_hz,
+        reader.wire.items,
+        reader.note,
+        collected.stretches(),
+        tuple(reader.damage),
+        collected.garbage_bytes,
+        collected.timing.measure(),
+        noise,
+        episodes,
+        _quality_errors(collected.rest + collected.covered),
+        collected.rigid_pair(),
+        collected.limits(),
+    )
+
+
+def _check_pair(rigid: tuple[str, str] | None, stations: tuple[str, ...]) -> None:
+    for name in rigid or ():
+        if name not in stations:
+            raise BadInput(f"No station {name!r} in the capture.", f"It has {', '.join(stations)}.")
+    if rigid and rigid[0] == rigid[1]:
+        raise BadInput(f"--rigid names {rigid[0]} twice.", "Name the two stations on the bar.")
+
+
+class _Collected:
+    """What is kept of the blocks of a capture while it is read."""
+
+    def __init__(self, reader: CaptureReader, rigid: tuple[str, str] | None) -> None:
+        self._rate_hz, self._rigid = reader.wire.rate_hz, rigid
+        self.timing = TimingAccumulator(self._rate_hz)
+        self.rest: list[StaticSeries] = []
+        self.covered: list[StaticSeries] = []
+        self.garbage_bytes = 0
+        self._samples = 0
+        self._left_out_s = 0.0
+        self._moved = 0
+        self._stretches: dict[str, list[float]] = {}
+        self._motion: list[tuple[StationReadings, StationReadings]] = []
+
+    def add(self, block: CaptureBlock) -> None:
+        self.timing.add(block)
+        self.garbage_bytes += block.garbage_bytes
+        length = self._stretches.setdefault(block.stretch, [0.0, 0.0])
+        times_s = [readings.received_s for readings in block.stations.values() if len(readings)]
+        if times_s:
+            length[0] += max(float(t[-1]) for t in times_s) - min(float(t[0]) for t in times_s)
+        length[1] += block.records
+        if not block.stations:
+            return
+        kept = self.rest if block.stretch in REST_STRETCHES else self.covered if block.stretch == "covered" else None
+        for station, readings in block.stations.items():
+            for rest in find_rest(readings, self._rate_hz).tolist() if kept is not None else ():
+                self._keep(kept, static_series(readings, (rest[0], rest[1]), self._rate_hz, station))
+        if self._rigid and block.stretch not in ("static", "covered") and self._moved < MOST_REST_SAMPLES:
+            self._moved += block.records
+            self._motion.append((block.stations[self._rigid[0]], block.stations[self._rigid[1]]))
+
+    def _keep(self, kept: list[StaticSeries] | None, series: StaticSeries) -> None:
+        if kept is None or series.valid.sum() < 2.0 * self._rate_hz:
+            return
+        if self._samples + len(series) > MOST_REST_SAMPLES:
+            self._left_out_s += series.duration_s
+            return
+        self._samples += len(series)
+        kept.append(series)
+
+    def stretches(self) -> tuple[StretchLength, ...]:
+        return tuple(StretchLength(name, one[0], int(one[1])) for name, one in self._stretches.items())
+
+    def rigid_pair(self) -> RigidPair | None:
+        if self._rigid is None:
+            return None
+        columns = []
+        for number in (0, 1):
+            readings = [pair[number] for pair in self._motion]
+            names = ("measured_s", "position_m", "tracker_from_station", "suspect")
+            time_s, place, turn, suspect = (
+                np.concatenate([getattr(one, name) for one in readings]) if readings else np.zeros(0) for name in names
+            )
+            sound = np.isfinite(time_s)
+            if readings:
+                sound &= np.isfinite(place[:, 0]) & np.isfinite(turn[:, 0]) & ~suspect.astype(bool)
+                sound &= np.diff(time_s, prepend=-np.inf) > 0.0
+            columns.append((time_s[sound], place[sound], turn[sound]))
+        first, second = columns
+        return measure_rigid_pair(self._rigid, (first[0], second[0]), (first[1], second[1]), (first[2], second[2]))
+
+    def limits(self) -> tuple[str, ...]:
+        if not self._left_out_s:
+            return ()
+        return (
+            f"Errors at rest are those of the first {self._samples:,} samples; {self._left_out_s / 60.0:.0f} station "
+            "minutes after them show the timing only.",
+        )
+
+
+def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes, in turn: each is found better once the other is known."""
+    nothing: list[Bools] = [np.zeros(len(one), bool) for one in rest]
+    start = np.exp(start_values(rest, nothing))
+    found, _ = find_episodes(rest, ExcursionNoise(float(start[0]), float(start[1]), float(start[5])))
+    progress("fitting the noise", 1, 3)
+    noise = fit_noise(rest, [one.disturbed for one in found], by_station=False)
+    progress("fitting the episodes", 2, 3)
+    episodes = fit_episodes(rest, _excursion_noise(noise, start))
+    final = fit_noise(rest, [one.disturbed for one in episodes.found])
+    progress("", 3, 3)
+    return final, episodes
+
+
+def _excursion_noise(noise: NoiseFit, start: Floats) -> ExcursionNoise:
+    """The fitted noise of the position; rough values stand in for what the fit could not tell."""
+    keys = ("components.white.position_m", "components.drift.position_m", "components.drift.correlation_s")
+    fitted = [noise.all_stations[key] for key in keys]
+    rough = (start[0], start[1], start[5])
+    return ExcursionNoise(
+        *(one.value if one.is_measured else float(value) for one, value in zip(fitted, rough, strict=True))
+    )
+
+
+def _quality_errors(series: list[StaticSeries]) -> tuple[QualityError, ...]:
+    """Distance from the resting place, by classes of quality; the first class holds the lost readings."""
+    quality = np.concatenate([one.quality for one in series])
+    away_m = np.concatenate([np.linalg.norm(one.position_m, axis=1) for one in series])
+    came = np.isfinite(quality)
+    total = max(int(came.sum()), 1)
+    classes = [(0.0, 0.0, came & (quality == 0.0))]
+    for above, to in pairwise(QUALITY_EDGES):
+        classes.append((above, to, came & (quality > above) & (quality <= to)))
+    out = []
+    for above, to, inside in classes:
+        known = away_m[inside & np.isfinite(away_m)]
+        middle, high = np.quantile(known, [0.5, 0.95]).tolist() if len(known) else (np.nan, np.nan)
+        out.append(QualityError(above, to, float(inside.sum()) / total, middle, high))
+    return tuple(out)

@@ -1,0 +1,149 @@
+"""Characterisation of a unit: its profile as a unit file, and its departures from what is expected."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.progress import ProgressCallback
+from harness.measure.measured import Measured
+from harness.measure.profile import UnitProfile, measure_profile
+from harness.measure.recording_time import events_for_precision
+from harness.measure.unit_file import UnitFile
+from harness.results.digests import file_digest
+from harness.stream.recording.recording import EXPECTED_FILE
+from harness.study.trust.expected_values import (
+    UNIFORM_KEYS,
+    flatten_components,
+    nest_components,
+    preset_components,
+    preset_values,
+    unit_values,
+)
+from harness.study.trust.named_departures import NamedDeparture, check_departures
+
+REFERENCE_NEEDED = "A reference is needed: `harness validate`."
+DEFAULT_KEPT = {
+    "components.session.scale": REFERENCE_NEEDED,
+    "components.session.station_offset_m": REFERENCE_NEEDED,
+    "components.excursion.ramp_s": "Excursions do not show it well enough.",
+    "components.clock.offset_s": "The driver sets the clock to zero.",
+}
+"""Keys that no capture shows -> why they keep the default."""
+CHECKED_TIMING = ("timing.lost_share", "timing.duplicate_share", "timing.stamp_resolution_s", "timing.clock_age_s")
+STATION_CHECKS = ("components.dropout.share", "components.echo.share", "components.white.position_m")
+"""Parameters that are also checked for each station."""
+PRECISION = 0.2
+"""Relative half width of the interval of a rate that is aimed at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Characterization:
+    """What was found out about a unit."""
+
+    profile: UnitProfile
+    unit: UnitFile
+    checks: tuple[NamedDeparture, ...]
+    expected_from: str
+    """Origin of the expected numbers: the preset, or the name of an earlier unit."""
+
+    @property
+    def named(self) -> tuple[NamedDeparture, ...]:
+        """The departures that are significant after the correction."""
+        return tuple(check for check in self.checks if check.is_named)
+
+    @property
+    def needed_minutes(self) -> float:
+        """Minutes of rest after which the rate of excursions has the precision; NaN without any excursion."""
+        rate = self.profile.parameters["components.excursion.onsets_per_min"]
+        if not rate.is_measured or not rate.value > 0.0:
+            return math.nan
+        return events_for_precision(PRECISION) / (rate.value * len(self.profile.stations))
+
+
+def characterize_capture(
+    path: Path,
+    *,
+    name: str = "",
+    expected: UnitFile | None = None,
+    rigid: tuple[str, str] | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> Characterization:
+    """Measure a unit from a capture, and compare it with the preset `default` or with an earlier unit file.
+
+    `name` is that of the unit; by default the capture's. BadFile and BadInput as `measure.profile.measure_profile`.
+    """
+    profile = measure_profile(path, rigid=rigid, progress=progress)
+    unit = make_unit_file(profile, name or path.stem, path)
+    known = preset_values() if expected is None else unit_values(expected)
+    checks = check_departures(measured_numbers(profile), expected_numbers(profile, known))
+    return Characterization(profile, unit, tuple(checks), expected.name if expected else "the preset default")
+
+
+def make_unit_file(profile: UnitProfile, name: str, path: Path) -> UnitFile:
+    """The unit file of a profile: measured values in their places, the preset's where nothing was measured."""
+    components = preset_components()
+    defaults = dict(flatten_components(components))
+    measured = {key: number for key, number in profile.parameters.items() if key in defaults}
+    values = {key: number.value for key, number in measured.items() if number.is_measured}
+    reasons = {key: number.reason for key, number in measured.items() if not number.is_measured}
+    return UnitFile(
+        name,
+        nest_components(_in_order(values), components),
+        {"rate_hz": profile.rate_hz, "items": list(profile.items)},
+        {key: number for key, number in {**measured, **_means(profile)}.items() if number.is_measured},
+        {**reasons, **{key: reason for key, reason in DEFAULT_KEPT.items() if key in defaults}},
+        capture=_describe_capture(profile, path),
+    )
+
+
+def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Measured]:
+    """Everything that is checked: (key, station) -> number; of a uniform distribution its mean, not its ends."""
+    parameters = {key: one for key, one in profile.parameters.items() if not key[-1].isdecimal()}
+    numbers = {(key, ""): one for key, one in {**parameters, **_means(profile)}.items()}
+    numbers |= {(key, ""): profile.timing.all_stations[key] for key in CHECKED_TIMING}
+    for station in profile.stations:
+        own = {**profile.noise.by_station.get(station, {}), **profile.episodes.by_station.get(station, {})}
+        numbers |= {(key, station): own[key] for key in STATION_CHECKS if key in own}
+    return numbers
+
+
+def expected_numbers(profile: UnitProfile, known: Mapping[str, Measured]) -> dict[tuple[str, str], Measured]:
+    """What is expected of the measured numbers: the known ones, and of the line that no record is lost or repeated."""
+    line = dict.fromkeys(("timing.lost_share", "timing.duplicate_share", "timing.clock_age_s"), 0.0)
+    resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
+    if resolution.value > 2.0 * profile.timing.expected_resolution_s:  # else it is as fine as the format allows
+        line["timing.stamp_resolution_s"] = profile.timing.expected_resolution_s
+    return {(key, ""): one for key, one in {**known, **{key: _exact(value) for key, value in line.items()}}.items()}
+
+
+def _means(profile: UnitProfile) -> dict[str, Measured]:
+    return {key: profile.episodes.means[key] for key in UNIFORM_KEYS if key in profile.episodes.means}
+
+
+def _in_order(values: Mapping[str, float]) -> dict[str, float]:
+    """The values; the ends of a distribution in rising order, and not below zero."""
+    out = dict(values)
+    for key in UNIFORM_KEYS:
+        ends = [f"{key}.{i}" for i in (0, 1) if f"{key}.{i}" in out]
+        out |= dict(zip(ends, sorted(max(out[end], 0.0) for end in ends), strict=True))
+    return out
+
+
+def _describe_capture(profile: UnitProfile, path: Path) -> dict[str, Any]:
+    stretches = {one.name or "unmarked": round(one.duration_s, 3) for one in profile.stretches}
+    return {
+        "file": path.name,
+        "digest": file_digest(path, EXPECTED_FILE, ""),
+        "stations": list(profile.stations),
+        "seconds": stretches,
+        "rest_s": round(float(np.sum([one.duration_s for one in profile.rest])), 3),
+        "damage": list(profile.damage),
+    }
+
+
+def _exact(value: float) -> Measured:
+    return Measured(value, value, value)

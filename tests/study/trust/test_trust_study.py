@@ -1,0 +1,261 @@
+"""A whole trust study on short clips: its findings, each outcome, and going on after a stop."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.errors import BadInput, Outcome, UnknownName
+from harness.experiment.remote_method import run_over_frames
+from harness.measure.unit_file import UnitFile, write_unit_file
+from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
+from harness.study.trust import capture_cells
+from harness.study.trust.capture_cells import Arm
+from harness.study.trust.expected_values import preset_components
+from harness.study.trust.trust_study import (
+    FINDINGS_FILE,
+    OtherPlan,
+    comparable_pairs,
+    judge_outcome,
+    run_trust_study,
+)
+from tests.study.trust.conftest import CLIPS, SmallStudy
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def finished(small_study: SmallStudy, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a finished study."""
+    out = tmp_path_factory.mktemp("finished") / "out"
+    run_trust_study(small_study.plan, small_study.captures, out)
+    return out
+
+
+def read_findings(out: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((out / FINDINGS_FILE).read_text(encoding="utf-8"))
+    return content
+
+
+def test_the_same_profile_on_both_sides_passes(finished: Path) -> None:
+    found = read_findings(finished)
+    assert found["outcome"] == "pass", found["why"]
+    assert len(list((finished / "cells").iterdir())) == len(CLIPS) * 6 * 3
+    assert [line["verdict"] for line in found["equivalences"]] == ["equivalent"] * 12
+    assert all(line["clips"] == len(CLIPS) for line in found["equivalences"])
+    assert {pair["verdict"] for pair in found["pairs"]} >= {"agree"}
+    assert not any(pair["verdict"] == "contradict" for pair in found["pairs"])
+    assert len(found["pairs"]) == 9
+    assert [capture["clip"] for capture in found["captures"]] == list(CLIPS)
+    assert found["rank_correlations"][1]["value"] > 0.9
+
+
+def test_errors_differ_between_device_and_simulation_though_the_seed_is_the_same(finished: Path) -> None:
+    """The captures were simulated with seed 1, which is a seed of the plan too."""
+    lines = [line for line in read_findings(finished)["equivalences"] if not line["arm"].startswith("mean_pose")]
+    assert all(line["difference"] != 0.0 for line in lines)
+    one = {(pair["a"], pair["b"]): pair for pair in read_findings(finished)["pairs"]}[
+        "mean_pose, all", "best_match, all"
+    ]
+    assert one["simulated"]["low"] < one["simulated"]["high"]
+
+
+def test_readings_and_health_of_both_sides_are_alike(finished: Path) -> None:
+    found = read_findings(finished)
+    assert len(found["distances"]) == 12
+    for row in found["distances"]:
+        assert row["p_holm"] > 0.01, row
+        assert min(row["blocks"]) >= 4
+        assert row["distance"] < 3.0 * row["split_half"]
+    for row in found["health"]:
+        for side in (row["device"], row["simulated"]):
+            assert side["rate_hz"] == pytest.approx(40.0, rel=0.01)
+            assert side["quality"] > 0.8
+            assert side["lost_share"] < 0.2
+
+
+def test_finished_cells_are_read_and_the_findings_have_the_same_bytes(
+    finished: Path, small_study: SmallStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / FINDINGS_FILE).unlink()
+    cells = sorted((out / "cells").iterdir())
+    for cell in cells[::5]:
+        cell.unlink()
+    ran: list[Any] = []
+
+    def count_runs(fitted: Any, calibration: Any, frames: Any) -> Any:
+        ran.append(calibration)
+        return run_over_frames(fitted, calibration, frames)
+
+    monkeypatch.setattr(capture_cells, "run_over_frames", count_runs)
+    run_trust_study(small_study.plan, small_study.captures, out)
+    assert len(ran) == len(cells[::5])
+    assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
+    assert {cell.name: cell.read_bytes() for cell in (out / "cells").iterdir()} == {
+        cell.name: cell.read_bytes() for cell in (finished / "cells").iterdir()
+    }
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_goes_on_to_the_same_bytes(
+    finished: Path, small_study: SmallStudy, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "harness", "trust", str(small_study.plan), *map(str, small_study.captures)]
+    killed = 0
+    for wanted in range(5, 105, 10):
+        process = subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and len(list(out.glob("cells/*.json"))) < wanted:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+        killed += process.wait() == -signal.SIGKILL
+    assert killed == 10
+    assert subprocess.run([*command, "--out", str(out)], check=False, capture_output=True).returncode == 0
+    assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
+
+
+def test_a_damaged_cell_has_no_result(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    cell = min((out / "cells").iterdir())
+    cell.write_bytes(cell.read_bytes().replace(b'"joint_angle_mean_deg": ', b'"joint_angle_mean_deg": 1'))
+    found = run_trust_study(small_study.plan, small_study.captures, out).findings
+    assert found.outcome is Outcome.INCOMPLETE
+    assert [cell.name in why and "digest" in why for why in found.failures.values()] == [True]
+
+
+def test_a_changed_plan_is_not_comparable_unless_exploratory(small_study: SmallStudy, tmp_path: Path) -> None:
+    changed = small_study.another_plan("changed.toml", "200.0", "199.0")
+    with pytest.raises(OtherPlan, match="another plan") as caught:
+        run_trust_study(changed, small_study.captures, tmp_path / "refused")
+    assert caught.value.outcome is Outcome.NOT_COMPARABLE
+    assert not (tmp_path / "refused").exists()
+    found = run_trust_study(changed, small_study.captures[:1], tmp_path / "out", exploratory=True).findings
+    assert found.exploratory
+    assert (found.outcome, found.equivalences[0].why) == (Outcome.NOT_COMPARABLE, "too few clips: 1, of at least 6")
+
+
+def test_the_plan_of_the_captures_is_not_exploratory(small_study: SmallStudy, tmp_path: Path) -> None:
+    found = run_trust_study(small_study.plan, small_study.captures[:1], tmp_path / "out", exploratory=True).findings
+    assert not found.exploratory
+
+
+def test_a_unit_that_is_worse_than_the_device_is_beyond_the_margin(small_study: SmallStudy, tmp_path: Path) -> None:
+    components = preset_components()
+    components["white"] = {**components["white"], "orientation_rad": 0.2}
+    write_unit_file(small_study.plan.with_name("noisy.toml"), UnitFile("noisy", components, {}))
+    plan = small_study.another_plan("noisy_plan.toml", "seeds = [1, 2]", 'seeds = [1]\nunit = "noisy.toml"')
+    plan.write_text(plan.read_text().replace("20.0", "0.5").replace('"mean_pose", "best_match", ', ""))
+    found = run_trust_study(plan, small_study.captures, tmp_path / "out", exploratory=True).findings
+    assert found.outcome is Outcome.REGRESSED, found.why
+    lines = {(line.arm, line.metric): line for line in found.equivalences}
+    worse = lines["ik:previous, all", "joint_angle_mean_deg"]
+    assert worse.verdict == "beyond the margin"
+    assert worse.difference is not None
+    assert worse.difference > 0.5
+    assert found.unit_digest
+    turned = [row.p_holm for row in found.distances if row.feature == "orientation error"]
+    assert all(p is not None and p < 0.1 for p in turned)
+
+
+def test_a_method_that_fails_costs_its_cells(
+    small_study: SmallStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail_for_four(fitted: Any, calibration: Any, frames: Any) -> Any:
+        if len(calibration.stations) == 4:
+            raise ZeroDivisionError("the method divides by zero")
+        return run_over_frames(fitted, calibration, frames)
+
+    monkeypatch.setattr(capture_cells, "run_over_frames", fail_for_four)
+    found = run_trust_study(small_study.plan, small_study.captures, tmp_path / "out").findings
+    assert found.outcome is Outcome.INCOMPLETE
+    assert len(found.failures) == len(CLIPS) * 3 * 3
+    assert "divides by zero" in found.failures["best_match, four on golf_p1_01, seed 2"]
+    whole = {line.arm: line.verdict for line in found.equivalences}
+    assert whole["best_match, all"] == "equivalent"
+    assert whole["best_match, four"] == "cannot tell"
+
+
+@pytest.mark.parametrize(
+    ("captures", "clips", "error", "words"),
+    [
+        ([], [], BadInput, "captures"),
+        ([0, 0], [], BadInput, "twice"),
+        ([0, 1], ["walking_p1_01"], BadInput, "1 clips for 2 captures"),
+        ([0], ["boxing_p1_01"], BadInput, "another motion"),
+        ([0], ["nothing"], UnknownName, "nothing"),
+    ],
+)
+def test_captures_that_are_refused(
+    small_study: SmallStudy, tmp_path: Path, captures: list[int], clips: list[str], error: type, words: str
+) -> None:
+    given = [small_study.captures[k] for k in captures]
+    with pytest.raises(error, match=words):
+        run_trust_study(small_study.plan, given, tmp_path / "out", clips=clips)
+
+
+def test_a_folder_of_another_study_is_refused(finished: Path, small_study: SmallStudy) -> None:
+    with pytest.raises(BadInput, match="another study"):
+        run_trust_study(small_study.plan, small_study.captures[:3], finished)
+
+
+def test_parameters_are_arms_of_their_own(small_study: SmallStudy, tmp_path: Path) -> None:
+    plan = small_study.another_plan(
+        "varied.toml", "[stations]", '[parameters]\n"motion.thin_to" = [5, 200]\n[stations]'
+    )
+    found = run_trust_study(plan, small_study.captures[:1], tmp_path / "out", exploratory=True).findings
+    assert len(found.arms) == 12
+    lines = {line.arm: line.device for line in found.equivalences if line.metric == "joint_angle_mean_deg"}
+    assert lines["best_match, all, thin_to = 5"] != lines["best_match, all, thin_to = 200"]
+    assert lines["ik:previous, all, thin_to = 5"] == lines["ik:previous, all, thin_to = 200"]
+    assert ("best_match, all, thin_to = 5", "best_match, all, thin_to = 200") in {(p.a, p.b) for p in found.pairs}
+    assert ("mean_pose, all, thin_to = 5", "best_match, all, thin_to = 200") not in {(p.a, p.b) for p in found.pairs}
+
+
+def test_pairs_differ_in_one_thing() -> None:
+    arms = [Arm("a", "x", ("1",)), Arm("b", "x", ("1",)), Arm("a", "y", ("2",)), Arm("b", "y", ("2",))]
+    assert comparable_pairs(arms) == [("a, x", "b, x"), ("a, x", "a, y"), ("b, x", "b, y"), ("a, y", "b, y")]
+
+
+EQUIVALENT = Equivalence("ik", "mpjpe_mm", 1.0, 9, 1.0, 1.0, 0.0, -0.1, 0.1, "equivalent", "within")
+SIDE = SideDifference(1.0, 0.5, 1.5, 0.001)
+AGREE = PairAgreement("a", "b", 9, SIDE, SIDE, 0.001, 0.001, "agree", "same order")
+UNTOLD, UNTOLD_PAIR = replace(EQUIVALENT, verdict="cannot tell"), replace(AGREE, verdict="cannot tell")
+
+
+@pytest.mark.parametrize(
+    ("equivalences", "pairs", "failures", "outcome"),
+    [
+        ([EQUIVALENT], [AGREE, UNTOLD_PAIR], {}, Outcome.PASS),
+        ([EQUIVALENT], [], {}, Outcome.PASS),
+        ([EQUIVALENT], [UNTOLD_PAIR], {}, Outcome.NOT_COMPARABLE),
+        ([EQUIVALENT, UNTOLD], [AGREE], {}, Outcome.NOT_COMPARABLE),
+        ([EQUIVALENT], [AGREE], {"cell": "why"}, Outcome.INCOMPLETE),
+        ([EQUIVALENT], [AGREE, replace(AGREE, verdict="contradict")], {"cell": "why"}, Outcome.REGRESSED),
+        ([UNTOLD, replace(EQUIVALENT, verdict="beyond the margin")], [AGREE], {}, Outcome.REGRESSED),
+    ],
+)
+def test_each_outcome(
+    equivalences: list[Equivalence], pairs: list[PairAgreement], failures: dict[str, str], outcome: Outcome
+) -> None:
+    found, why = judge_outcome(equivalences, pairs, failures)
+    assert found is outcome
+    assert why.endswith(".")
+
+
+def test_methods_take_most_of_the_time(small_study: SmallStudy, tmp_path: Path) -> None:
+    """The methods' own time is counted; `harness bench lab` measures the ratio with longer clips."""
+    start = time.perf_counter()
+    study = run_trust_study(small_study.plan, small_study.captures[:1], tmp_path / "out")
+    assert 0.0 < study.methods_s < time.perf_counter() - start
+    assert np.isfinite(study.methods_s)
