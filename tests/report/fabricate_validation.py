@@ -34,13 +34,13 @@ def made_up_validation() -> ValidationReport:
         expected_frames=2400,
         expected_from="the preset default",
         numbers=(
-            RegistrationNumber("registration.offset_orientation_s", Measured(0.0240, 0.0236, 0.0244, 300)),
-            RegistrationNumber("registration.offset_position_s", Measured(0.0220, 0.0215, 0.0225, 300)),
-            RegistrationNumber("registration.offset_difference_s", Measured(0.0020, 0.0014, 0.0026, 300)),
-            RegistrationNumber("components.clock.drift_ppm", Measured(21.0, 14.0, 28.0, 300)),
-            RegistrationNumber("registration.scale", Measured(0.0009, -0.0001, 0.0019, 300)),
+            RegistrationNumber("time_offset_orientation_s", Measured(0.0240, 0.0236, 0.0244, 300)),
+            RegistrationNumber("time_offset_position_s", Measured(0.0220, 0.0215, 0.0225, 300)),
+            RegistrationNumber("position_ahead_s", Measured(0.0020, 0.0014, 0.0026, 300)),
+            RegistrationNumber("clock_ratio_ppm", Measured(21.0, 14.0, 28.0, 300)),
+            RegistrationNumber("scale", Measured(0.0009, -0.0001, 0.0019, 300)),
             *(
-                RegistrationNumber("registration.heading_rad", Measured(0.001 * n, 0.001 * n - 0.01, 0.02), station)
+                RegistrationNumber("heading_rad", Measured(0.001 * n, 0.001 * n - 0.01, 0.02), station)
                 for n, station in enumerate(STATIONS)
             ),
         ),
@@ -48,13 +48,13 @@ def made_up_validation() -> ValidationReport:
         accuracy=tuple(_accuracy(station, n) for n, station in enumerate(STATIONS)),
         checks=(
             DepartureCheck(
-                compare_with_expected("registration.latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9
+                compare_with_expected("latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9
             ),
             DepartureCheck(
-                compare_with_expected("registration.turn_rad", "head", Measured(0.052, 0.047, 0.057), exact(0.0)), 1e-6
+                compare_with_expected("mount_turn_rad", "head", Measured(0.052, 0.047, 0.057), exact(0.0)), 1e-6
             ),
             DepartureCheck(
-                compare_with_expected("registration.scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3
+                compare_with_expected("scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3
             ),
         ),
         residuals=tuple(_residuals(station, rng) for station in STATIONS),
@@ -78,7 +78,7 @@ def without_exchange() -> ValidationReport:
 def without_truth_of_time() -> ValidationReport:
     """A capture of which hardly anything could be told."""
     full = made_up_validation()
-    missing = RegistrationNumber("registration.offset_position_s", Measured.missing(NO_STAMPS))
+    missing = RegistrationNumber("time_offset_position_s", Measured.missing(NO_STAMPS))
     return replace(
         full, numbers=(missing,), poses=(), accuracy=(), checks=(), residuals=(), scores=(), exchanged=(),
         notes=(),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_OFFSETS = ("registration.offset_orientation_s", "registration.offset_position_s")
+_OFFSETS = ("time_offset_orientation_s", "time_offset_position_s")
 _ROW_IN, _FRAME_IN, _SERIES_IN = 0.34, 0.75, 0.95
 _MOST_POINTS = 1200
 """Points of one curve; more are averaged in pairs, fours and so on: the largest is drawn."""

@@ -34,7 +34,7 @@ class RegistrationNumber:
     """A number of the registration, such as a time offset."""
 
     key: str
-    """Name such as "registration.offset_orientation_s"."""
+    """Name such as "time_offset_orientation_s"."""
     measured: Measured
     station: str = ""
     """Station that it is of; "" is all together."""
