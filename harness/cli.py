@@ -13,6 +13,7 @@ from typing import Any
 from harness.commands.baseline import add_baseline
 from harness.commands.bench import add_bench
 from harness.commands.calibrate import add_calibrate
+from harness.commands.characterize import add_characterize
 from harness.commands.check import add_check
 from harness.commands.compare import add_compare
 from harness.commands.demo import add_demo
@@ -59,7 +60,7 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
         add_paper,
     ),
     "if you place sensors": (add_placement,),
-    "if you have a device": (add_emulate, add_record, add_replay, add_calibrate, add_live, add_trust),
+    "if you have a device": (add_emulate, add_record, add_replay, add_calibrate, add_live, add_characterize, add_trust),
 }
 
 

@@ -1,0 +1,117 @@
+"""The verb `characterize`: measure the errors, clock and line of a device without a reference."""
+
+import argparse
+from pathlib import Path
+
+from harness.commands.common import (
+    LINE_FLAGS,
+    Verbs,
+    add_line_flags,
+    add_verb,
+    positive_float,
+    print_result,
+    this_command,
+)
+from harness.core.progress import ProgressBar
+from harness.errors import BadInput, Outcome
+
+_DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 60.0, 60.0
+"""Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
+_PORT_FLAGS = ("stations", "rate", "minutes", "capture", "yes", *LINE_FLAGS)
+
+
+def add_characterize(verbs: Verbs) -> None:
+    text = "measure the errors, clock and line of a device at rest, and write them as a unit file for scenarios"
+    verb = add_verb(verbs, "characterize", text, run_characterize)
+    verb.add_argument("source", help="a recording, or a port as for `harness record`: a guided capture is then made")
+    verb.add_argument("--out", type=Path, metavar="FILE", help="unit file to write; the page is written beside it")
+    verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
+    verb.add_argument("--name", metavar="NAME", help="name of the unit in tables (default: that of the capture)")
+    text = "earlier unit file to compare with (default: the noise preset `default`)"
+    verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
+    text = "two stations on one bar: they show errors in motion without a reference"
+    verb.add_argument("--rigid", metavar="A,B", help=text)
+    text = f"port: minutes at rest (default {_DEFAULT_STATIC_MIN:g})"
+    verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
+    text = "port: the recording to write; it is continued if it exists (default: as --out, with the suffix .rec)"
+    verb.add_argument("--capture", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
+    verb.add_argument("--stations", metavar="A,B|A=3,B=1", help="port: names of the stations, as for `harness record`")
+    text = "port: frames per second, for a device that does not report its rate"
+    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
+    add_line_flags(verb)
+
+
+def run_characterize(args: argparse.Namespace) -> Outcome:
+    from harness.commands.characterized_unit import unit_report
+    from harness.core.output_file import require_writable
+    from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
+    from harness.report.lab.unit_page import write_unit_page
+    from harness.report.lab.unit_text import format_unit
+    from harness.study.trust.characterization import characterize_capture
+
+    if args.out is not None:
+        require_writable(args.out, UNIT_FILE, force=args.force)
+    expected = None if args.expect is None else read_unit_file(args.expect)
+    pair = _parse_pair(args.rigid)
+    capture = _capture_of(args)
+    with ProgressBar("parts") as progress:
+        found = characterize_capture(capture, name=args.name or "", expected=expected, rigid=pair, progress=progress)
+    report = unit_report(found, capture, this_command(), args.out)
+    lines = [format_unit(report)]
+    content = {
+        "unit": found.unit.name,
+        "parameters": {key: number.as_dict() for key, number in found.profile.parameters.items()},
+        "timing": {key: number.as_dict() for key, number in found.profile.timing.all_stations.items()},
+        "departures": [
+            {
+                "key": check.departure.key,
+                "station": check.departure.station,
+                "measured": check.departure.measured.as_dict(),
+                "expected": check.departure.expected.as_dict(),
+                "p": check.departure.p,
+                "p_holm": check.p_holm,
+            }
+            for check in found.named
+        ],
+        "damage": list(found.profile.damage),
+    }
+    if args.out is not None:
+        write_unit_file(args.out, found.unit, force=args.force)
+        page = write_unit_page(args.out.with_suffix(".html"), report)
+        lines += [f"unit file: {args.out}", f"report: {page}"]
+        content |= {"unit_file": str(args.out), "page": str(page)}
+    return print_result(args, content, *lines)
+
+
+def _parse_pair(text: str | None) -> tuple[str, str] | None:
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names):
+        raise BadInput(f"--rigid {text!r}.", "Name the two stations on the bar: --rigid left_hand,right_hand.")
+    return names[0], names[1]
+
+
+def _is_port(source: str) -> bool:
+    """Whether a source is the name of a port: an address, a device of the system, or COM3."""
+    path = Path(source)
+    return "://" in source or path.is_char_device() or (source.upper().startswith("COM") and source[3:].isdecimal())
+
+
+def _capture_of(args: argparse.Namespace) -> Path:
+    """The recording to measure; of a port it is made first."""
+    if not _is_port(args.source):
+        for name in _PORT_FLAGS:
+            if getattr(args, name) is not None:
+                raise BadInput(
+                    f"--{name.replace('_', '-')} with the recording {args.source}.", "It is for a port: leave it out."
+                )
+        return Path(args.source)
+    if args.out is None and args.capture is None:
+        raise BadInput("A port without --out and --capture.", "Name the unit file: --out unit.toml.")
+    return _record_stretches(args)
+
+
+def _record_stretches(args: argparse.Namespace) -> Path:
+    raise NotImplementedError
