@@ -54,7 +54,14 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
             profile.damage,
         ),
         expected_from=found.expected_from,
-        parameters=tuple(ParameterRow(key, number, defaults.get(key)) for key, number in parameters.items()),
+        parameters=(
+            *(ParameterRow(key, number, defaults.get(key)) for key, number in parameters.items()),
+            *(
+                ParameterRow(key, Measured.missing(reason), defaults.get(key))
+                for key, reason in found.unit.not_measured.items()
+                if key not in parameters
+            ),
+        ),
         timing=tuple(
             ParameterRow(key, number, None)
             for key, number in profile.timing.all_stations.items()
@@ -70,7 +77,7 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         advice=_advice(found),
         rigid_pairs=(profile.rigid,) if profile.rigid else (),
         unit_file="" if out is None else out.name,
-        notes=(*profile.limits, *(f"{key}: {reason}" for key, reason in found.unit.not_measured.items())),
+        notes=profile.limits,
     )
 
 

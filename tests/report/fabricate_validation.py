@@ -47,15 +47,11 @@ def made_up_validation() -> ValidationReport:
         poses=tuple(_pose(name, n) for n, name in enumerate((ROOM, *STATIONS))),
         accuracy=tuple(_accuracy(station, n) for n, station in enumerate(STATIONS)),
         checks=(
-            DepartureCheck(
-                compare_with_expected("latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9
-            ),
+            DepartureCheck(compare_with_expected("latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9),
             DepartureCheck(
                 compare_with_expected("mount_turn_rad", "head", Measured(0.052, 0.047, 0.057), exact(0.0)), 1e-6
             ),
-            DepartureCheck(
-                compare_with_expected("scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3
-            ),
+            DepartureCheck(compare_with_expected("scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3),
         ),
         residuals=tuple(_residuals(station, rng) for station in STATIONS),
         scores=(

@@ -1,5 +1,6 @@
 """The chart of checks: measured over expected numbers, departures in colour."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -7,17 +8,20 @@ import numpy as np
 
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_log_scale
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
 from harness.report.lab.quantities import format_both, quantity
 from harness.report.lab.unit_content import DepartureCheck
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _ROW_IN, _FRAME_IN = 0.3, 0.75
 _LEAST_RATIO, _MOST_RATIO = 0.02, 50.0
 """Ends of the axis of ratios."""
+_TICKS = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
+_TICK_SPACING = 0.07
+"""Least distance of two ticks, as a share of the axis."""
 
 
 def check_chart(every: Sequence[DepartureCheck], expected_from: str) -> Chart | None:
@@ -66,8 +70,7 @@ def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequ
         ends += [low, high]
     axes.axvline(1.0, color=INK, linewidth=0.9, zorder=1)
     label_rows(axes, names)
-    set_log_scale(axes, "x")
-    axes.set_xlim(min(0.8, 0.9 * min(ends)), max(1.25, 1.1 * max(ends)))
+    _scale_ratios(axes, min(0.8, 0.9 * min(ends)), max(1.25, 1.1 * max(ends)))
     axes.set_xlabel("measured over expected")
 
 
@@ -80,3 +83,17 @@ def _with_ratio(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
         and check.departure.expected.value > 0.0
         and check.departure.measured.value > 0.0
     ]
+
+
+def _scale_ratios(axes: "Axes", low: float, high: float) -> None:
+    """Make the x axis logarithmic from `low` to `high`, with plain ticks that stand far enough apart."""
+    from matplotlib.ticker import NullLocator
+
+    axes.set_xscale("log")
+    axes.xaxis.set_minor_locator(NullLocator())
+    ticks = [1.0]
+    for tick in sorted((tick for tick in _TICKS if low <= tick <= high), key=lambda tick: abs(math.log(tick))):
+        if min(abs(math.log(tick / other)) for other in ticks) > _TICK_SPACING * math.log(high / low):
+            ticks.append(tick)
+    axes.set_xticks(sorted(ticks), [f"{tick:g}" for tick in sorted(ticks)])
+    axes.set_xlim(low, high)

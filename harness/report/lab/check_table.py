@@ -11,10 +11,10 @@ from harness.report.lab.unit_content import DepartureCheck
 ALL_STATIONS = "all"
 
 
-def departures_table(checks: Sequence[DepartureCheck]) -> Table:
-    """Measured and expected numbers of checks, the least likely first."""
+def departures_table(checks: Sequence[DepartureCheck], most: int | None = None) -> Table:
+    """Measured and expected numbers of checks, the least likely first; at most so many rows."""
     rows = []
-    for check in sorted(checks, key=lambda check: (check.p_holm, check.departure.p)):
+    for check in sorted(checks, key=lambda check: (check.p_holm, check.departure.p))[:most]:
         one = check.departure
         shown = quantity(one.key)
         rows.append(

@@ -102,7 +102,7 @@ _SUFFIXES: tuple[tuple[str, str, float], ...] = (
     ("_m", *_MM),
 )
 """Ends of keys that have no name here, with their unit."""
-_MOST_DECIMALS = 6
+_MOST_DECIMALS, _MOST_DIGITS = 6, 5
 
 
 def quantity(key: str) -> Quantity:
@@ -119,10 +119,11 @@ def is_known(key: str) -> bool:
 
 
 def format_value(number: Measured, shown: Quantity, *, with_unit: bool = True) -> str:
-    """The estimate with as many decimals as its interval deserves; "not measured" without one."""
+    """The estimate with as many decimals as its interval deserves; "not measured" without one, and a plain 0."""
     if not number.is_measured:
         return NOT_MEASURED
-    text = format_fixed(shown.factor * number.value, measured_decimals(number, shown), grouped=True)
+    decimals = measured_decimals(number, shown) if number.value else 0
+    text = format_fixed(shown.factor * number.value, decimals, grouped=True)
     return with_unit_of(text, shown) if with_unit else text
 
 
@@ -155,11 +156,12 @@ def with_unit_of(text: str, shown: Quantity) -> str:
 
 
 def measured_decimals(number: Measured, shown: Quantity) -> int:
-    """Decimals that show two digits of half the interval's width, or three of a value without an interval."""
-    half = 0.5 * shown.factor * (number.high - number.low)
+    """Decimals that show two digits of half the interval's width, and at most five digits of the value."""
+    half, value = 0.5 * shown.factor * (number.high - number.low), shown.factor * number.value
     if half > 0.0 and math.isfinite(half):
-        return decimals_for(half, digits=2, most=_MOST_DECIMALS)
-    return _plain_decimals(shown.factor * number.value)
+        enough = decimals_for(value or half, digits=_MOST_DIGITS, most=_MOST_DECIMALS)
+        return min(decimals_for(half, digits=2, most=_MOST_DECIMALS), enough)
+    return _plain_decimals(value)
 
 
 def _end(value: float, decimals: int) -> str:

@@ -43,7 +43,7 @@ def parameters_table(parameters: Sequence[ParameterRow]) -> Table:
                 row.status,
             ]
         )
-    return Table(["number", "measured", INTERVAL, "from", "default", "in the unit file"], rows)
+    return Table(["number", "measured", INTERVAL, "from", "default", "status"], rows)
 
 
 def reasons(parameters: Sequence[ParameterRow]) -> list[str]:

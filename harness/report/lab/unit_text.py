@@ -15,7 +15,7 @@ from harness.report.lab.unit_tables import (
 )
 from harness.report.lab.unit_wording import advice_text, answer, description
 
-_WIDTH = 118
+_WIDTH, _MOST_CHECKS = 118, 8
 
 
 def format_unit(report: UnitReport) -> str:
@@ -30,7 +30,9 @@ def format_unit(report: UnitReport) -> str:
     lines += _part("episodes", episodes_table(report.episodes) if report.episodes else Table([], []))
     for pair in report.rigid_pairs:
         lines += _part("stations on a bar", pair_table(pair))
-    lines += _part(f"checks against {report.expected_from}", departures_table(report.checks))
+    shown = max(_MOST_CHECKS, len(report.departures))
+    title = f"checks against {report.expected_from}, the least likely of {len(report.checks)} first"
+    lines += _part(title, departures_table(report.checks, shown))
     if report.advice:
         lines += ["", "how long to record", *(f"- {advice_text(one)}" for one in report.advice)]
     if report.notes:

@@ -41,7 +41,7 @@ def _spread_sentence(report: UnitReport) -> str:
         for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
         if numbers
     ]
-    return f"At rest, {' and '.join(parts)} about its mean." if parts else ""
+    return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
 
 
 def _range(numbers: Sequence[Measured], key: str) -> str:

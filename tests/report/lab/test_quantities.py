@@ -64,6 +64,12 @@ def test_the_interval_sets_the_decimals() -> None:
     assert format_ends(Measured(-0.001, -0.002, math.inf), length) == "−2 to ∞"
 
 
+def test_at_most_five_digits_of_a_value_are_shown() -> None:
+    rate = Quantity("rate", "Hz")
+    assert format_both(Measured(39.9992, 39.999199, 39.999201), rate) == "39.999 Hz (39.999 to 39.999)"
+    assert format_value(Measured(0.0, 0.0, 5e-5), Quantity("share", "%", 100.0)) == "0 %"
+
+
 def test_a_number_without_width_is_exact_and_one_that_is_missing_says_so() -> None:
     length = Quantity("length", "mm", 1e3)
     exact = Measured(0.002, 0.002, 0.002)

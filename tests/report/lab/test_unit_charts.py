@@ -62,6 +62,14 @@ def test_departures_are_triangles_right_of_one(figures: dict[str, Figure]) -> No
     assert labels[-1] == "rate of excursions, head"
 
 
+def test_ratios_near_one_have_several_ticks() -> None:
+    unit = made_up_unit()
+    near = figures_of(replace(unit, checks=unit.checks[1:4]))["checks"].axes[0]
+    ticks = [float(tick) for tick in near.get_xticks()]
+    assert ticks == [0.8, 0.9, 1.0, 1.1, 1.2]
+    assert near.get_xlim() == (0.8, 1.25)
+
+
 def test_allan_deviations_are_in_millimetres_and_degrees(figures: dict[str, Figure]) -> None:
     position, orientation = figures["allan"].axes
     unit = made_up_unit()

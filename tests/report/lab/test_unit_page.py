@@ -108,7 +108,8 @@ def test_the_text_has_the_answer_the_tables_and_fits_a_terminal() -> None:
         assert f"\n\n{part}\n" in joined
     assert "damage: The last 312 bytes" in joined
     assert f"not measured: tilt error before a gap: {TOO_FEW}" in joined
-    assert "checks against the preset default" in joined
+    assert "checks against the preset default, the least likely of 9 first" in joined
+    assert sum(line.startswith(("white noise of the orient", "correlation time")) for line in lines) == 3
     assert "note: Latency cannot be told" in joined
 
 

@@ -50,11 +50,12 @@ def test_ratios_are_left_out_where_they_say_nothing() -> None:
 
 def test_the_description_has_numbers_that_were_measured_only() -> None:
     assert description(made_up_unit()) == [
-        "At rest, a position scatters by 2.90 to 3.40 mm and an orientation scatters by 0.58 deg about its mean.",
+        "At rest, a position scatters by 2.90 to 3.40 mm and an orientation scatters by 0.58 deg (RMS, everything "
+        "included).",
         "On each axis a position has 1.500 mm of white noise and 1.520 mm of drift, which lasts 0.980 s.",
         "A station has 3.10 excursions a minute of 5.20 to 29.80 mm.",
         "Of the readings 3.04 % are echoes and 0 % are sent twice.",
-        "Records of a station come at 40.0000 Hz and the clock runs 21.0 ppm slow.",
+        "Records of a station come at 40.000 Hz and the clock runs 21.0 ppm slow.",
     ]
     assert description(without_content()) == []
 

@@ -69,7 +69,7 @@ def test_numbers_have_their_intervals(page: Path) -> None:
     text = text_of(page)
     assert "difference of the two time offsets all 2.00 ms 1.40 to 2.60" in text
     assert "heading error pelvis 0.06 deg −0.52 to 1.15" in text
-    assert "room 0.0 −1.5 to 1.5 −20.0 −21.5 to −18.5 2,500.0 2,498.5 to 2,501.5 1.0000 0.0000" in text
+    assert "room 0 −1.5 to 1.5 −20.0 −21.5 to −18.5 2,500.0 2,498.5 to 2,501.5 1.0000 0.0000" in text
     assert "head on head_bone 50.0" in text
     assert "0.0000 ± 0.20 deg" in text
     assert "head 2.50 2.38 to 2.62 3.20 3.04 to 3.36 7.10 6.75 to 7.46 0.458 0.435 to 0.481 0.573" in text
