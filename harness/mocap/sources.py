@@ -11,6 +11,7 @@ from harness.errors import BadInput, UnknownName
 from harness.mocap import synthetic
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
 from harness.mocap.skeletons import read_skeletons
+from harness.mocap.synthetic.rig import RIG_TAKES, generate_rig
 
 MOCAP_VARIABLE = "HARNESS_MOCAP"
 POPULATION_SIZE = 100
@@ -59,7 +60,12 @@ def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, 
 
 @cache
 def _synthetic_names() -> frozenset[str]:
-    return frozenset(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
+    return frozenset(_list_synthetic_names())
+
+
+def _list_synthetic_names() -> tuple[str, ...]:
+    takes = (name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
+    return (*takes, *RIG_TAKES)
 
 
 class SyntheticSource:
@@ -72,7 +78,7 @@ class SyntheticSource:
         self._clips: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
-        return tuple(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
+        return _list_synthetic_names()
 
     def check(self, name: str) -> None:
         if name not in _synthetic_names():
@@ -87,7 +93,10 @@ class SyntheticSource:
     def load(self, name: str) -> Clip:
         if name not in self._clips:
             behaviour, performer, take = _parse_take_name(name)
-            self._clips[name] = synthetic.generate(behaviour, performer, take, seed=self._seed)
+            is_rig = name in RIG_TAKES
+            self._clips[name] = (
+                generate_rig(name) if is_rig else synthetic.generate(behaviour, performer, take, seed=self._seed)
+            )
         return self._clips[name]
 
     def other_skeletons(self, without: str) -> dict[str, Skeleton]:

@@ -1,0 +1,93 @@
+"""Takes of a rig: a rigid mannequin that carries all stations, at rest and swept through the room.
+
+They stand in for the captures of `harness characterize` where no device is at hand. No two stations move against each
+other, so that any two are on one rigid bar.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.motion import Clip
+from harness.errors import UnknownName
+from harness.mocap.synthetic.curves import minimum_jerk
+from harness.mocap.synthetic.performers import performer_skeleton
+
+RIG = "rig"
+"""Behaviour of the takes."""
+_PERFORMER = "p1"
+_SETTLE_S = 2.0
+"""Time in which a sweep begins and ends [s]."""
+_REACH_M = np.array([0.35, 0.45, 0.15])
+_SWING_RAD = np.array([0.35, 0.30, 0.80])
+"""Amplitudes of a sweep along the axes and about them [m, rad]."""
+_CYCLES = np.array([[1.0, 0.83, 1.27], [0.91, 1.13, 0.71]])
+"""Relative frequencies of positions and angles: no two alike, so that every direction and axis is swept."""
+_SLOW_HZ, _FAST_HZ = 0.12, 0.55
+
+
+@dataclass(frozen=True)
+class RigTake:
+    """The stretches of a take: seconds at rest, swept slowly, swept fast, and at rest again to be covered."""
+
+    static_s: float
+    slow_s: float = 0.0
+    fast_s: float = 0.0
+    covered_s: float = 0.0
+    rate_hz: float = 60.0
+
+    def stretches(self) -> tuple[tuple[str, float, float], ...]:
+        """Name, beginning and end [s] of each stretch."""
+        out, now_s = [], 0.0
+        for name in ("static", "slow", "fast", "covered"):
+            length_s = getattr(self, f"{name}_s")
+            if length_s:
+                out.append((name, now_s, now_s + length_s))
+            now_s += length_s
+        return tuple(out)
+
+
+RIG_TAKES = {
+    "rig_p1_01": RigTake(70.0, 40.0, 40.0, 40.0),
+    "rig_p1_02": RigTake(300.0, rate_hz=10.0),
+    "rig_p1_03": RigTake(1200.0, rate_hz=10.0),
+    "rig_p1_04": RigTake(1200.0, 60.0, 60.0, 60.0, rate_hz=30.0),
+}
+"""Takes by name: a short one of all stretches, five minutes and twenty minutes at rest, and a long one of all."""
+
+
+def generate_rig(name: str) -> Clip:
+    """Generate a take; UnknownName for another name."""
+    if name not in RIG_TAKES:
+        raise UnknownName("take of the rig", name, RIG_TAKES)
+    take = RIG_TAKES[name]
+    duration_s = sum(end_s - begin_s for _, begin_s, end_s in take.stretches())
+    time_s = np.arange(round(duration_s * take.rate_hz) + 1) / take.rate_hz
+    place, angle = np.zeros((len(time_s), 3)), np.zeros((len(time_s), 3))
+    for stretch, begin_s, end_s in take.stretches():
+        if stretch in ("slow", "fast"):
+            swept = _sweep(time_s - begin_s, end_s - begin_s, _SLOW_HZ if stretch == "slow" else _FAST_HZ)
+            place += _REACH_M * swept[0]
+            angle += _SWING_RAD * swept[1]
+    skeleton = performer_skeleton(_PERFORMER)
+    return Clip(
+        name=name,
+        subject=_PERFORMER,
+        source="built-in performer",
+        behaviour=RIG,
+        skeleton=skeleton,
+        rate_hz=take.rate_hz,
+        root_m=np.array([0.0, 0.0, 1.0]) + place,
+        world_from_root=rotations.continuous(rotations.exp(angle)),
+        angles_rad=np.zeros((len(time_s), len(skeleton.axes))),
+    )
+
+
+def _sweep(since_s: Floats, length_s: float, frequency_hz: float) -> Floats:
+    """Shares (2, T, 3) of the amplitudes of positions and angles, from rest to rest."""
+    inside = np.minimum(minimum_jerk(since_s / _SETTLE_S), minimum_jerk((length_s - since_s) / _SETTLE_S))
+    phase = 2.0 * np.pi * frequency_hz * np.clip(since_s, 0.0, length_s)
+    out: Floats = inside[:, None] * np.sin(_CYCLES[:, None, :] * phase[:, None])
+    return out
