@@ -1,21 +1,31 @@
 """The verb `characterize`: measure the errors, clock and line of a device without a reference."""
 
 import argparse
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
     LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
+    line_options,
+    parse_device_names,
     positive_float,
     print_result,
+    print_status,
+    show_progress,
     this_command,
 )
+from harness.core.package_data import VERSION
 from harness.core.progress import ProgressBar
-from harness.errors import BadInput, Outcome
+from harness.errors import BadFile, BadInput, Outcome
 
-_DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 60.0, 60.0
+if TYPE_CHECKING:
+    from harness.stream.recording.guided_capture import Stretch
+
+_DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
 """Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
 _PORT_FLAGS = ("stations", "rate", "minutes", "capture", "yes", *LINE_FLAGS)
 
@@ -114,4 +124,54 @@ def _capture_of(args: argparse.Namespace) -> Path:
 
 
 def _record_stretches(args: argparse.Namespace) -> Path:
-    raise NotImplementedError
+    """Record the stretches of a device, or the rest of them; the recording's path."""
+    from harness.measure.recording_time import events_for_precision
+    from harness.stream.driver import DriverConfig
+    from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
+
+    path: Path = args.capture or args.out.with_suffix(".rec")
+    minutes = args.minutes or _DEFAULT_STATIC_MIN
+    print_status(
+        f"A rate known to 20 % takes {events_for_precision(0.2)} events: 17 minutes at rest of six stations with one "
+        f"event a minute each. This capture rests for {minutes:g} minutes. Stop with Ctrl-C; the same command goes on."
+    )
+    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
+    config = DriverConfig(stations=stations, rate_hz=args.rate, **_line_options(args))
+    capture_stretches(
+        args.source,
+        config,
+        path,
+        _stretches(60.0 * minutes),
+        {"source": "port", "port": args.source, "purpose": "characterize", "harness": VERSION},
+        ready=_always_ready if args.yes or not sys.stdin.isatty() else _wait_for_enter,
+        log=print_status,
+        progress=show_progress,
+    )
+    if "static" not in finished_stretches(path):
+        raise BadFile(path, "no finished static stretch", "a capture", "Give the same command to go on with it.")
+    return path
+
+
+def _line_options(args: argparse.Namespace) -> dict[str, Any]:
+    args.port = args.source
+    return line_options(args)
+
+
+def _stretches(static_s: float) -> "tuple[Stretch, ...]":
+    from harness.stream.recording.guided_capture import Stretch
+
+    return (
+        Stretch("static", static_s, "let all stations lie still, in sight of the emitters", True),
+        Stretch("slow", _SWEEP_S, "sweep the stations slowly through the room, about all axes", False),
+        Stretch("fast", _SWEEP_S, "sweep them fast, about all axes", False),
+        Stretch("covered", _COVERED_S, "lay them down and cover them with a hand, one after another", True),
+    )
+
+
+def _always_ready() -> bool:
+    return True
+
+
+def _wait_for_enter() -> bool:
+    print_status("Press Enter when ready.")
+    return bool(sys.stdin.readline())

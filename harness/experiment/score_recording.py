@@ -21,7 +21,7 @@ from harness.core.progress import ProgressCallback
 from harness.core.text_table import Table
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_run import MethodAnswers, lag_and_sigma
+from harness.experiment.method_run import lag_and_sigma
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import load_scenario
@@ -201,8 +201,7 @@ def score_methods(
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
     loops = _split_into_loops(frames, zero_s, playback.samples)
-    truth = playback.tracker.rate_hz, playback.simulation.truth_qpos
-    return [_score_method(name, made[name], loops, playback, truth) for name in methods]
+    return [_score_method(name, made[name], loops, playback) for name in methods]
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,18 +216,6 @@ def match_recording(stream: RecordingStream, playback: Playback) -> MatchedRecor
     """Decode a recording once, for any number of methods; BadInput for another motion."""
     frames, zero_s, _ = _run_methods(stream, {})
     return MatchedRecording(tuple(frames), tuple(_split_into_loops(frames, zero_s, playback.samples)))
-
-
-def score_answers(
-    name: str, answers: MethodAnswers, loops: Sequence[LoopFrames], playback: Playback, truth: tuple[float, Floats]
-) -> RecordingScore:
-    """Score a method's answers to the frames of a recording, or of a simulation of the same motion.
-
-    `truth` is a rate [Hz] and the true configurations (E, 55) at that rate, to whose rows the loops refer.
-    """
-    by_frame, lag = answers.by_frame()
-    output = _MethodOutput(lag, by_frame.qpos, by_frame.status, by_frame.step_ms, by_frame.angle_sigma_rad)
-    return _score_method(name, output, loops, playback, truth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,10 +315,8 @@ def _row_medians(values: Floats) -> Floats:
     return out
 
 
-def _score_method(
-    name: str, output: _MethodOutput, loops: Sequence[LoopFrames], playback: Playback, truth: tuple[float, Floats]
-) -> RecordingScore:
-    rate_hz, truth_qpos = truth
+def _score_method(name: str, output: _MethodOutput, loops: Sequence[LoopFrames], playback: Playback) -> RecordingScore:
+    rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
     skeleton, scores, expected, sigma = playback.body.skeleton, [], 0, list[SigmaSums]()
     for number, loop in enumerate(loops):
         first, last = int(loop.index[0]), int(loop.index[-1])

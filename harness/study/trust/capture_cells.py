@@ -32,17 +32,18 @@ from harness.experiment.score_recording import (
     checked_note,
     find_playback,
     match_recording,
-    score_answers,
 )
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.results.storage import cell_key
+from harness.score.pair import PoseSequence, compute_poses
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
 from harness.stream.frame import TrackerFrame, split_frames
 from harness.stream.recording.replay import RecordingStream
+from harness.study.trust.loop_scores import score_loops
 from harness.study.trust.reading_errors import HealthCounts, count_health, ideal_readings, reading_errors
 
 _EXPECTED, _ADVICE = "the errors of a finished cell", "Delete the file and run again; finished cells are kept."
@@ -124,7 +125,7 @@ class _SideFrames:
     frames: tuple[TrackerFrame, ...]
     loops: tuple[LoopFrames, ...]
     rate_hz: float
-    truth_qpos: Floats
+    truth: PoseSequence
 
     @cached_property
     def _columns(self) -> list[NDArray[Any]]:
@@ -196,7 +197,8 @@ class _CaptureRun:
         matched, tracker = match_recording(self.stream, self.playback), self.playback.tracker
         trajectory = Trajectory(self.playback.body, self.playback.take)
         time_s = sampling_times_s(trajectory.duration_s, tracker, len(self.stream.stations))
-        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, trajectory.qpos(time_s.mean(axis=1)))
+        truth = compute_poses(self.playback.body.skeleton, trajectory.qpos(time_s.mean(axis=1)))
+        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, truth)
 
     @cached_property
     def fitted(self) -> Scenario:
@@ -226,7 +228,8 @@ class _CaptureRun:
         first, last = (time_s * tracker.rate_hz for time_s in self._span_s)
         rows: Ints = np.flatnonzero((found.frame_index >= first - 0.5) & (found.frame_index <= last + 0.5))
         loop = LoopFrames(rows, found.frame_index[rows])
-        return _SideFrames(found.frames, (loop,), tracker.rate_hz, found.truth_qpos)
+        truth = compute_poses(self.playback.body.skeleton, found.truth_qpos)
+        return _SideFrames(found.frames, (loop,), tracker.rate_hz, truth)
 
     @cached_property
     def _span_s(self) -> tuple[float, float]:
@@ -283,8 +286,7 @@ class _CaptureRun:
         fitted = evaluation.fit_method(method, arm.method)
         answers = run_over_frames(fitted, _select_stations(self.playback.calibration, rows), shown)
         self.methods_s += time.perf_counter() - start
-        score = score_answers(arm.method, answers, frames.loops, self.playback, (frames.rate_hz, frames.truth_qpos))
-        errors = {metric: score.metrics[metric] for metric in self.task.metrics}
+        errors = score_loops(self.task.metrics, answers, frames.loops, frames.truth, frames.rate_hz)
         with named_folder_fault(self.task.out):
             write_result_json(path, {"arm": str(arm), "clip": self.clip, "side": side, "errors": errors})
         return errors

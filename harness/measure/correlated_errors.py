@@ -1,0 +1,77 @@
+"""Least squares with errors that are white noise plus a Gauss-Markov process.
+
+A Kalman filter turns such errors into independent ones of unit variance. The same linear filter is applied to the
+derivatives, so that ordinary least squares of both is generalised least squares; samples that are left out need no
+filling.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.compiled import compiled
+from harness.measure.gauss_markov import series_log_likelihood
+
+_LEAST, _MOST = np.log([1e-9, 1e-9, 0.05]), np.log([10.0, 10.0, 30.0])
+
+
+@dataclass(frozen=True)
+class ErrorProcess:
+    """Standard deviations of white noise and of a Gauss-Markov process, and its correlation time."""
+
+    white: float
+    drift: float
+    correlation_s: float
+
+    def whiten(self, values: Floats, valid: Bools, period_s: float) -> Floats:
+        """Filter the columns (N, C) of one axis, sampled every `period_s` [s]; rows that are not valid become zero."""
+        correlation = float(np.exp(-period_s / self.correlation_s))
+        return _whiten(np.ascontiguousarray(values), valid, correlation, self.drift**2, self.white**2)
+
+
+def fit_process(errors: Floats, valid: Bools, period_s: float) -> ErrorProcess:
+    """Fit the process to errors (N, A) of A axes by maximum likelihood."""
+    from scipy import optimize
+
+    known = np.where(valid[:, None], errors, 0.0)
+    spread = float(np.sqrt(np.mean(known[valid] ** 2))) if valid.any() else 0.0
+    both = valid[1:] & valid[:-1]
+    step = float(np.sqrt(np.mean((errors[1:] - errors[:-1])[both] ** 2) / 2.0)) if both.any() else spread
+
+    def cost(logarithms: Floats) -> float:
+        bounded = np.clip(logarithms, _LEAST, _MOST)
+        white, drift, correlation_s = np.exp(bounded)
+        correlation = float(np.exp(-period_s / correlation_s))
+        fit = series_log_likelihood(known, valid, correlation, float(drift**2), float(white**2))
+        return float(np.sum((logarithms - bounded) ** 2)) - fit / max(int(valid.sum()), 1)
+
+    start = np.log(np.maximum([0.7 * min(step, spread), spread, 1.0], 1e-8))
+    corners = np.concatenate([start[None], start + np.diag([-0.5, 0.5, 0.5])])
+    options = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 300}
+    found = optimize.minimize(cost, start, method="Nelder-Mead", options=options)
+    white, drift, correlation_s = np.exp(np.clip(found.x, _LEAST, _MOST)).tolist()
+    return ErrorProcess(white, drift, correlation_s)
+
+
+@compiled
+def _whiten(values: Floats, valid: Bools, correlation: float, drift_variance: float, white_variance: float) -> Floats:
+    count, columns = values.shape
+    out = np.zeros((count, columns))
+    state = np.zeros(columns)
+    variance = drift_variance  # stationary before the first sample
+    for i in range(count):
+        variance = correlation**2 * variance + drift_variance * (1.0 - correlation**2)
+        for c in range(columns):
+            state[c] *= correlation
+        if not valid[i]:
+            continue
+        innovation_variance = variance + white_variance
+        gain = variance / innovation_variance
+        deviation = np.sqrt(innovation_variance)
+        for c in range(columns):
+            innovation = values[i, c] - state[c]
+            state[c] += gain * innovation
+            out[i, c] = innovation / deviation
+        variance *= 1.0 - gain
+    return out

@@ -1,0 +1,139 @@
+"""Room and mounts in closed form: the hand-eye problem A X = Y B of several stations that share one room.
+
+A station's orientation is `tracker_from_world * world_from_body * body_from_station`. Rotations come first, from the
+Kronecker products of matrices (Shah 2013, J. Mechanisms Robotics 5); all stations share the first factor. Positions
+follow by linear least squares, together with the scale of the tracker.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, freeze
+from harness.errors import BadInput
+
+LEAST_TURN_RAD = 0.05
+"""Least spread of the body's orientations about a second axis [rad]; a smaller one is motion about one axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosePairs:
+    """N pairs of poses of one station at the same instants: reported, and those of its body."""
+
+    position_m: Floats
+    """(N, 3) reported position, tracker's frame [m]."""
+    tracker_from_station: Floats
+    """(N, 4) unit quaternions."""
+    body_m: Floats
+    """(N, 3) position of the body, world [m]."""
+    world_from_body: Floats
+    """(N, 4) unit quaternions."""
+
+    def __post_init__(self) -> None:
+        freeze(self, position_m=("N", 3))
+        count = len(self.position_m)
+        freeze(self, tracker_from_station=(count, 4), body_m=(count, 3), world_from_body=(count, 4))
+
+
+@dataclass(frozen=True, eq=False)
+class HandEye:
+    """Room and mounts of S stations."""
+
+    tracker_from_world: Floats
+    """(4,) unit quaternion."""
+    tracker_origin_m: Floats
+    """(3,) origin of the tracker's frame in the world [m]."""
+    scale: float
+    """Relative scale error of reported positions about the tracker's origin."""
+    body_from_station: Floats
+    """(S, 4) unit quaternions."""
+    mount_m: Floats
+    """(S, 3) origin of each station in the frame of its body [m]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, tracker_from_world=(4,), tracker_origin_m=(3,))
+        freeze(self, body_from_station=("S", 4), mount_m=("S", 3))
+
+
+def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> HandEye:
+    """Solve for the room and the mount of each station by least squares.
+
+    BadInput if no station turns about two axes: the room's and the mounts' turn about the only axis is then
+    not observable.
+    """
+    require_two_axes(stations)
+    room, mounts = _solve_rotations(stations)
+    origin_m, scale, mount_m = _solve_positions(stations, room, with_scale)
+    return HandEye(room, origin_m, scale, mounts, mount_m)
+
+
+def require_two_axes(stations: Sequence[PosePairs]) -> None:
+    """Raise BadInput unless a body turns about two axes."""
+    spread = max((second_spread_rad(pairs.world_from_body) for pairs in stations), default=0.0)
+    if not spread >= LEAST_TURN_RAD:
+        raise BadInput(
+            f"The bodies turn about one axis only: {np.rad2deg(spread):.1f} deg (RMS) about a second one.",
+            "Not observable: each mount's rotation about this axis, and its position along it. Turn about two axes.",
+        )
+
+
+def second_spread_rad(quaternions: Floats) -> float:
+    """RMS rotation about the second axis of orientations (N, 4) relative to their mean [rad]; 0 without any."""
+    if not len(quaternions):
+        return 0.0
+    mean = _mean_quaternion(quaternions)
+    turns = rotations.log(rotations.multiply(rotations.inverse(mean), quaternions))
+    return float(np.sqrt(max(np.linalg.eigvalsh(turns.T @ turns / len(turns))[1], 0.0)))
+
+
+def _mean_quaternion(quaternions: Floats) -> Floats:
+    out: Floats = np.linalg.eigh(quaternions.T @ quaternions)[1][:, -1]
+    return out
+
+
+def _solve_rotations(stations: Sequence[PosePairs]) -> tuple[Floats, Floats]:
+    """`tracker_from_world` (4,) and `body_from_station` (S, 4).
+
+    R_m = X B Y gives vec(R_m Y^T B^T): the sum of R_m (x) B maps vec(Y) to a multiple of vec(X).
+    """
+    sums = []
+    for pairs in stations:
+        reported = rotations.to_matrix(pairs.tracker_from_station)
+        body = rotations.to_matrix(pairs.world_from_body)
+        # X[i,k] = sum over j, l of R_m[i,j] B[k,l] Y[l,j]
+        sums.append(np.einsum("nij,nkl->iklj", reported, body).reshape(9, 9))
+    left, _, _ = np.linalg.svd(np.concatenate(sums, axis=1))
+    room = _nearest_rotation(left[:, 0].reshape(3, 3))
+    mounts = [_nearest_rotation((total.T @ room.reshape(9)).reshape(3, 3)) for total in sums]
+    return rotations.from_matrix(room), rotations.from_matrix(np.array(mounts))
+
+
+def _nearest_rotation(matrix: Floats) -> Floats:
+    """The rotation nearest to a multiple, of either sign, of a matrix (3, 3)."""
+    matrix = matrix * np.sign(np.linalg.det(matrix))
+    u, _, v = np.linalg.svd(matrix)
+    out: Floats = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    return out
+
+
+def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bool) -> tuple[Floats, float, Floats]:
+    """Origin (3,), scale and mounts (S, 3), from k p = R (b + B m - o), which is linear in k, o and m."""
+    size = 4 + 3 * len(stations)
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    for s, pairs in enumerate(stations):
+        in_world = rotations.rotate(rotations.inverse(room), pairs.position_m)
+        rows = np.zeros((len(in_world), 3, size))
+        rows[:, :, 0] = in_world
+        rows[:, :, 1:4] = np.eye(3)
+        rows[:, :, 4 + 3 * s : 7 + 3 * s] = -rotations.to_matrix(pairs.world_from_body)
+        values = pairs.body_m
+        if not with_scale:
+            values, rows[:, :, 0] = values - in_world, 0.0
+        flat = rows.reshape(-1, size)
+        normal += flat.T @ flat
+        right += flat.T @ values.reshape(-1)
+    solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
+    factor = solution[0] if with_scale else 1.0
+    return solution[1:4], float(1.0 / factor - 1.0), solution[4:].reshape(-1, 3)

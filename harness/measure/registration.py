@@ -1,0 +1,385 @@
+"""Registration of a capture with a reference: clocks, room, scale, heading error, and the mount of each station."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, freeze
+from harness.errors import BadInput
+from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.handeye import PosePairs, solve_hand_eye
+from harness.measure.measured import NORMAL_QUANTILE, Measured
+from harness.measure.offset import SpeedSeries, TimeOffset, angular_speed, time_offset
+from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
+from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
+from harness.measure.registration_model import (
+    CLOCK,
+    HEADING,
+    OFFSET_ORIENTATION,
+    OFFSET_POSITION,
+    OWN,
+    ROOM_ORIGIN,
+    ROOM_TURN,
+    SCALE,
+    SHARED,
+    RegistrationState,
+)
+
+LEAST_OVERLAP_S = 10.0
+"""Shortest common motion of capture and reference [s]."""
+LEAST_MATCHED = 0.95
+"""Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
+LEAST_CORRELATION = 0.5
+"""Smallest correlation of angular speeds with which motion counts as the reference's."""
+MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05}
+"""Largest standard deviation by unit; a parameter with a larger one is not observable."""
+
+
+@dataclass(frozen=True, eq=False)
+class MountFit:
+    """Mount of one station on its body, as the device reports it."""
+
+    station: str
+    body: str
+    position_m: Floats
+    """(3,) origin of the station in the frame of its body [m]."""
+    body_from_station: Floats
+    """(4,) unit quaternion."""
+    covariance: Floats
+    """(6, 6) of a small rotation in the body's axes [rad], then of the position [m]."""
+    blocks: int
+    """Number of independent blocks of time."""
+
+    def __post_init__(self) -> None:
+        freeze(self, position_m=(3,), body_from_station=(4,), covariance=(6, 6))
+
+    def position(self, axis: int) -> Measured:
+        """Position on one axis of the body [m]."""
+        return Measured.normal(
+            float(self.position_m[axis]), float(np.sqrt(self.covariance[3 + axis, 3 + axis])), self.blocks
+        )
+
+    def turn_from(self, nominal: Floats) -> tuple[Measured, Measured, Measured]:
+        """Rotation vector from a nominal orientation (4,) to the measured one, in the body's axes [rad]."""
+        return _turns(self.body_from_station, nominal, self.covariance[:3, :3], self.blocks)
+
+    def angle_from(self, nominal: Floats) -> Measured:
+        """Angle between a nominal orientation (4,) and the measured one [rad].
+
+        The interval is 95 % for a vector of three errors, so that it contains zero in 95 % of exact mounts.
+        """
+        return _length(_vector(self.body_from_station, nominal), self.covariance[:3, :3], self.blocks)
+
+    def distance_from(self, nominal_m: Floats) -> Measured:
+        """Distance of the measured position from a nominal one (3,) [m]; the interval as for `angle_from`."""
+        return _length(self.position_m - nominal_m, self.covariance[3:, 3:], self.blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class StationErrors:
+    """What remains of N readings of a station after registration; a grid of its records in time."""
+
+    truth_s: Floats
+    """(N,) time of the reference's clock, by the offset of orientation [s]."""
+    position_m: Floats
+    """(N, 3) reported minus modelled position, tracker's axes [m]."""
+    rotation_rad: Floats
+    """(N, 3) rotation vector from modelled to reported orientation, tracker's axes [rad]."""
+    valid: Bools
+    """(N,) whether there is a reading; the others are zero."""
+    used: Bools
+    """(N, 2) whether the registration used position and orientation."""
+    noise: tuple[ErrorProcess, ErrorProcess, ErrorProcess]
+    """White and Gauss-Markov noise of position [m], pitch and roll [rad], and yaw [rad]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, truth_s=("N",))
+        count = len(self.truth_s)
+        freeze(self, position_m=(count, 3), rotation_rad=(count, 3))
+        freeze(self, np.bool_, valid=(count,), used=(count, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """Everything that relates a capture to its reference, with 95 % intervals."""
+
+    values: Mapping[str, Measured]
+    """By key, all stations together:
+
+    - `time_offset_orientation_s`, `time_offset_position_s`: device's clock minus reference's clock at `reference_s`, by
+      which orientations and positions agree; a late stream has a positive one.
+    - `position_ahead_s`: the first minus the second; `components.speed.ahead_s`.
+    - `clock_ratio_ppm`: rate error of the device's clock, positive runs fast; `components.clock.drift_ppm`.
+    - `scale`: relative error of positions about the tracker's origin.
+    - `heading_rad`: orientations turned about the tracker's vertical, relative to positions.
+    - `tracker_origin_m.0` to `.2`: origin of the tracker's frame in the world.
+    """
+    mounts: Mapping[str, MountFit]
+    errors: Mapping[str, StationErrors]
+    world_from_tracker: Floats
+    """(4,) unit quaternion."""
+    tracker_origin_m: Floats
+    """(3,) origin of the tracker's frame in the world [m]."""
+    room_covariance: Floats
+    """(6, 6) of a small rotation in the tracker's axes [rad], then of the origin in the world [m]."""
+    state: RegistrationState
+    """Estimates of all parameters, from which device times are mapped to those of the reference."""
+    correlation: float
+    """Correlation of angular speeds at the time offset."""
+    overlap_s: float
+    """Time that capture and reference have in common [s]."""
+    matched: float
+    """Share of the records due in the overlap that have a pose and a reference."""
+    blocks: int
+
+    def __post_init__(self) -> None:
+        freeze(self, world_from_tracker=(4,), tracker_origin_m=(3,), room_covariance=(6, 6))
+
+    @property
+    def reference_s(self) -> float:
+        """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
+        return self.state.reference_s
+
+    def room_turn_from(self, world_from_tracker: Floats) -> tuple[Measured, Measured, Measured]:
+        """Rotation vector from an expected `world_from_tracker` (4,) to the measured one, tracker's axes [rad]."""
+        measured, expected = rotations.inverse(self.world_from_tracker), rotations.inverse(world_from_tracker)
+        x, y, z = _turns(measured, expected, self.room_covariance[:3, :3], self.blocks)
+        return x, y, z
+
+    def room_point(self, point_m: Floats) -> tuple[Measured, Measured, Measured]:
+        """World coordinates of a point (3,) given in the tracker's frame, without the scale error [m]."""
+        at_m = rotations.rotate(self.world_from_tracker, point_m)
+        turn = rotations.to_matrix(self.world_from_tracker) @ _cross_matrix(point_m)
+        slope = np.concatenate([turn, np.eye(3)], axis=1)
+        deviation = np.sqrt(np.diag(slope @ self.room_covariance @ slope.T))
+        x, y, z = (
+            Measured.normal(float(value), float(one), self.blocks)
+            for value, one in zip(self.tracker_origin_m + at_m, deviation, strict=True)
+        )
+        return x, y, z
+
+
+def register(
+    stations: Mapping[str, MeasuredPoses],
+    truths: Mapping[str, TruthPoses],
+    *,
+    pairs: Mapping[str, str] | None = None,
+    least_overlap_s: float = LEAST_OVERLAP_S,
+    least_matched: float = LEAST_MATCHED,
+) -> Registration:
+    """Register stations with the reference motion of the bodies that carry them.
+
+    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput that names what
+    is not observable: no stamps, too little overlap, too few matched records, another motion, motion about one axis.
+    """
+    named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
+    require_pairs(stations, truths, named)
+    splines = {station: TruthSpline(truths[body]) for station, body in named.items()}
+    chosen = {station: stations[station] for station in named}
+    require_stamps(chosen)
+    period_s = record_period_s(chosen)
+    coarse = coarse_offset(chosen, splines, period_s, least_overlap_s)
+    if not coarse.correlation >= LEAST_CORRELATION:
+        raise BadInput(
+            f"Angular speeds of capture and reference correlate by {coarse.correlation:.2f} at best.",
+            "The motion is not the reference's, or stations are on other bodies than stated.",
+        )
+    grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
+    start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
+    fit = fit_registration(list(grids.values()), list(splines.values()), start)
+    _require_observable(fit, list(named))
+    return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
+
+
+def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
+    """Raise BadInput unless the records of each station have times."""
+    for name, station in stations.items():
+        if np.isfinite(station.measured_s).sum() < 2:
+            raise BadInput(
+                f"Records of station {name!r} have no time stamps.",
+                "Time offset and clock ratio are not observable without stamps. Switch them on in the device.",
+            )
+
+
+def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
+    """Median time between records of a station [s]."""
+    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
+    return float(np.median(np.concatenate(steps_s)))
+
+
+def coarse_offset(
+    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
+) -> TimeOffset:
+    """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
+    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
+    expected = [reference_speed(splines[name], period_s) for name in stations]
+    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
+
+
+def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
+    """Angular speed of a reference, over steps of `period_s` as the device's."""
+    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
+    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
+
+
+def _make_grids(
+    stations: Mapping[str, MeasuredPoses],
+    splines: Mapping[str, TruthSpline],
+    period_s: float,
+    coarse: TimeOffset,
+    least_matched: float,
+) -> tuple[dict[str, StationGrid], float, float, float]:
+    """Grids of all stations, the share of matched records, the overlap [s] and its middle [s]."""
+    begins, ends = [], []
+    for name, station in stations.items():
+        at_s = station.measured_s[np.isfinite(station.measured_s)] - coarse.offset_s
+        begins += [float(at_s.min()), float(splines[name].time_s[0])]
+        ends += [float(at_s.max()), float(splines[name].time_s[-1])]
+    begin_s, end_s = max(begins), min(ends)
+    grids = {
+        name: _make_grid(station, splines[name], period_s, coarse.offset_s, begin_s, end_s)
+        for name, station in stations.items()
+    }
+    due = len(grids) * max((end_s - begin_s) / period_s, 1.0)
+    matched = min(sum(int(grid.known.sum()) for grid in grids.values()) / due, 1.0)
+    if matched < least_matched:
+        raise BadInput(
+            f"{100.0 * matched:.1f} % of the records due in the overlap have a pose and a reference.",
+            f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings.",
+        )
+    return grids, matched, end_s - begin_s, 0.5 * (begin_s + end_s)
+
+
+def _make_grid(
+    station: MeasuredPoses, spline: TruthSpline, period_s: float, offset_s: float, begin_s: float, end_s: float
+) -> StationGrid:
+    margin_s = 2.0 * period_s  # the refined offset must not leave the reference
+    at_s = station.measured_s - offset_s
+    known = station.valid & np.isfinite(at_s) & (at_s >= begin_s + margin_s) & (at_s <= end_s - margin_s)
+    known &= np.isfinite(station.position_m).all(axis=1) & np.isfinite(station.tracker_from_station).all(axis=1)
+    rows = np.flatnonzero(known)
+    rows = rows[spline.covers(at_s[rows] - margin_s) & spline.covers(at_s[rows] + margin_s)]
+    count = int((end_s - begin_s) / period_s) + 2
+    place = np.clip(np.round((at_s[rows] - begin_s) / period_s).astype(np.int64), 0, count - 1)
+    measured_s = begin_s + offset_s + period_s * np.arange(count)
+    position_m, turn = np.zeros((count, 3)), np.tile(rotations.IDENTITY, (count, 1))
+    filled = np.zeros(count, bool)
+    measured_s[place], position_m[place], filled[place] = station.measured_s[rows], station.position_m[rows], True
+    turn[place] = station.tracker_from_station[rows]
+    return StationGrid(period_s, measured_s, position_m, turn, filled)
+
+
+def _start(
+    grids: Mapping[str, StationGrid], splines: list[TruthSpline], offset_s: float, middle_s: float
+) -> RegistrationState:
+    """Closed-form room and mounts at the coarse offset."""
+    paired = []
+    for grid, spline in zip(grids.values(), splines, strict=True):
+        body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
+        paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
+    solved = solve_hand_eye(paired)
+    return RegistrationState(
+        middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, offset_s, 0.0,
+        solved.body_from_station, solved.mount_m,
+    )  # fmt: skip
+
+
+def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
+    deviation = np.sqrt(np.diag(fit.covariance))
+    checks = [
+        ("the room's rotation", "rad", deviation[ROOM_TURN]),
+        ("the tracker's origin", "m", deviation[ROOM_ORIGIN]),
+        ("the heading error", "rad", deviation[[HEADING]]),
+        ("the time offset of orientations", "s", deviation[[OFFSET_ORIENTATION]]),
+        ("the time offset of positions", "s", deviation[[OFFSET_POSITION]]),
+    ]
+    for s, name in enumerate(stations):
+        own = deviation[SHARED + OWN * s : SHARED + OWN * (s + 1)]
+        checks += [(f"the rotation of {name} on its body", "rad", own[:3])]
+        checks += [(f"the position of {name} on its body", "m", own[3:])]
+    for what, unit, values in checks:
+        worst = float(np.max(values))
+        if not worst <= MOST_DEVIATION[unit]:
+            raise BadInput(
+                f"Not observable from this motion: {what} (standard deviation {worst:.2g} {unit}).",
+                "Turn every body about two axes and move through the room.",
+            )
+
+
+def _result(
+    pairs: Mapping[str, str],
+    grids: Mapping[str, StationGrid],
+    fit: FittedRegistration,
+    correlation: float,
+    overlap_s: float,
+    matched: float,
+) -> Registration:
+    state, covariance, blocks = fit.state, fit.covariance, fit.blocks
+    deviation = np.sqrt(np.diag(covariance))
+
+    def measured(value: float, index: int, unit: float = 1.0) -> Measured:
+        return Measured.normal(unit * value, unit * float(deviation[index]), blocks)
+
+    both = [OFFSET_ORIENTATION, OFFSET_POSITION]
+    apart = float(np.sqrt(np.array([1.0, -1.0]) @ covariance[np.ix_(both, both)] @ np.array([1.0, -1.0])))
+    values = {
+        "time_offset_orientation_s": measured(state.offset_orientation_s, OFFSET_ORIENTATION),
+        "time_offset_position_s": measured(state.offset_position_s, OFFSET_POSITION),
+        "position_ahead_s": Measured.normal(state.offset_orientation_s - state.offset_position_s, apart, blocks),
+        "clock_ratio_ppm": measured(state.clock_ratio, CLOCK, 1e6),
+        "scale": measured(state.scale, SCALE),
+        "heading_rad": measured(state.heading_rad, HEADING),
+        **{
+            f"tracker_origin_m.{axis}": measured(float(state.tracker_origin_m[axis]), ROOM_ORIGIN.start + axis)
+            for axis in range(3)
+        },
+    }
+    mounts, errors = {}, {}
+    for s, (station, body) in enumerate(pairs.items()):
+        own = slice(SHARED + OWN * s, SHARED + OWN * (s + 1))
+        mounts[station] = MountFit(
+            station, body, state.mount_m[s], state.body_from_station[s], covariance[own, own], blocks
+        )
+        grid, residual = grids[station], fit.residuals[s]
+        truth_s = state.truth_time_s(grid.measured_s, of_position=False)
+        errors[station] = StationErrors(
+            truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
+        )
+    room = slice(0, ROOM_ORIGIN.stop)
+    return Registration(
+        values, mounts, errors, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
+        covariance[room, room], state, correlation, overlap_s, matched, blocks,
+    )  # fmt: skip
+
+
+def _vector(measured: Floats, nominal: Floats) -> Floats:
+    """Rotation vector (3,) of a left factor that takes the nominal rotation to the measured one [rad]."""
+    return rotations.log(rotations.multiply(measured, rotations.inverse(nominal)))
+
+
+def _turns(measured: Floats, nominal: Floats, covariance: Floats, blocks: int) -> tuple[Measured, Measured, Measured]:
+    vector, deviation = _vector(measured, nominal), np.sqrt(np.diag(covariance))
+    x, y, z = (Measured.normal(float(value), float(one), blocks) for value, one in zip(vector, deviation, strict=True))
+    return x, y, z
+
+
+def _length(vector: Floats, covariance: Floats, blocks: int) -> Measured:
+    """Length of a vector (3,) with an interval for three errors: the quantile of chi with three degrees of freedom."""
+    length = float(np.linalg.norm(vector))
+    largest = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    along = vector / length if length > 0.0 else np.zeros(3)
+    deviation = float(np.sqrt(along @ covariance @ along)) if length > 3.0 * largest else largest
+    return Measured.normal(length, deviation * _CHI_QUANTILE / NORMAL_QUANTILE, blocks, least=0.0)
+
+
+_CHI_QUANTILE = 2.795483482915108
+"""95 % quantile of the length of a vector of three standard normal numbers."""
+
+
+def _cross_matrix(vector: Floats) -> Floats:
+    """Matrix (3, 3) that gives the change of R v by a small rotation of R^-1 on its left, v = vector."""
+    x, y, z = vector
+    out: Floats = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return out

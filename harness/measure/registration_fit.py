@@ -1,0 +1,212 @@
+"""Robust fit of the registration model to the records of all stations, with its covariance.
+
+The fit alternates three steps: readings that do not agree are left out, the noise of each station is fitted to what
+remains, and generalised least squares gives the parameters. The covariance is that of the fitted noise; where blocks of
+time longer than five correlation times scatter more than it says, it is enlarged.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.runs import find_runs
+from harness.measure.correlated_errors import ErrorProcess, fit_process
+from harness.measure.pose_series import TruthSpline
+from harness.measure.registration_model import OWN, SHARED, RegistrationState, linearise
+
+OUTLIER = 4.0
+"""Residuals larger than this many robust deviations are left out."""
+BLOCK_CORRELATIONS = 5.0
+"""Shortest block of the covariance, in correlation times."""
+_AXES = ((0, 1, 2), (3, 4), (5,))
+"""Axes of a reading with one noise: position, pitch and roll, yaw."""
+_CHI_MEDIAN = 1.538
+"""Median length of a vector of three standard normal numbers."""
+_LONG_S, _AROUND_S = 0.4, 0.3
+"""A run of outliers of this length is an excursion, whose ends are hidden in noise for this time [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StationGrid:
+    """Readings of one station on a uniform grid of N places."""
+
+    period_s: float
+    measured_s: Floats
+    """(N,) device time [s]; the grid's own time where no record came."""
+    position_m: Floats
+    """(N, 3); zero where not known."""
+    turn: Floats
+    """(N, 4) `tracker_from_station`; identity where not known."""
+    known: Bools
+    """(N,) whether there is a reading, and the reference at its time."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRegistration:
+    """Parameters, their covariance, and what remains of the readings."""
+
+    state: RegistrationState
+    covariance: Floats
+    """(11 + 6 S, 11 + 6 S) of the steps of `RegistrationState.moved`."""
+    blocks: int
+    """Number of blocks of time that the covariance rests on."""
+    residuals: tuple[Floats, ...]
+    """(N, 6) for each station: position [m] and rotation vector [rad]."""
+    used: tuple[Bools, ...]
+    """(N, 2) for each station: whether position and orientation were used."""
+    noise: tuple[tuple[ErrorProcess, ErrorProcess, ErrorProcess], ...]
+    """Position, pitch and roll, and yaw of each station."""
+
+
+def fit_registration(
+    grids: Sequence[StationGrid], truths: Sequence[TruthSpline], start: RegistrationState, fixed: Sequence[int] = ()
+) -> FittedRegistration:
+    """Fit all parameters of S stations but those `fixed`, from a start within some degrees and tenths of a second."""
+    state = _fit_loosely(grids, truths, start, fixed)
+    for _ in range(2):
+        residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
+        used = [_agreeing(r, g) for r, g in zip(residuals, grids, strict=True)]
+        noise = [_fit_noise(r, u, g.period_s) for r, u, g in zip(residuals, used, grids, strict=True)]
+        for _ in range(3):
+            step, information, meat, blocks = _whitened_step(state, grids, truths, used, noise, fixed)
+            state = state.moved(step)
+    covariance = _covariance(information, meat, blocks, fixed)
+    residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
+    return FittedRegistration(state, covariance, blocks, tuple(residuals), tuple(used), tuple(noise))
+
+
+def _linear(
+    state: RegistrationState, s: int, grids: Sequence[StationGrid], truths: Sequence[TruthSpline]
+) -> tuple[Floats, Floats]:
+    """Residuals (N, 6) and slopes (N, 6, 17) of one station; zero where nothing is known."""
+    grid, truth = grids[s], truths[s]
+    rows = grid.known
+    one = linearise(state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth)
+    residual, slope = np.zeros((len(rows), 6)), np.zeros((len(rows), 6, SHARED + OWN))
+    residual[rows], slope[rows] = one.residual, one.slope
+    return residual, slope
+
+
+def _columns(s: int) -> list[int]:
+    """Places of the parameters of one station among all."""
+    return [*range(SHARED), *range(SHARED + OWN * s, SHARED + OWN * (s + 1))]
+
+
+def _fit_loosely(
+    grids: Sequence[StationGrid], truths: Sequence[TruthSpline], state: RegistrationState, fixed: Sequence[int]
+) -> RegistrationState:
+    """Iteratively reweighted least squares with Tukey's weights, as if all records were independent."""
+    size = SHARED + OWN * len(grids)
+    for _ in range(12):
+        information, score = np.zeros((size, size)), np.zeros(size)
+        for s, grid in enumerate(grids):
+            residual, slope = _linear(state, s, grids, truths)
+            for part in (slice(0, 3), slice(3, 6)):
+                length = np.linalg.norm(residual[:, part], axis=1)
+                deviation = max(float(np.median(length[grid.known])) / _CHI_MEDIAN, 1e-9)
+                share = np.minimum(length / (6.0 * deviation), 1.0)
+                weight = np.where(grid.known, (1.0 - share**2) ** 2, 0.0) / deviation**2
+                rows = slope[:, part].reshape(-1, SHARED + OWN)
+                weighted = rows * np.repeat(weight, 3)[:, None]
+                place = np.ix_(_columns(s), _columns(s))
+                information[place] += weighted.T @ rows
+                score[_columns(s)] += weighted.T @ residual[:, part].reshape(-1)
+        step = _solve(information, score, fixed)
+        state = state.moved(step)
+        if np.abs(step).max() < 1e-7:
+            break
+    return state
+
+
+def _agreeing(residual: Floats, grid: StationGrid) -> Bools:
+    """(N, 2) whether position and orientation agree with the model."""
+    out = np.zeros((len(residual), 2), bool)
+    for column, part in enumerate((slice(0, 3), slice(3, 6))):
+        length = np.linalg.norm(residual[:, part], axis=1)
+        deviation = float(np.median(length[grid.known])) / _CHI_MEDIAN
+        outlying = grid.known & (length > OUTLIER * deviation)
+        near = outlying.copy()
+        for begin, end in find_runs(_joined(outlying, grid.known)):
+            around = round(_AROUND_S / grid.period_s) if (end - begin) * grid.period_s >= _LONG_S else 1
+            near[max(begin - around, 0) : end + around] = True
+        out[:, column] = grid.known & ~near
+    return out
+
+
+def _joined(outlying: Bools, known: Bools) -> Bools:
+    """Outliers, where gaps between two of them count as well."""
+    before = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    out: Bools = outlying | (~known & (before >= 0) & outlying[np.maximum(before, 0)])
+    return out
+
+
+def _fit_noise(residual: Floats, used: Bools, period_s: float) -> tuple[ErrorProcess, ErrorProcess, ErrorProcess]:
+    place, tilt, yaw = (
+        fit_process(np.ascontiguousarray(residual[:, list(axes)]), used[:, int(axes[0] >= 3)], period_s)
+        for axes in _AXES
+    )
+    return place, tilt, yaw
+
+
+def _whitened_step(
+    state: RegistrationState,
+    grids: Sequence[StationGrid],
+    truths: Sequence[TruthSpline],
+    used: Sequence[Bools],
+    noise: Sequence[tuple[ErrorProcess, ErrorProcess, ErrorProcess]],
+    fixed: Sequence[int],
+) -> tuple[Floats, Floats, Floats, int]:
+    """One step of generalised least squares, the information, its scatter over blocks, and their number."""
+    size = SHARED + OWN * len(grids)
+    information, score, scores = np.zeros((size, size)), np.zeros(size), []
+    for s, grid in enumerate(grids):
+        residual, slope = _linear(state, s, grids, truths)
+        longest_s = max(process.correlation_s for process in noise[s])
+        block_rows = max(round(BLOCK_CORRELATIONS * min(longest_s, 2.0) / grid.period_s), 1)
+        gradient = np.zeros((len(residual), SHARED + OWN))
+        for process, axes in zip(noise[s], _AXES, strict=True):
+            valid = used[s][:, int(axes[0] >= 3)]
+            for axis in axes:
+                values = np.concatenate([slope[:, axis], residual[:, axis, None]], axis=1)
+                white = process.whiten(values, valid, grid.period_s)
+                rows, errors = white[:, :-1], white[:, -1]
+                information[np.ix_(_columns(s), _columns(s))] += rows.T @ rows
+                gradient += rows * errors[:, None]
+        score[_columns(s)] += gradient.sum(axis=0)
+        edges = np.arange(0, len(gradient), block_rows)
+        mine = np.zeros((len(edges), size))
+        mine[:, _columns(s)] = np.add.reduceat(gradient, edges, axis=0)
+        scores.append(mine)
+    blocks = min(len(mine) for mine in scores)
+    centred = np.concatenate(scores)
+    meat = centred.T @ centred * blocks / max(blocks - 1, 1)
+    return _solve(information, score, fixed), information, meat, blocks
+
+
+def _free(size: int, fixed: Sequence[int]) -> list[int]:
+    return [i for i in range(size) if i not in fixed]
+
+
+def _solve(information: Floats, score: Floats, fixed: Sequence[int]) -> Floats:
+    """Solution of the normal equations; parameters without information, and fixed ones, do not move."""
+    free = _free(len(score), fixed)
+    out = np.zeros(len(score))
+    scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
+    scaled = information[np.ix_(free, free)] / scale[:, None] / scale
+    out[free] = np.linalg.lstsq(scaled, score[free] / scale, rcond=1e-12)[0] / scale
+    return out
+
+
+def _covariance(information: Floats, meat: Floats, blocks: int, fixed: Sequence[int]) -> Floats:
+    """Inverse of the information, enlarged where blocks scatter more; fixed parameters have none."""
+    free = _free(len(information), fixed)
+    inside = np.ix_(free, free)
+    scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
+    inverse = np.linalg.pinv(information[inside] / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
+    sandwich = inverse @ meat[inside] @ inverse
+    factor = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
+    out = np.zeros_like(information)
+    out[inside] = inverse * factor[:, None] * factor
+    return out

@@ -1,0 +1,188 @@
+"""Guided capture of a device: stretches with an instruction each, marked in the recording.
+
+A stretch begins when the person is ready and the stations rest or move as it needs. The recording is only appended to.
+A capture that was stopped goes on where it stopped: whole stretches are kept, one that was cut is recorded again.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.errors import BadFile
+from harness.stream.driver import DriverConfig, Tracker, open_tracker
+from harness.stream.event_counter import EventCounter
+from harness.stream.frame import TrackerFrame
+from harness.stream.recording.recording import RecordingWriter, read_recording
+
+WATCHED_S = 2.0
+"""Time over which the stations are watched for rest and motion [s]."""
+_REST_M, _REST_RAD = 0.06, float(np.deg2rad(3.0))
+"""Largest change of the median pose from one half of that time to the other at rest; excursions stay below it."""
+_FEWEST_FRAMES = 8
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One stretch of a guided capture."""
+
+    name: str
+    seconds: float
+    instruction: str
+    """What the person is asked to do."""
+    at_rest: bool
+    """Whether the stations rest in it; otherwise it begins with their motion."""
+
+
+def finished_stretches(path: Path) -> set[str]:
+    """Names of the stretches that a recording has in full; empty without a file. BadFile for another file."""
+    if not path.exists():
+        return set()
+    marks = read_recording(path).marks
+    return {
+        str(begin["stretch"])
+        for begin, end in pairwise(marks)
+        if begin.get("stretch") and end.get("stretch") == "" and end.get("finished") == begin["stretch"]
+    }
+
+
+def capture_stretches(
+    port: str,
+    config: DriverConfig,
+    path: Path,
+    stretches: Sequence[Stretch],
+    note: dict[str, object],
+    *,
+    ready: Callable[[], bool],
+    log: Callable[[str], None] = lambda line: None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> None:
+    """Record the stretches that the file at `path` does not have yet.
+
+    `ready` waits for the person, in a thread of its own, and returns False to stop. Records keep coming meanwhile.
+    Raises BadInput without a device, and BadFile for a file that cannot be continued or where the capture is stopped.
+    KeyboardInterrupt leaves a recording that can be continued.
+    """
+    done = finished_stretches(path)
+    missing = [stretch for stretch in stretches if stretch.name not in done]
+    for stretch in stretches:
+        if stretch.name in done:
+            log(f"{stretch.name}: recorded already")
+    if not missing:
+        return
+    events = EventCounter(log)
+    with (
+        RecordingWriter(path, note) as writer,
+        open_tracker(port, config, observer=writer, on_event=events) as device,
+        closing(_frames(device)) as frames,
+    ):
+        log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")
+        writer.on_mark({"stretch": ""})  # ends one that was cut
+        for stretch in missing:
+            _record_stretch(frames, device, writer, stretch, ready, log, progress)
+        progress("")
+
+
+def _frames(device: Tracker) -> Generator[TrackerFrame, None, None]:
+    yield from device
+
+
+def _record_stretch(
+    frames: Iterator[TrackerFrame],
+    device: Tracker,
+    writer: RecordingWriter,
+    stretch: Stretch,
+    ready: Callable[[], bool],
+    log: Callable[[str], None],
+    progress: Callable[[str], None],
+) -> None:
+    log(f"{stretch.name}, {_duration_text(stretch.seconds)}: {stretch.instruction}")
+    for frame in _until_ready(frames, ready, writer.path):
+        progress(f"{stretch.name}: waiting ({_tracked_text(frame)})")
+    watch = _RestWatch()
+    for frame in frames:
+        watch.add(frame)
+        moving = watch.moving(device.stations)
+        if moving is not None and bool(moving) != stretch.at_rest:
+            break
+        hint = f"{', '.join(moving)} move" if moving else "move the stations"
+        progress(f"{stretch.name}: waiting ({hint if moving is not None else _tracked_text(frame)})")
+    writer.on_mark({"stretch": stretch.name, "seconds": stretch.seconds})
+    began_s: float | None = None
+    for frame in frames:
+        began_s = frame.received_s if began_s is None else began_s
+        left_s = stretch.seconds - (frame.received_s - began_s)
+        if left_s <= 0.0:
+            break
+        progress(f"{stretch.name}: {left_s:.0f} s left ({_tracked_text(frame)})")
+    writer.on_mark({"stretch": "", "finished": stretch.name})
+    log(f"{stretch.name}: recorded")
+
+
+def _until_ready(frames: Iterable[TrackerFrame], ready: Callable[[], bool], path: Path) -> Iterator[TrackerFrame]:
+    """Yield the frames that come until the person is ready; BadFile when the person ends the capture."""
+    answers: list[bool] = []
+    waiting = threading.Thread(target=lambda: answers.append(ready()), daemon=True)
+    waiting.start()
+    for frame in frames:
+        yield frame
+        if not waiting.is_alive():
+            break
+    if answers == [False]:
+        raise BadFile(path, "an unfinished capture", "all stretches", "Give the same command to go on with it.")
+
+
+class _RestWatch:
+    """Tells from the latest frames which stations move."""
+
+    def __init__(self) -> None:
+        self._recent: deque[TrackerFrame] = deque()
+
+    def add(self, frame: TrackerFrame) -> None:
+        self._recent.append(frame)
+        while frame.received_s - self._recent[0].received_s > WATCHED_S:
+            self._recent.popleft()
+
+    def moving(self, stations: Sequence[str]) -> list[str] | None:
+        """Stations whose pose changes; None while there are too few frames to tell."""
+        frames = list(self._recent)
+        if len(frames) < _FEWEST_FRAMES or frames[-1].received_s - frames[0].received_s < 0.9 * WATCHED_S:
+            return None
+        place = np.array([frame.position_m for frame in frames])
+        turn = np.array([frame.tracker_from_station for frame in frames])
+        half = len(frames) // 2
+        return [
+            name
+            for row, name in enumerate(stations)
+            if _changes(place[:half, row], turn[:half, row], place[half:, row], turn[half:, row])
+        ]
+
+
+def _changes(place_m: Floats, turn: Floats, later_m: Floats, later_turn: Floats) -> bool:
+    """Whether the median pose of later readings differs; a station that is lost does not move."""
+    poses = [
+        (values[np.isfinite(values[:, 0])], angles[np.isfinite(angles[:, 0])])
+        for values, angles in ((place_m, turn), (later_m, later_turn))
+    ]
+    if any(len(values) < 2 or len(angles) < 2 for values, angles in poses):
+        return False
+    (first_m, first), (second_m, second) = poses
+    step_m = float(np.linalg.norm(np.median(second_m, axis=0) - np.median(first_m, axis=0)))
+    angle = rotations.angle_between_rad(first[len(first) // 2], second[len(second) // 2])
+    return step_m > _REST_M or float(angle) > _REST_RAD
+
+
+def _duration_text(seconds: float) -> str:
+    return f"{seconds / 60.0:.3g} min" if seconds >= 120.0 else f"{seconds:.3g} s"
+
+
+def _tracked_text(frame: TrackerFrame) -> str:
+    tracked = int((frame.position_valid | frame.orientation_valid).sum())
+    return f"{tracked} of {len(frame.quality)} stations tracked"
