@@ -36,6 +36,7 @@ from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
 from harness.commands.table import add_table
 from harness.commands.trust import add_trust
+from harness.commands.validate import add_validate
 from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
@@ -60,7 +61,16 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
         add_paper,
     ),
     "if you place sensors": (add_placement,),
-    "if you have a device": (add_emulate, add_record, add_replay, add_calibrate, add_live, add_characterize, add_trust),
+    "if you have a device": (
+        add_emulate,
+        add_record,
+        add_replay,
+        add_calibrate,
+        add_live,
+        add_characterize,
+        add_validate,
+        add_trust,
+    ),
 }
 
 

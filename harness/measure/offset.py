@@ -77,7 +77,7 @@ def time_offset(
     length_a = max(len(_padded(a, origin_a)) for a in first)
     length_b = max(len(_padded(b, origin_b)) for b in second)
     total = np.zeros((3, length_a + length_b - 1))
-    for (a, b), sums in zip(zip(first, second, strict=True), lags, strict=True):
+    for b, sums in zip(second, lags, strict=True):
         begin = length_b - len(_padded(b, origin_b))
         total[:, begin : begin + sums.shape[1]] += sums
     overlap_s = total[2] * period_s / len(first)

@@ -76,6 +76,7 @@ _NAMES: Mapping[str, Quantity] = {
     "heading_rad": Quantity("heading error", *_DEG),
     "latency_s": Quantity("latency", *_MS),
     "mount_turn_rad": Quantity("turn of the station against its mount", *_DEG),
+    "mount_shift_m": Quantity("distance of the station from its mount", *_MM),
     "station.spread_m": Quantity("spread of the position", *_MM),
     "station.spread_rad": Quantity("spread of the orientation", *_DEG),
     "station.white_m": Quantity("white noise", *_MM),

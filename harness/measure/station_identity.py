@@ -1,0 +1,66 @@
+"""Which station is on which body, from their angular speeds, which no mount and no room changes."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
+
+LEAST_GAIN = 0.1
+"""Least gain in the mean correlation of the stations concerned with which an exchange is believed [choice]."""
+_FEWEST_STEPS = 20
+
+
+def identify_stations(
+    stations: Mapping[str, MeasuredPoses], truths: Mapping[str, TruthPoses], stated: Mapping[str, str]
+) -> dict[str, str]:
+    """The body of each station: the stated one, unless another assignment correlates clearly better.
+
+    The assignment has the largest sum of correlations between the angular speed of a station and that of a body
+    (Kuhn 1955). Bodies that no station is stated to be on are not considered.
+    """
+    from scipy import optimize
+
+    from harness.measure.registration import coarse_offset, record_period_s
+
+    names, bodies = list(stations), list(dict.fromkeys(stated[name] for name in stations))
+    if len(names) < 2 or len(bodies) < len(names):
+        return dict(stated)
+    splines = {body: TruthSpline(truths[body]) for body in bodies}
+    period_s = record_period_s(stations)
+    offset_s = coarse_offset(stations, {name: splines[stated[name]] for name in names}, period_s, 10.0).offset_s
+    correlation = np.array([_correlations(stations[name], splines, offset_s) for name in names])
+    rows, columns = optimize.linear_sum_assignment(-correlation)
+    own = [bodies.index(stated[name]) for name in names]
+    changed = columns != np.array(own)
+    gain = correlation[rows, columns][changed] - correlation[rows, own][changed]
+    if not changed.any() or gain.mean() < LEAST_GAIN:
+        return dict(stated)
+    return {name: bodies[column] for name, column in zip(names, columns, strict=True)}
+
+
+def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], offset_s: float) -> list[float]:
+    """Correlation of the station's angular speed with that of each body; 0 with too little in common."""
+    known = station.valid & np.isfinite(station.measured_s)
+    time_s, turn = station.measured_s[known], station.tracker_from_station[known]
+    lag = 4
+    middle_s, step_s = 0.5 * (time_s[lag:] + time_s[:-lag]) - offset_s, time_s[lag:] - time_s[:-lag]
+    measured = _angle(turn[:-lag], turn[lag:]) / np.maximum(step_s, 1e-6)
+    usable = (step_s > 0.0) & (step_s < 3.0 * np.median(step_s))
+    out = []
+    for spline in splines.values():
+        rows = usable & spline.covers(middle_s - step_s) & spline.covers(middle_s + step_s)
+        if rows.sum() < _FEWEST_STEPS:
+            out.append(0.0)
+            continue
+        before, after = (spline.poses(middle_s[rows] + sign * 0.5 * step_s[rows])[1] for sign in (-1.0, 1.0))
+        expected = _angle(before, after) / step_s[rows]
+        pair = np.corrcoef(measured[rows], expected)[0, 1]
+        out.append(float(pair) if np.isfinite(pair) else 0.0)
+    return out
+
+
+def _angle(first: Floats, second: Floats) -> Floats:
+    out: Floats = 2.0 * np.arccos(np.clip(np.abs(np.sum(first * second, axis=1)), 0.0, 1.0))
+    return out

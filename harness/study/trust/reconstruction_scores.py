@@ -1,0 +1,101 @@
+"""Reconstruction from a registered capture: methods run on its frames and are scored against the reference."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.calibrate.calibration_file import CalibrationFile
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.progress import ProgressCallback
+from harness.errors import BadInput
+from harness.experiment.isolation import DEFAULT_ISOLATION
+from harness.experiment.remote_method import resolve_method
+from harness.measure.registration import Registration
+from harness.score.score import WARM_UP_S, score_estimate
+from harness.simulate.trajectory import Trajectory
+from harness.stream.frame import TrackerFrame
+from harness.stream.recording.replay import RecordingStream
+from harness.study.trust.validation import Validation
+
+SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
+
+
+@dataclass(frozen=True)
+class RegisteredScore:
+    """One metric of one method."""
+
+    method: str
+    metric: str
+    value: float | None
+    """Mean over the frames, in the metric's unit; None if it was not measured."""
+
+
+def measured_calibration(registration: Registration) -> Calibration:
+    """Mounts and room as the registration found them, for methods."""
+    mounts = registration.mounts.values()
+    return Calibration(
+        kind="registered",
+        stations=tuple(mount.station for mount in mounts),
+        bones=tuple(mount.body for mount in mounts),
+        mount_m=np.array([mount.position_m for mount in mounts]),
+        bone_from_station=np.array([mount.body_from_station for mount in mounts]),
+        world_from_tracker=registration.world_from_tracker,
+        tracker_origin_m=registration.tracker_origin_m,
+    )
+
+
+def score_registered(
+    path: Path,
+    found: Validation,
+    methods: Sequence[str],
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> list[RegisteredScore]:
+    """Run methods on the frames of a capture with the registered calibration, and score them on the performer's body.
+
+    A frame's true pose is that of the reference at the frame's mean time. Frames outside the reference, and those of
+    the first second, are not scored. BadInput where the reference has no performer or no frame is inside it.
+    """
+    playback = found.truth.playback
+    if playback is None:
+        raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
+    frames = list(RecordingStream(path))
+    time_s = _truth_times_s(frames, found.registration)
+    trajectory = Trajectory(playback.body, playback.take)
+    rows = np.flatnonzero((time_s >= 0.0) & (time_s <= trajectory.duration_s))
+    if len(rows) < 2.0 * WARM_UP_S * found.reader.wire.rate_hz:
+        raise BadInput(f"{len(rows)} frames lie inside the reference.", "Record the motion of the reference.")
+    truth_qpos = trajectory.qpos(time_s[rows])
+    kept = CalibrationFile(measured_calibration(found.registration), None)
+    calibrated = playback.with_calibration(kept)
+    out = []
+    for done, name in enumerate(methods):
+        progress(f"reconstructing with {name}", done, len(methods))
+        fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
+        session = fitted.begin(calibrated.calibration)
+        estimates = [session.step(frames[row]) for row in rows.tolist()]
+        lag = max((estimate.lag for estimate in estimates), default=0)
+        scores = score_estimate(
+            playback.body.skeleton,
+            found.reader.wire.rate_hz,
+            truth_qpos,
+            np.array([estimate.qpos for estimate in estimates])[lag:],
+            np.arange(len(rows) - lag),
+            np.array([int(estimate.status) for estimate in estimates])[lag:],
+            np.full(len(rows) - lag, np.nan),
+        )
+        for metric in SCORED_METRICS:
+            value = scores.metrics.get(metric)
+            out.append(RegisteredScore(name, metric, value if value is not None and np.isfinite(value) else None))
+    return out
+
+
+def _truth_times_s(frames: Sequence[TrackerFrame], registration: Registration) -> Floats:
+    """(F,) mean time of each frame by the reference's clock [s]; NaN without stamps."""
+    stamps_s = np.array([frame.measured_s for frame in frames])
+    counted = np.isfinite(stamps_s)
+    mean_s = np.where(counted, stamps_s, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
+    out = registration.state.truth_time_s(mean_s, of_position=False)
+    return np.where(counted.any(axis=1), out, np.nan)

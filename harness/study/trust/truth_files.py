@@ -1,0 +1,182 @@
+"""References from files: markers in C3D, trajectories in TUM and CSV, and motion of a skeleton.
+
+- C3D: three or more markers for each station. A label is the station's name, a separator (`_`, `-`, `.` or none) and a
+  number or a letter: `head_1`, `head1`, `HEAD-A`. Capital and small letters are the same.
+- TUM: a file for each station, NAME.tum in a folder, or one file for a capture of one station. A line is
+  `time x y z qx qy qz qw`; `#` begins a comment.
+- CSV: columns time_s, station, x_m, y_m, z_m, qw, qx, qy, qz, in any order; others are ignored.
+"""
+
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.input_file import MEGABYTE, read_input_file
+from harness.errors import BadFile
+from harness.measure.pose_series import TruthPoses
+from harness.mocap.read.c3d import MarkerClip, read_c3d
+from harness.study.trust.truth_motion import TruthMotion, common_names
+
+FEWEST_MARKERS = 3
+MAX_TEXT_BYTES = 512 * MEGABYTE
+CSV_COLUMNS = ("time_s", "station", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_LABEL_END = re.compile(r"[\s_.\-:]*(?:\d+|[A-Za-z])$")
+_UNIT_TOLERANCE = 1e-2
+_LEAST_SPREAD_M = 0.005
+"""Least distance of the markers of a body from their common line [m]."""
+
+
+def read_truth_file(path: Path, stations: Sequence[str]) -> TruthMotion:
+    """Read a reference for these stations; BadFile that names the place, BadInput for bodies that it lacks."""
+    suffix = path.suffix.lower()
+    if suffix == ".c3d":
+        return truth_of_markers(path, read_c3d(path), stations)
+    bodies = read_tum(path, stations) if path.is_dir() or suffix == ".tum" else read_csv(path)
+    return TruthMotion(f"the trajectories of {path.name}", bodies, common_names(stations, bodies))
+
+
+def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -> TruthMotion:
+    """Bodies of markers, one for each station: the pose of the mean shape that fits best in each frame.
+
+    BadFile where a station has fewer than three markers, or where they lie on one line.
+    """
+    time_s = np.arange(len(markers)) / markers.rate_hz
+    bodies, notes = {}, []
+    for station in stations:
+        rows = [row for row, label in enumerate(markers.labels) if _is_marker_of(label, station)]
+        if len(rows) < FEWEST_MARKERS:
+            found = f"{len(rows)} marker(s) of station {station!r} among {', '.join(markers.labels[:12])}"
+            raise BadFile(path, found, "three or more", f"Label them {station}_1, {station}_2, {station}_3.")
+        place, turn, residual_m = fit_rigid_body(path, station, markers.position_m[:, rows])
+        bodies[station] = TruthPoses(time_s, place, turn)
+        notes.append(f"The {len(rows)} markers of {station} fit one rigid body to {1e3 * residual_m:.2g} mm (RMS).")
+    return TruthMotion(
+        f"the markers of {path.name}, {time_s[-1]:.1f} s", bodies, common_names(stations, bodies), notes=tuple(notes)
+    )
+
+
+def fit_rigid_body(path: Path, station: str, position_m: Floats) -> tuple[Floats, Floats, float]:
+    """Positions (T, 3), orientations (T, 4) and RMS residual [m] of the rigid body of markers (T, M, 3).
+
+    The shape is the mean of the frames with all markers, each turned onto the first of them; the body's axes are those
+    of the world there. Each frame with three markers or more is fitted by Kabsch 1976. Others are NaN.
+    """
+    whole = np.flatnonzero(np.isfinite(position_m[..., 0]).all(axis=1))
+    if not len(whole):
+        raise BadFile(path, f"no frame with all markers of {station!r}", "one at least", "Look at the marker set.")
+    shape = position_m[whole[0]] - position_m[whole[0]].mean(axis=0)
+    if np.linalg.svd(shape)[1][1] < _LEAST_SPREAD_M:
+        raise BadFile(path, f"markers of {station!r} on one line", "three that span a plane", "Move one of them.")
+    for _ in range(2):
+        turned = []
+        for frame in whole[:: max(len(whole) // 200, 1)]:
+            centred = position_m[frame] - position_m[frame].mean(axis=0)
+            turned.append(centred @ _best_rotation(shape, centred))
+        shape = np.mean(turned, axis=0)
+    place, turn = np.full((len(position_m), 3), np.nan), np.full((len(position_m), 4), np.nan)
+    squared, count = 0.0, 0
+    for frame, points_m in enumerate(position_m):
+        seen = np.isfinite(points_m[:, 0])
+        if seen.sum() < FEWEST_MARKERS or np.linalg.svd(shape[seen] - shape[seen].mean(axis=0))[1][1] < _LEAST_SPREAD_M:
+            continue
+        middle, centre = points_m[seen].mean(axis=0), shape[seen].mean(axis=0)
+        matrix = _best_rotation(shape[seen] - centre, points_m[seen] - middle)
+        place[frame], turn[frame] = middle - matrix @ centre, rotations.from_matrix(matrix)
+        squared += float(np.sum((points_m[seen] - place[frame] - shape[seen] @ matrix.T) ** 2))
+        count += int(seen.sum())
+    return place, rotations.continuous(turn), float(np.sqrt(squared / max(count, 1)))
+
+
+def read_tum(path: Path, stations: Sequence[str]) -> dict[str, TruthPoses]:
+    """Trajectories of a folder with NAME.tum for each station, or of one file for one station. BadFile."""
+    if not path.is_dir():
+        if len(stations) != 1:
+            found = f"one trajectory for {len(stations)} stations"
+            raise BadFile(path, found, "a folder with NAME.tum for each station", "Name the folder.")
+        return {stations[0]: _read_tum_file(path)}
+    return {name: _read_tum_file(path / f"{name}.tum") for name in stations}
+
+
+def _read_tum_file(path: Path) -> TruthPoses:
+    text = _read_text(path, "a TUM trajectory: time x y z qx qy qz qw")
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            rows.append(_numbers(path, number, line.split(), 8))
+    table = np.array(rows).reshape(-1, 8)
+    return _poses(path, table[:, 0], table[:, 1:4], table[:, [7, 4, 5, 6]])
+
+
+def read_csv(path: Path) -> dict[str, TruthPoses]:
+    """Trajectories of a table with the columns `CSV_COLUMNS`, station by station. BadFile."""
+    expected = f"a table with the columns {', '.join(CSV_COLUMNS)}"
+    text = _read_text(path, expected)
+    reader = csv.reader(text.splitlines())
+    head = [name.strip() for name in next(reader, [])]
+    missing = [name for name in CSV_COLUMNS if name not in head]
+    if missing:
+        raise BadFile(path, f"no column {missing[0]}", expected, "`harness replay --csv` writes such a table.")
+    place = [head.index(name) for name in CSV_COLUMNS]
+    rows: dict[str, list[list[float]]] = {}
+    for number, row in enumerate(reader, 2):
+        if not row:
+            continue
+        if len(row) < len(head):
+            raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "")
+        values = [row[column].strip() for column in place]
+        numbers = ["nan" if value == "" else value for value in (values[0], *values[2:])]
+        rows.setdefault(values[1], []).append(_numbers(path, number, numbers, 8))
+    bodies = {}
+    for name, values_of in rows.items():
+        table = np.array(values_of)
+        bodies[name] = _poses(path, table[:, 0], table[:, 1:4], table[:, 4:])
+    return bodies
+
+
+def _read_text(path: Path, expected: str) -> str:
+    data = read_input_file(path, expected, MAX_TEXT_BYTES)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadFile(path, "bytes that are no text", expected, "Is it the right file?") from error
+
+
+def _numbers(path: Path, line: int, words: Sequence[str], count: int) -> list[float]:
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise BadFile(path, f"line {line} has no {count} numbers", "a trajectory", "Look at that line.")
+    return values
+
+
+def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -> TruthPoses:
+    """Poses in the order of time; BadFile for quaternions of another length and for times that are not numbers."""
+    if not len(time_s) or not np.isfinite(time_s).all():
+        raise BadFile(path, "no times, or one that is no number", "a trajectory", "Look at its first column.")
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.sqrt(np.sum(quaternion**2, axis=1))
+    if np.any(np.abs(length[np.isfinite(length)] - 1.0) > _UNIT_TOLERANCE) or np.isinf(position_m).any():
+        raise BadFile(
+            path, "a quaternion that is not of length 1", "unit quaternions", "Is the order of columns right?"
+        )
+    _, rows = np.unique(time_s, return_index=True)
+    return TruthPoses(time_s[rows], position_m[rows], quaternion[rows] / length[rows, None])
+
+
+def _is_marker_of(label: str, station: str) -> bool:
+    return _LABEL_END.sub("", label.strip()).lower() == station.lower()
+
+
+def _best_rotation(shape: Floats, points: Floats) -> Floats:
+    """The rotation matrix (3, 3) that turns a centred shape (M, 3) onto centred points (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd(points.T @ shape)
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    out: Floats = u @ sign @ vt
+    return out

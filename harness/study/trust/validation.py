@@ -1,0 +1,258 @@
+"""Validation of a capture against a reference: registration, accuracy, latency, and departures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.progress import ProgressCallback
+from harness.errors import BadInput
+from harness.experiment.score_recording import find_playback
+from harness.measure.accuracy import ErrorQuantiles, error_quantiles
+from harness.measure.departures import Departure, compare_with_expected
+from harness.measure.measured import Measured
+from harness.measure.pose_series import MeasuredPoses
+from harness.measure.registration import Registration, record_period_s, register, require_stamps
+from harness.measure.station_identity import identify_stations
+from harness.measure.unit_file import UnitFile
+from harness.mocap.library import LibraryFolders
+from harness.stream.codec.items import BITS_PER_BYTE, record_size
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.replay import RecordingStream
+from harness.stream.recording.station_readings import CaptureReader, StationReadings
+from harness.study.trust.expected_values import preset_components, preset_values
+from harness.study.trust.named_departures import NamedDeparture, correct_departures
+from harness.study.trust.truth_files import read_truth_file
+from harness.study.trust.truth_motion import (
+    TruthMotion,
+    measured_poses,
+    read_stations,
+    truth_of_capture,
+    truth_of_playback,
+)
+
+SESSION_KEYS = ("scale", "heading_rad", "latency_s")
+"""Numbers that hold for a session of the device; a unit file keeps them in [session]."""
+_DEFAULT_LATENCY_S, _DEFAULT_BAUD = 0.004, 115200
+"""Latency and baud rate of the simulated tracker (`simulate.link.TrackerConfig`)."""
+_NO_HOST_CLOCK = "The reference does not have the clock of the host that recorded the capture."
+
+
+@dataclass(frozen=True)
+class StationResult:
+    """Errors of one station after the registration."""
+
+    position: ErrorQuantiles
+    orientation: ErrorQuantiles
+    readings: int
+    lost_share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """What a reference shows of a capture."""
+
+    reader: CaptureReader
+    truth: TruthMotion
+    registration: Registration
+    exchanged: Mapping[str, str]
+    """Station -> body that carries it, where that is not the stated one."""
+    numbers: Mapping[str, Measured]
+    """Time offsets, clock, scale, heading, latency, by key."""
+    stations: Mapping[str, StationResult]
+    checks: tuple[NamedDeparture, ...]
+    expected_from: str
+    duration_s: float
+    records: int
+
+    @property
+    def named(self) -> tuple[NamedDeparture, ...]:
+        """The departures that are significant after the correction."""
+        return tuple(check for check in self.checks if check.is_named)
+
+
+def load_truth(
+    capture: Path,
+    truth: str,
+    *,
+    scenario: str | None = None,
+    folder: LibraryFolders | None = None,
+) -> TruthMotion:
+    """The reference that `truth` names: a capture, a C3D, TUM or CSV file, or a clip of the capture's scenario.
+
+    BadFile, BadInput and UnknownName that name what is missing.
+    """
+    path = Path(truth)
+    stations = CaptureReader(capture).wire.stations
+    if path.is_dir() or path.suffix.lower() in (".c3d", ".tum", ".csv"):
+        return read_truth_file(path, stations)
+    if path.is_file():
+        return truth_of_capture(path, stations)
+    stream = RecordingStream(capture)
+    playback = find_playback(stream, scenario=scenario, clip=truth, folder=folder)
+    note = read_recording(capture).note
+    until_s = max(
+        (float(np.nanmax(frame.measured_s)) for frame in stream if np.isfinite(frame.measured_s).any()), default=0.0
+    )
+    return truth_of_playback(playback, until_s, host_clock=note.get("source") == "simulation")
+
+
+def validate_capture(
+    capture: Path,
+    truth: TruthMotion,
+    *,
+    expected: UnitFile | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> Validation:
+    """Register a capture with its reference and compare the result with the preset or an earlier unit file.
+
+    BadInput as `measure.registration.register`, and for a station that the reference does not carry.
+    """
+    reader = CaptureReader(capture)
+    progress("reading", 0, 3)
+    readings = read_stations(reader)
+    poses = {station: measured_poses(one) for station, one in readings.items() if station in truth.body_of}
+    if not poses:
+        raise BadInput(
+            f"No station of {capture.name} is in the reference.",
+            f"The capture has {', '.join(readings)}; the reference carries {', '.join(truth.body_of)}.",
+        )
+    progress("registration", 1, 3)
+    pairs, exchanged = _identify(poses, truth)
+    registration = register(poses, truth.bodies, pairs=pairs)
+    progress("accuracy", 2, 3)
+    numbers = {
+        "time_offset_orientation_s": registration.values["time_offset_orientation_s"],
+        "time_offset_position_s": registration.values["time_offset_position_s"],
+        "components.speed.ahead_s": registration.values["position_ahead_s"],
+        "components.clock.drift_ppm": registration.values["clock_ratio_ppm"],
+        "scale": registration.values["scale"],
+        "heading_rad": registration.values["heading_rad"],
+        "latency_s": _latency_s(readings, registration, truth),
+    }
+    period_s = record_period_s(poses)
+    stations = {}
+    for station, errors in registration.errors.items():
+        stations[station] = StationResult(
+            error_quantiles(errors.position_m, errors.valid, period_s),
+            error_quantiles(errors.rotation_rad, errors.valid, period_s),
+            int(errors.valid.sum()),
+            float(np.mean(readings[station].quality == 0.0)),
+        )
+    checks = _checks(numbers, registration, truth, pairs, expected, reader)
+    host_s = np.concatenate([one.received_s for one in readings.values()])
+    progress("", 3, 3)
+    return Validation(
+        reader,
+        truth,
+        registration,
+        exchanged,
+        numbers,
+        stations,
+        tuple(correct_departures(checks)),
+        expected.name if expected else "the preset default",
+        float(host_s.max() - host_s.min()) if len(host_s) else 0.0,
+        sum(map(len, readings.values())),
+    )
+
+
+def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFile:
+    """A unit file that also holds what the reference showed: speed error, and the session's scale and latency."""
+    wire = found.reader.wire
+    start = base or UnitFile(name, preset_components(), {"rate_hz": wire.rate_hz, "items": list(wire.items)})
+    components = {key: dict(table) for key, table in start.components.items()}
+    measured, not_measured = dict(start.measured), dict(start.not_measured)
+    for key in ("components.speed.ahead_s", "components.clock.drift_ppm"):
+        number = found.numbers[key]
+        if number.is_measured and not (key in measured and "clock" in key):  # a longer capture knows the clock better
+            _, component, field = key.split(".")
+            components[component][field] = number.value
+            measured[key] = number
+            not_measured.pop(key, None)
+    session = {key: found.numbers[key] for key in SESSION_KEYS}
+    return replace(
+        start,
+        components=components,
+        measured=measured,
+        not_measured=not_measured,
+        session={key: one for key, one in session.items() if one.is_measured},
+    )
+
+
+def _identify(poses: Mapping[str, MeasuredPoses], truth: TruthMotion) -> tuple[dict[str, str], dict[str, str]]:
+    """The body of each station, and those that are not the stated ones."""
+    require_stamps(poses)
+    stated = {station: truth.body_of[station] for station in poses}
+    found = identify_stations(poses, truth.bodies, stated)
+    return found, {station: body for station, body in found.items() if body != stated[station]}
+
+
+def _latency_s(readings: Mapping[str, StationReadings], registration: Registration, truth: TruthMotion) -> Measured:
+    """Median time from the sample to the reception of its record."""
+    if not truth.host_clock:
+        return Measured.missing(_NO_HOST_CLOCK)
+    delays = []
+    for station in registration.mounts:
+        known = np.isfinite(readings[station].measured_s)
+        at_s = registration.state.truth_time_s(readings[station].measured_s[known], of_position=False)
+        delays.append(readings[station].received_s[known] - at_s)
+    middle = float(np.median(np.concatenate(delays)))
+    offset = registration.values["time_offset_orientation_s"]
+    half = 0.5 * (offset.high - offset.low)
+    return Measured(middle, middle - half, middle + half, offset.count)
+
+
+def _checks(
+    numbers: Mapping[str, Measured],
+    registration: Registration,
+    truth: TruthMotion,
+    pairs: Mapping[str, str],
+    expected: UnitFile | None,
+    reader: CaptureReader,
+) -> list[Departure]:
+    preset = preset_components()
+    record_s = record_size(reader.wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
+    known = {
+        "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
+        "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
+        "scale": Measured.normal(0.0, preset["session"]["scale"]),
+        "heading_rad": Measured.normal(0.0, 0.0),
+        "latency_s": Measured.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
+    }
+    if expected is not None:
+        known |= {key: one for key, one in expected.measured.items() if key in known}
+        known |= {key: one for key, one in expected.session.items() if key in known}
+    checks = [
+        compare_with_expected(key, "", numbers[key], one) for key, one in known.items() if numbers[key].is_measured
+    ]
+    for station in registration.mounts:
+        if station in truth.nominal and pairs[station] == truth.body_of[station]:
+            checks += _mount_checks(registration, truth, station, preset["session"]["station_offset_m"])
+    return checks
+
+
+def _mount_checks(registration: Registration, truth: TruthMotion, station: str, offset_m: float) -> list[Departure]:
+    """Rotation and displacement of a station from its nominal mount, by chi-square with three degrees of freedom."""
+    mount, nominal = registration.mounts[station], truth.nominal[station]
+    exact = Measured(0.0, 0.0, 0.0)
+    vector = np.array([one.value for one in mount.turn_from(nominal.body_from_station)])
+    moved_m = mount.position_m - nominal.position_m
+    spread = mount.covariance[3:, 3:] + offset_m**2 * np.eye(3)  # the origin in the housing is known to a millimetre
+    return [
+        Departure(
+            "mount_turn_rad", station, mount.angle_from(nominal.body_from_station), exact,
+            _chi_square_p(vector, mount.covariance[:3, :3]),
+        ),
+        Departure(
+            "mount_shift_m", station, mount.distance_from(nominal.position_m), exact,
+            _chi_square_p(moved_m, spread),
+        ),
+    ]  # fmt: skip
+
+
+def _chi_square_p(vector: Floats, covariance: Floats) -> float:
+    from scipy import special
+
+    return float(special.chdtrc(3.0, float(vector @ np.linalg.solve(covariance, vector))))
