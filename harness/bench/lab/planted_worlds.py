@@ -85,7 +85,7 @@ def typical_scatter() -> float:
 
 
 def further_swapped_rows(seeds: Sequence[int]) -> list[TruthRow]:
-    """The same for pairs of given likeness and for two captures of each clip; without a verdict."""
+    """Swapped pairs of given likeness, with one capture of each clip or two; rows without a verdict."""
     cases = [
         ("the same method with one constant changed", CHANGED, 1),
         ("the two methods nearest to each other", RELATED, 1),
