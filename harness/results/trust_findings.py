@@ -35,7 +35,7 @@ class StreamHealth:
     """Health of one station's stream, over all clips."""
 
     rate_hz: float
-    """Frames a second."""
+    """Frames a second, with those that never arrived."""
     lost_share: float
     """Share of the frames without a usable position."""
     gaps_per_min: float

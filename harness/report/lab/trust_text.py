@@ -26,11 +26,8 @@ _WIDTH = 118
 def format_trust(report: TrustReport) -> str:
     """The text of a trust study; parts without content are left out."""
     found = report.findings
-    lines = [
-        verdict_sentence(found),
-        *([found.why] if found.why else []),
-        *([EXPLORATORY] if found.exploratory else []),
-    ]
+    lines = [EXPLORATORY] if found.exploratory else []
+    lines += [verdict_sentence(found), *([found.why] if found.why else [])]
     lines += ["", *_head(found)]
     for title, table, shrinkable in (
         (f"pairs in {metric_title(found.ranked_metric)}", pairs_table(found), (0, 8)),

@@ -124,7 +124,7 @@ def count_health(frames: Sequence[TrackerFrame], rows: Sequence[LoopFrames], rat
         read = [frames[row] for row in loop.rows]
         first, count = int(loop.index[0]), int(loop.index[-1]) + 1 - int(loop.index[0])
         received_s = read[-1].received_s - read[0].received_s
-        duration_s = received_s * len(read) / (len(read) - 1) if len(read) > 1 else len(read) / rate_hz
+        duration_s = received_s * count / (count - 1) if count > 1 else 1.0 / rate_hz
         valid = np.zeros((count, stations), dtype=bool)
         valid[loop.index - first] = [frame.position_valid for frame in read]
         suspect = np.array([frame.suspect for frame in read]).sum(axis=0)
