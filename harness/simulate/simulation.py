@@ -27,7 +27,7 @@ from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 
-__all__ = ["Simulation", "TrackerConfig", "simulate_readings", "simulate_tracker"]
+__all__ = ["Simulation", "TrackerConfig", "simulate_readings", "simulate_tracker", "transmit_readings"]
 
 WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """The tracker's axes are x forward, y right, z down (docs/is900.md 5.3): half a turn about x from the world's."""
@@ -91,7 +91,7 @@ def simulate_tracker(
     readings = simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
     if noise.physics is not None:
         apply_device_settings(readings, noise.physics.fusion)
-    sent, wire = _transmit(readings, wire_format, tracker)
+    sent, wire = transmit_readings(readings, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
     truth_s = time_s.mean(axis=1)
@@ -205,7 +205,7 @@ def _measure(
     }
 
 
-def _transmit(
+def transmit_readings(
     readings: SimulatedReadings, wire_format: WireFormat, tracker: TrackerConfig
 ) -> tuple[Bools, ByteCapture]:
     """Encode and transmit: (E*S,) which records got through the line, in sampling order, and the received bytes."""

@@ -1,0 +1,243 @@
+"""Captures with planted faults, as `harness record sim:` makes them, and what a lab's verbs have to find in each.
+
+Captures for `harness characterize` are takes of the rig at rest. Those for `harness validate` are a minute of boxing.
+Their stations are those of the scenario `lab`, and their errors those of the preset `default`, with one fault each.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from harness.body.retargeting import retarget_to_own_body
+from harness.core.fields import replace_fields
+from harness.core.motion import Clip
+from harness.core.package_data import VERSION
+from harness.core.seeds import generator
+from harness.errors import UnknownName
+from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.mocap import synthetic
+from harness.mocap.synthetic.rig import generate_rig
+from harness.simulate.components.dropout import Dropout
+from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
+from harness.simulate.trajectory import Trajectory
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.reader import WireFormat
+from harness.stream.recording.recording import record_capture
+
+SCENARIO = "lab"
+FIVE_MINUTES, TWENTY_MINUTES = "rig_p1_02", "rig_p1_03"
+"""Takes of the rig at rest."""
+BOXING, BOXING_S = "boxing", 60.0
+"""Behaviour and length [s] of the motion before a reference."""
+STATION, OTHER_STATION = "right_hand", "left_hand"
+"""Station of the faults of one station, and the one that it is exchanged with."""
+NO_FAULT = "none"
+EARLIER = "earlier"
+"""Kind of the capture of the same session whose validation the scale is compared with."""
+LOST_SHARE, REPEATED_SHARE, SCALE = 0.05, 0.01, 0.003
+LEAST_DRAW = 0.05
+"""Least size of the draw of a session's scale. With a smaller one no scenario plants the scale, and the next seed of
+the session is taken."""
+_NEXT_SEED = 1_000_000
+_PERFORMER, _BOXING_TAKE = "p1", "boxing_p1_01"
+
+
+@dataclass(frozen=True)
+class PlantedNumber:
+    """A number that a verb has to name, and its planted size."""
+
+    key: str
+    value: float
+    station: str = ""
+
+
+@dataclass(frozen=True)
+class PlantedFault:
+    """A fault as changes to the scenario `lab`, and the numbers by which it has to be named."""
+
+    title: str
+    verb: Literal["characterize", "validate"]
+    numbers: tuple[PlantedNumber, ...] = ()
+    """Numbers that all have to be named; () where none may be."""
+    take: str = FIVE_MINUTES
+    components: Mapping[str, Any] = field(default_factory=dict)
+    tracker: Mapping[str, Any] = field(default_factory=dict)
+
+
+PLANTED_FAULTS: Mapping[str, PlantedFault] = {
+    "white": PlantedFault(
+        "white noise x2",
+        "characterize",
+        (
+            PlantedNumber("components.white.position_m", 0.0015),
+            PlantedNumber("components.white.orientation_rad", math.radians(0.1)),
+        ),
+        components={"white": {"position_m": 0.0015, "orientation_rad": math.radians(0.1)}},
+    ),
+    "excursions": PlantedFault(
+        "excursions x3, 20 min",
+        "characterize",
+        (PlantedNumber("components.excursion.onsets_per_min", 3.0),),
+        take=TWENTY_MINUTES,
+        components={"excursion": {"onsets_per_min": 3.0}},
+    ),
+    "echoes": PlantedFault(
+        "echoes x3",
+        "characterize",
+        (PlantedNumber("components.echo.share", 0.09),),
+        components={"echo": {"share": 0.09}},
+    ),
+    "lost": PlantedFault(
+        "station lost 5 %", "characterize", (PlantedNumber("components.dropout.share", LOST_SHARE, STATION),)
+    ),
+    "duplicates": PlantedFault(
+        "duplicates 1 %", "characterize", (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),)
+    ),
+    "clock": PlantedFault(
+        "clock 80 ppm",
+        "characterize",
+        (PlantedNumber("components.clock.drift_ppm", 80.0),),
+        components={"clock": {"drift_ppm": 80.0}},
+    ),
+    "stamps": PlantedFault(
+        "stamps after 5 h",
+        "characterize",
+        (PlantedNumber("timing.clock_age_s", 18_000.0), PlantedNumber("timing.stamp_resolution_s", 0.002)),
+        components={"clock": {"offset_s": 18_000.0}},
+    ),
+    NO_FAULT: PlantedFault("no fault, 20 min", "characterize", take=TWENTY_MINUTES),
+    "turned": PlantedFault(
+        "station turned 3 deg",
+        "validate",
+        (PlantedNumber("mount_turn_rad", math.radians(3.0), STATION),),
+        take=BOXING,
+        components={"mount_slip": [{"station": STATION, "from_s": -1.0, "around_rad": math.radians(3.0)}]},
+    ),
+    "heading": PlantedFault(
+        "heading 5 deg",
+        "validate",
+        (PlantedNumber("heading_rad", math.radians(5.0)),),
+        take=BOXING,
+        components={"orientation_offset": [{"angle_rad": math.radians(5.0)}]},
+    ),
+    "latency": PlantedFault(
+        "latency 20 ms",
+        "validate",
+        (PlantedNumber("latency_s", 0.02),),
+        take=BOXING,
+        tracker={"latency_s": 0.02},
+    ),
+    "scale": PlantedFault("scale 0.3 %", "validate", (PlantedNumber("scale", SCALE),), take=BOXING),
+    "exchanged": PlantedFault("two stations exchanged", "validate", take=BOXING),
+    "none validated": PlantedFault("no fault, with a reference", "validate", take=BOXING),
+    EARLIER: PlantedFault("an earlier capture of the session", "validate", take=BOXING),
+}
+"""Faults by kind."""
+
+
+def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math.inf) -> Path:
+    """Record the capture of a fault and seed into a folder, in which it must not exist yet.
+
+    `seconds` cuts the capture [s]. UnknownName for another kind of fault.
+    """
+    if kind not in PLANTED_FAULTS:
+        raise UnknownName("planted fault", kind, PLANTED_FAULTS)
+    scenario, clip = planted_scenario(kind, seed), planted_motion(kind, seed)
+    wire_format, wire = _simulate_line(scenario, clip)
+    if kind == "duplicates":
+        wire = repeat_records(wire, seed)
+    note = {
+        "source": "simulation",
+        "scenario": SCENARIO,
+        "clip": clip.name,
+        "seed": scenario.seed,
+        "noise": scenario.noise,
+        "stations": list(scenario.stations),
+        "rate_hz": scenario.tracker.rate_hz,
+        "posing": False,
+        "harness": VERSION,
+    }
+    path = folder / f"{kind.replace(' ', '_')}_{seed}.rec"
+    record_capture(path, wire_format, wire, note, seconds=seconds)
+    return path
+
+
+def planted_scenario(kind: str, seed: int) -> Scenario:
+    """The scenario with the fault of a capture."""
+    fault = PLANTED_FAULTS[kind]
+    scenario = replace(load_scenario(SCENARIO), seed=_session_seed(seed) if kind in ("scale", EARLIER) else seed)
+    components = dict(fault.components)
+    if kind == "lost":
+        components["lost"] = _gaps_of_station(seed, generate_rig(fault.take).duration_s)
+    if kind == "scale":
+        components["session"] = {"scale": SessionBias.scale + SCALE / abs(_scale_draw(scenario.seed))}
+    if kind == "exchanged":
+        stations = dict(scenario.stations)
+        stations[STATION], stations[OTHER_STATION] = stations[OTHER_STATION], stations[STATION]
+        scenario = replace(scenario, stations=stations)
+    tracker = replace_fields(scenario.tracker, dict(fault.tracker), "tracker")
+    return replace(scenario, components=components, tracker=tracker)
+
+
+def planted_motion(kind: str, seed: int) -> Clip:
+    """The true motion of a capture: a take of the rig, or boxing that depends on the seed."""
+    take = PLANTED_FAULTS[kind].take
+    return (
+        synthetic.generate(BOXING, _PERFORMER, 1, seed=seed, duration_s=BOXING_S)
+        if take == BOXING
+        else generate_rig(take)
+    )
+
+
+def planted_numbers(kind: str, seed: int) -> tuple[PlantedNumber, ...]:
+    """The numbers that have to be named in a capture, with the sign of the session's scale."""
+    numbers = PLANTED_FAULTS[kind].numbers
+    if kind != "scale":
+        return numbers
+    sign = math.copysign(1.0, _scale_draw(_session_seed(seed)))
+    return tuple(replace(number, value=sign * number.value) for number in numbers)
+
+
+def repeat_records(wire: ByteCapture, seed: int) -> ByteCapture:
+    """The capture of a line on which a share of the records is sent twice, both in one chunk."""
+    size = len(wire.data) // len(wire.ends)
+    twice = generator(seed, "planted", "repeated").random(len(wire.ends)) < REPEATED_SHARE
+    records = np.frombuffer(wire.data, np.uint8).reshape(-1, size)
+    return ByteCapture(np.repeat(records, 1 + twice, axis=0).tobytes(), size * np.cumsum(1 + twice), wire.received_s)
+
+
+def _simulate_line(scenario: Scenario, clip: Clip) -> tuple[WireFormat, ByteCapture]:
+    """What `harness record sim:` records of a scenario and a clip."""
+    body, motion = retarget_to_own_body(clip)
+    mounts, tracker = mounts_of(scenario), tracker_of(scenario)
+    wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
+    trajectory = Trajectory(body, motion)
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
+    readings = simulate_readings(
+        trajectory, mounts, tracker, noise_of(scenario), time_s, seed=scenario.seed, take=clip.name
+    )
+    return wire_format, transmit_readings(readings, wire_format, tracker)[1]
+
+
+def _gaps_of_station(seed: int, until_s: float) -> list[dict[str, Any]]:
+    """Losses of `STATION`, with the lengths of the preset's, so that it is lost for `LOST_SHARE` of the time."""
+    more = Dropout(share=1.0 - (1.0 - LOST_SHARE) / (1.0 - Dropout.share))
+    gaps = more.gaps(generator(seed, "planted", "lost"), until_s)
+    return [{"station": STATION, "from_s": begin_s, "to_s": end_s, "fade_s": 0.0} for begin_s, end_s, _ in gaps]
+
+
+def _scale_draw(seed: int) -> float:
+    """The draw of `SessionBias` that the scale of the session is multiplied with."""
+    return float(generator(seed, "noise", _BOXING_TAKE, "session", "").normal())
+
+
+def _session_seed(seed: int) -> int:
+    while abs(_scale_draw(seed)) < LEAST_DRAW:
+        seed += _NEXT_SEED
+    return seed
