@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
+
+from harness.measure.allan import expected_allan, measure_allan, pool_allan
 from harness.measure.measured import Measured
 from harness.measure.recording_time import events_for_precision
 from harness.measure.spectrum import measure_spectrum, pool_spectra
@@ -11,6 +14,7 @@ from harness.report.lab.unit_content import (
     CaptureSummary,
     DensityCurve,
     DepartureCheck,
+    DeviationCurve,
     EpisodeMark,
     ParameterRow,
     QualityClass,
@@ -69,6 +73,9 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         ),
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         stations=tuple(StationFigures(station, _figures(found, station)) for station in profile.stations),
+        allan_position=_allan(profile.rest, "position_m"),
+        allan_orientation=_allan(profile.rest, "rotation_rad"),
+        allan_position_model=_allan_model(found, "components.white.position_m", "components.drift.position_m"),
         spectra=_spectra(profile.rest),
         episodes=_episodes(found),
         quality=tuple(
@@ -95,6 +102,35 @@ def _figures(found: Characterization, station: str) -> dict[str, Measured]:
         "spread_rad": rest_spread(rest, "rotation_rad"),
         **figures,
     }
+
+
+def _allan(rest: tuple[StaticSeries, ...], name: str) -> tuple[DeviationCurve, ...]:
+    """Allan deviation of each station on one axis; a rest shorter than twice the longest time is left out."""
+    curves = []
+    for station in dict.fromkeys(one.station for one in rest):
+        longest_s = min(max(one.duration_s for one in rest if one.station == station) / 4.0, 300.0)
+        parts = [
+            measure_allan(getattr(one, name), one.valid, one.rate_hz, longest_s=longest_s)
+            for one in rest
+            if one.station == station and one.duration_s >= 2.0 * longest_s
+        ]
+        pooled = pool_allan(parts)
+        low, high = pooled.interval.T
+        curves.append(DeviationCurve(station, pooled.tau_s, pooled.deviation, low, high))
+    return tuple(curves)
+
+
+def _allan_model(found: Characterization, white: str, drift: str) -> DeviationCurve | None:
+    """Allan deviation of the fitted white noise and drift; None where one of them was not measured."""
+    parameters = found.profile.parameters
+    numbers = [parameters[key] for key in (white, drift, "components.drift.correlation_s")]
+    if not all(number.is_measured for number in numbers):
+        return None
+    rate_hz = found.profile.rate_hz
+    tau_s = np.exp2(np.arange(int(np.log2(100.0 * rate_hz)) + 1, dtype=np.float64)) / rate_hz
+    deviation = expected_allan(tau_s, rate_hz, *(number.value for number in numbers))
+    unknown = np.full(len(tau_s), np.nan)
+    return DeviationCurve("fitted noise and drift", tau_s, deviation, unknown, unknown)
 
 
 def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:

@@ -6,6 +6,7 @@ filling.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,12 +45,12 @@ def fit_process(errors: Floats, valid: Bools, period_s: float) -> ErrorProcess:
         white, drift, correlation_s = np.exp(bounded)
         correlation = float(np.exp(-period_s / correlation_s))
         fit = series_log_likelihood(known, valid, correlation, float(drift**2), float(white**2))
-        return float(np.sum((logarithms - bounded) ** 2)) - fit / max(int(valid.sum()), 1)
+        return float(np.sum((logarithms - bounded) ** 2)) - float(fit) / max(int(valid.sum()), 1)
 
-    start = np.log(np.maximum([0.7 * min(step, spread), spread, 1.0], 1e-8))
+    start: Floats = np.log(np.maximum([0.7 * min(step, spread), spread, 1.0], 1e-8))
     corners = np.concatenate([start[None], start + np.diag([-0.5, 0.5, 0.5])])
-    options = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 300}
-    found = optimize.minimize(cost, start, method="Nelder-Mead", options=options)
+    options: dict[str, Any] = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 300}
+    found: Any = optimize.minimize(cost, start, method="Nelder-Mead", options=options)  # type: ignore[call-overload]  # its stubs know no simplex
     white, drift, correlation_s = np.exp(np.clip(found.x, _LEAST, _MOST)).tolist()
     return ErrorProcess(white, drift, correlation_s)
 

@@ -50,6 +50,8 @@ _APART_S = 1.5
 """Time to the nearest other excursion from which on size and duration of an excursion are certain [s]."""
 _BEFORE_S, _AFTER_S = 0.2, 0.6
 """Samples around an excursion that the noise fit leaves out [s]."""
+_NONE_SEEN = 3.689
+"""Upper end of the 95 % interval of the expected number of events of which none was seen (Garwood 1936)."""
 _STRAYS = 0.05
 """Share of excursions that are expected to be confused with others although they seem alone."""
 _STAY_ERROR_S = 0.03
@@ -109,13 +111,14 @@ def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> Episo
     parameters, means = _fit_echoes(found)
     gap_parameters, gap_means = _fit_gaps(found, noise)
     excursion_parameters, excursion_means = _fit_excursions(found, searches, noise)
+    burst, gap = (_mean_length(found, name) for name in ("echoes", "gaps"))
     by_station = {}
     for station in dict.fromkeys(one.series.station for one in found):
         own = [one for one in found if one.series.station == station]
         by_station[station] = {
             "components.excursion.onsets_per_min": _station_rate(own, excursion_parameters[EPISODE_KEYS[0]], found),
-            "components.echo.share": _echo_share(own),
-            "components.dropout.share": _lost_share(own),
+            "components.echo.share": _echo_share(own, burst),
+            "components.dropout.share": _lost_share(own, gap),
         }
     return EpisodeFit(
         {**excursion_parameters, **parameters, **gap_parameters},
@@ -123,6 +126,12 @@ def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> Episo
         by_station,
         tuple(found),
     )
+
+
+def _mean_length(found: Sequence[SeriesEpisodes], name: str) -> float:
+    """Mean length of the episodes of all stations, in samples; 1 without any."""
+    lengths = np.concatenate([getattr(one, name).end - getattr(one, name).begin for one in found])
+    return float(lengths.mean()) if len(lengths) else 1.0
 
 
 def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], dict[str, Measured]]:
@@ -154,27 +163,28 @@ def _integer_ends(values: Floats) -> tuple[Measured, Measured, Measured]:
     return Measured(low, max(low - slack, 1), low, count), Measured(high, high, high + slack, count), mean
 
 
-def _echo_share(found: Sequence[SeriesEpisodes]) -> Measured:
-    """Share of valid readings that are echoes; bursts come independently of each other."""
+def _echo_share(found: Sequence[SeriesEpisodes], typical: float = 1.0) -> Measured:
+    """Share of valid readings that are echoes; `typical` is the length of a burst where none was found."""
     lengths = np.concatenate([one.echoes.end - one.echoes.begin for one in found]).astype(float)
     valid = sum(int(one.series.valid.sum()) for one in found)
-    return _compound_share(lengths, valid)
+    return _compound_share(lengths, valid, typical)
 
 
-def _lost_share(found: Sequence[SeriesEpisodes]) -> Measured:
+def _lost_share(found: Sequence[SeriesEpisodes], typical: float = 1.0) -> Measured:
+    """Share of samples that are lost; `typical` is the length of a gap where none was found."""
     lengths = np.concatenate([one.gaps.end - one.gaps.begin for one in found]).astype(float)
-    return _compound_share(lengths, sum(len(one.series) for one in found))
+    return _compound_share(lengths, sum(len(one.series) for one in found), typical)
 
 
-def _compound_share(lengths: Floats, total: int) -> Measured:
-    """Share of samples in episodes of these lengths, whose number is nearly Poisson.
+def _compound_share(lengths: Floats, total: int, typical: float) -> Measured:
+    """Share of samples in episodes of these lengths, which come independently of each other.
 
-    Without any episode the interval ends where three would be expected: the 95 % limit of a count of zero.
+    Without any episode the interval ends at the upper limit of a count of zero, for episodes of `typical` length.
     """
     if not total:
         return Measured.missing("There is no reading at rest.")
     if not len(lengths):
-        return Measured(0.0, 0.0, 3.0 / total, 0)
+        return Measured(0.0, 0.0, min(_NONE_SEEN * typical / total, 1.0), 0)
     share = float(lengths.sum()) / total
     relative = (1.0 - share) * float(np.sqrt(np.sum(lengths**2))) / float(lengths.sum())
     low, high = (share * float(np.exp(sign * NORMAL_QUANTILE * relative)) for sign in (-1.0, 1.0))
@@ -276,7 +286,7 @@ def _fit_rate(
     minutes = sum(one.series.duration_s for one in found) / 60.0
     detected = sum(len(_counted(one.excursions)) for one in found)
     if not detected:
-        return Measured(0.0, 0.0, 3.0 / minutes, 0)
+        return Measured(0.0, 0.0, _NONE_SEEN / minutes, 0)
     recovery, spread = 1.0, 1.0 / np.sqrt(detected)
     rate_per_min = detected / minutes
     for _ in range(2):

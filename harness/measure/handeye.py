@@ -134,6 +134,6 @@ def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bo
         flat = rows.reshape(-1, size)
         normal += flat.T @ flat
         right += flat.T @ values.reshape(-1)
-    solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
-    factor = solution[0] if with_scale else 1.0
-    return solution[1:4], float(1.0 / factor - 1.0), solution[4:].reshape(-1, 3)
+    solution: Floats = np.asarray(np.linalg.lstsq(normal, right, rcond=1e-12)[0], dtype=np.float64)
+    factor = float(solution[0]) if with_scale else 1.0
+    return solution[1:4], 1.0 / factor - 1.0, solution[4:].reshape(-1, 3)

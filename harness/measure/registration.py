@@ -78,7 +78,7 @@ class MountFit:
 
 
 @dataclass(frozen=True, eq=False)
-class StationErrors:
+class StationResiduals:
     """What remains of N readings of a station after registration; a grid of its records in time."""
 
     truth_s: Floats
@@ -117,7 +117,7 @@ class Registration:
     - `tracker_origin_m.0` to `.2`: origin of the tracker's frame in the world.
     """
     mounts: Mapping[str, MountFit]
-    errors: Mapping[str, StationErrors]
+    errors: Mapping[str, StationResiduals]
     world_from_tracker: Floats
     """(4,) unit quaternion."""
     tracker_origin_m: Floats
@@ -263,7 +263,7 @@ def _make_grid(
     rows = rows[spline.covers(at_s[rows] - margin_s) & spline.covers(at_s[rows] + margin_s)]
     count = int((end_s - begin_s) / period_s) + 2
     place = np.clip(np.round((at_s[rows] - begin_s) / period_s).astype(np.int64), 0, count - 1)
-    measured_s = begin_s + offset_s + period_s * np.arange(count)
+    measured_s = begin_s + offset_s + period_s * np.arange(count, dtype=np.float64)
     position_m, turn = np.zeros((count, 3)), np.tile(rotations.IDENTITY, (count, 1))
     filled = np.zeros(count, bool)
     measured_s[place], position_m[place], filled[place] = station.measured_s[rows], station.position_m[rows], True
@@ -344,7 +344,7 @@ def _result(
         )
         grid, residual = grids[station], fit.residuals[s]
         truth_s = state.truth_time_s(grid.measured_s, of_position=False)
-        errors[station] = StationErrors(
+        errors[station] = StationResiduals(
             truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
         )
     room = slice(0, ROOM_ORIGIN.stop)
