@@ -47,6 +47,13 @@ def test_a_lower_level_widens_the_interval() -> None:
     assert wide.low < narrow.low
 
 
+@pytest.mark.parametrize(("level", "quantile"), [(0.05, 1.795885), (0.01, 2.718079)])
+def test_the_interval_has_the_level_of_two_one_sided_tests(level: float, quantile: float) -> None:
+    """About that of Student's t with eleven degrees of freedom, since the scatter is even."""
+    found = judge_equivalence("ik", "mpjpe_mm", *sides(0.0), MARGIN, level)
+    assert found.high == pytest.approx(quantile * SCATTER.std(ddof=1) / np.sqrt(12.0), rel=0.05)
+
+
 def test_few_clips_and_clips_of_one_side_are_undecided() -> None:
     device, simulated = sides(0.0)
     few = dict(list(simulated.items())[:5])

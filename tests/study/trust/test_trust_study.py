@@ -18,7 +18,7 @@ from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.study.trust import capture_cells
-from harness.study.trust.capture_cells import Arm
+from harness.study.trust.capture_cells import Arm, CaptureTask, run_capture
 from harness.study.trust.expected_values import preset_components
 from harness.study.trust.trust_study import (
     FINDINGS_FILE,
@@ -58,14 +58,18 @@ def test_the_same_profile_on_both_sides_passes(finished: Path) -> None:
     assert found["rank_correlations"][1]["value"] > 0.9
 
 
-def test_errors_differ_between_device_and_simulation_though_the_seed_is_the_same(finished: Path) -> None:
+def test_errors_of_the_simulation_are_not_those_of_the_device_though_the_seed_is_the_same(
+    small_study: SmallStudy, tmp_path: Path
+) -> None:
     """The captures were simulated with seed 1, which is a seed of the plan too."""
-    lines = [line for line in read_findings(finished)["equivalences"] if not line["arm"].startswith("mean_pose")]
-    assert all(line["difference"] != 0.0 for line in lines)
-    one = {(pair["a"], pair["b"]): pair for pair in read_findings(finished)["pairs"]}[
-        "mean_pose, all", "best_match, all"
-    ]
-    assert one["simulated"]["low"] < one["simulated"]["high"]
+    arm = Arm("mean_pose", "two", ("head", "torso"))
+    (tmp_path / "cells").mkdir()
+    scenario = small_study.plan.with_name("small.toml")
+    task = CaptureTask(small_study.captures[0], "", scenario, (arm,), {}, ("mpjpe_mm",), (1,), None, tmp_path, None)
+    device, simulated = (side["position error"][0].reshape(-1) for side in run_capture(task).readings)
+    both = np.isfinite(device[: len(simulated)]) & np.isfinite(simulated[: len(device)])
+    assert both.sum() > 1000
+    assert abs(np.corrcoef(device[: len(both)][both], simulated[: len(both)][both])[0, 1]) < 0.3
 
 
 def test_readings_and_health_of_both_sides_are_alike(finished: Path) -> None:
