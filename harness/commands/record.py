@@ -59,6 +59,8 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--noise", metavar="PRESET", help="with sim: clean, noise or default (default: the scenario's)")
     text = "with sim: play the calibration poses of `harness calibrate` instead of the clip"
     verb.add_argument("--poses", action="store_true", default=None, help=text)
+    text = "plan of a trust study that the recording is made for: its digest is written into it"
+    verb.add_argument("--plan", type=Path, metavar="PLAN.toml", help=text)
 
 
 def run_record(args: argparse.Namespace) -> Outcome:
@@ -77,6 +79,8 @@ def run_record(args: argparse.Namespace) -> Outcome:
             raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out.")
     if args.allow_writes and args.send is None:
         raise BadInput("--allow-writes without --send.", "It is for commands that --send names: leave it out.")
+    if args.plan is not None and args.send is not None:
+        raise BadInput("--plan with --send.", "A plan is for a recording of motion: leave one of them out.")
     if args.serve is not None:
         return _record_served(args)
     return _record_port(args) if args.send is None else _record_commands(args)
@@ -111,10 +115,18 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         "rate_hz": played.tracker.rate_hz,
         "posing": playback.posing,
         "harness": VERSION,
+        **_plan_note(args),
     }
     seconds = math.inf if args.seconds is None else args.seconds
     written = record_capture(args.file, simulation.wire_format, simulation.wire, note, seconds=seconds)
     return _print_recording(args, written.counts)
+
+
+def _plan_note(args: argparse.Namespace) -> dict[str, str]:
+    """The entry of a recording's note that names the plan it was made for; none without a plan."""
+    from harness.study.trust.plan import plan_digest
+
+    return {} if args.plan is None else {"plan": plan_digest(args.plan)}
 
 
 def _record_port(args: argparse.Namespace) -> Outcome:
@@ -124,7 +136,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
 
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
-    note = {"source": "port", "port": args.port, "harness": VERSION}
+    note = {"source": "port", "port": args.port, "harness": VERSION, **_plan_note(args)}
     with RecordingWriter(args.file, note) as writer:
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
     return _print_recording(args, writer.counts, line.get("out_of_range", 0))
@@ -144,7 +156,7 @@ def _record_served(args: argparse.Namespace) -> Outcome:
         raise BadInput(f"--serve with {args.port}.", "UDP carries no commands: name the serial line.")
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
-    note = {"source": "served", "port": args.port, "harness": VERSION}
+    note = {"source": "served", "port": args.port, "harness": VERSION, **_plan_note(args)}
     with RecordingWriter(args.file, note) as writer:
         counts = serve_line(
             args.port, args.serve, config, writer, seconds=args.seconds, log=print_status, progress=show_progress

@@ -23,6 +23,7 @@ from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.recording.frame_table import FRAME_COLUMNS
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
+from harness.study.trust.plan import plan_digest
 from tests.interrupts import heeding_interrupts
 from tests.stream.recording.test_recording import newer_file
 from tests.stream.wire import frames_equal
@@ -214,6 +215,21 @@ def test_seconds_end_a_recording(port: str, tmp_path: Path, capsys: pytest.Captu
     stream = RecordingStream(path)
     assert stream.stations == tuple("1234")
     assert len(list(stream)) > 5
+
+
+@pytest.mark.parametrize("source", ["port", "simulation"])
+def test_a_plan_is_named_by_its_digest(
+    source: str, port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan, file = tmp_path / "plan.toml", tmp_path / "a.rec"
+    plan.write_text('kind = "trust plan"\nscenario = "demo"\nmethods = ["ik"]\n[margins]\nmpjpe_mm = 5.0\n', "utf-8")
+    name = port if source == "port" else "sim:demo"
+    assert main(["record", name, str(file), "--seconds", "0.5", "--plan", str(plan)]) == 0
+    assert read_recording(file).note["plan"] == plan_digest(plan)
+    plan.write_text('kind = "trust plan"\n', "utf-8")
+    assert "margins" in refused(["record", name, str(tmp_path / "b.rec"), "--plan", str(plan)], capsys)
+    assert not (tmp_path / "b.rec").exists()
+    assert "--send" in refused(["record", port, str(file), "--send", "S", "--plan", str(plan)], capsys)
 
 
 def test_old_firmware_is_recorded_by_mp_and_refused_without(
