@@ -12,6 +12,8 @@ from harness.errors import BadInput, Outcome
 
 ACCURACY = "accuracy"
 """Name of the benchmark of accuracy, which runs alone."""
+LAB = "lab"
+"""Name of the benchmark of characterize, validate and trust."""
 _ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick")
 
 
@@ -19,19 +21,26 @@ def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
     text = (
-        "methods, ik, index, wire, serve, view, stream, physics, load, gate, sweep, startup (default: all), or accuracy"
+        "methods, ik, index, wire, serve, view, stream, physics, lab, load, gate, sweep, startup (default: all), or "
+        "accuracy"
     )
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
     verb.add_argument("--runs", type=positive_int, metavar="N", help="wire, serve, view: number of runs (default 1)")
-    text = "physics: hold the simulated errors to published figures and write a page, instead of speed"
+    text = (
+        "instead of speed: physics holds the simulated errors to published figures and writes a page; lab looks for "
+        "planted faults in captures, and goes on after a stop"
+    )
     verb.add_argument("--truth", action="store_true", help=text)
     verb.add_argument("--method", metavar="NAME", help="accuracy: the method (default expert_map)")
     verb.add_argument(
-        "--seeds", type=positive_int, metavar="N", help="accuracy: number of seeds (default 5); --truth: (default 20)"
+        "--seeds",
+        type=positive_int,
+        metavar="N",
+        help="number of seeds: accuracy (default 5), --truth of physics (20) and lab (100)",
     )
-    text = "accuracy: clips computed at the same time (default 1)"
+    text = "accuracy, --truth of lab: clips or captures computed at the same time (default 1)"
     verb.add_argument("--jobs", type=positive_int, metavar="N", help=text)
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
@@ -42,7 +51,7 @@ def add_bench(verbs: Verbs) -> None:
 
 def run_bench(args: argparse.Namespace) -> Outcome:
     if args.truth:
-        return _bench_truth(args)
+        return _bench_lab_truth(args) if args.what == [LAB] else _bench_truth(args)
     if ACCURACY in args.what:
         return _bench_accuracy(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
@@ -75,14 +84,9 @@ def _bench_truth(args: argparse.Namespace) -> Outcome:
     from harness.report.physics.truth_table import result_sentence, truth_lines
     from harness.report.physics.writer import write_physics_page
 
-    given = [name for name in _ACCURACY_FLAGS if name not in ("seeds", "out") and getattr(args, name) is not None]
-    if args.what != ["physics"] or args.large or args.runs or args.seed is not None or given:
-        raise BadInput(
-            "--truth is for physics alone, with --seeds N and --out FOLDER.", "Run: harness bench physics --truth."
-        )
-    if args.seeds and args.seeds > len(SEEDS):
-        raise BadInput(f"--seeds {args.seeds}: there are {len(SEEDS)} seeds.", "Name fewer.")
-    seeds, out = SEEDS[: args.seeds], args.out or Path("results") / "physics"
+    if args.what != ["physics"]:
+        raise BadInput("--truth is for physics or lab alone.", "Run: harness bench physics --truth.")
+    seeds, out = _truth_flags(args, SEEDS, "seeds", "out"), args.out or Path("results") / "physics"
     with ProgressBar("rows") as progress:
         rows = truth_rows(seeds, progress)
         models = compare_error_models(seeds, progress)
@@ -91,6 +95,31 @@ def _bench_truth(args: argparse.Namespace) -> Outcome:
     content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "page": str(page)}
     lines = [*truth_lines(rows), result_sentence("the physical simulation", rows), f"report: {page}"]
     return print_result(args, content, *lines)
+
+
+def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
+    """Print the truth table of the lab's verbs; a row that is missed is no error."""
+    from harness.bench.lab.truth import SEEDS, lab_truth_rows
+    from harness.experiment.executors import process_executor
+    from harness.report.physics.truth_table import result_sentence, truth_lines
+
+    seeds, out = _truth_flags(args, SEEDS, "seeds", "out", "jobs"), args.out or Path("results") / LAB
+    with progress_note(out), ProgressBar("captures") as progress, process_executor(args.jobs or 1) as executor:
+        rows = lab_truth_rows(seeds, out, executor, progress)
+    content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "captures": str(out / "captures")}
+    return print_result(args, content, *truth_lines(rows), result_sentence("the lab", rows))
+
+
+def _truth_flags(args: argparse.Namespace, seeds: tuple[int, ...], *allowed: str) -> tuple[int, ...]:
+    """The seeds that a truth table is asked for; BadInput for flags that it does not have."""
+    given = [name for name in _ACCURACY_FLAGS if name not in allowed and getattr(args, name) is not None]
+    if args.large or args.runs or args.seed is not None or given:
+        flags = {"seeds": "--seeds N", "out": "--out FOLDER", "jobs": "--jobs N"}
+        listed = " and ".join(flags[name] for name in allowed)
+        raise BadInput(f"--truth of {args.what[0]} takes {listed} alone.", "Leave the other flags out.")
+    if args.seeds and args.seeds > len(seeds):
+        raise BadInput(f"--seeds {args.seeds}: there are {len(seeds)} seeds.", "Name fewer.")
+    return seeds[: args.seeds]
 
 
 def _bench_accuracy(args: argparse.Namespace) -> Outcome:

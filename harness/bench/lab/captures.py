@@ -33,11 +33,15 @@ from harness.stream.recording.recording import record_capture
 SCENARIO = "lab"
 FIVE_MINUTES, TWENTY_MINUTES = "rig_p1_02", "rig_p1_03"
 """Takes of the rig at rest."""
+SHORT_S = 120.0
+"""Length of the captures at rest of all faults but excursions, of which two minutes have a dozen [s]."""
 BOXING, BOXING_S = "boxing", 60.0
 """Behaviour and length [s] of the motion before a reference."""
 STATION, OTHER_STATION = "right_hand", "left_hand"
 """Station of the faults of one station, and the one that it is exchanged with."""
 NO_FAULT = "none"
+NO_FAULTS = (NO_FAULT, "none_validated")
+"""Kinds of captures in which nothing may be named."""
 EARLIER = "earlier"
 """Kind of the capture of the same session whose validation the scale is compared with."""
 LOST_SHARE, REPEATED_SHARE, SCALE = 0.05, 0.01, 0.003
@@ -66,6 +70,8 @@ class PlantedFault:
     numbers: tuple[PlantedNumber, ...] = ()
     """Numbers that all have to be named; () where none may be."""
     take: str = FIVE_MINUTES
+    seconds: float = SHORT_S
+    """Length of the capture [s]; that of the take if it is shorter."""
     components: Mapping[str, Any] = field(default_factory=dict)
     tracker: Mapping[str, Any] = field(default_factory=dict)
 
@@ -81,10 +87,11 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
         components={"white": {"position_m": 0.0015, "orientation_rad": math.radians(0.1)}},
     ),
     "excursions": PlantedFault(
-        "excursions x3, 20 min",
+        "excursions x3",
         "characterize",
         (PlantedNumber("components.excursion.onsets_per_min", 3.0),),
         take=TWENTY_MINUTES,
+        seconds=math.inf,
         components={"excursion": {"onsets_per_min": 3.0}},
     ),
     "echoes": PlantedFault(
@@ -111,7 +118,7 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
         (PlantedNumber("timing.clock_age_s", 18_000.0), PlantedNumber("timing.stamp_resolution_s", 0.002)),
         components={"clock": {"offset_s": 18_000.0}},
     ),
-    NO_FAULT: PlantedFault("no fault, 20 min", "characterize", take=TWENTY_MINUTES),
+    NO_FAULT: PlantedFault("no fault", "characterize", take=TWENTY_MINUTES, seconds=math.inf),
     "turned": PlantedFault(
         "station turned 3 deg",
         "validate",
@@ -135,7 +142,7 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
     ),
     "scale": PlantedFault("scale 0.3 %", "validate", (PlantedNumber("scale", SCALE),), take=BOXING),
     "exchanged": PlantedFault("two stations exchanged", "validate", take=BOXING),
-    "none validated": PlantedFault("no fault, with a reference", "validate", take=BOXING),
+    "none_validated": PlantedFault("no fault, with a reference", "validate", take=BOXING),
     EARLIER: PlantedFault("an earlier capture of the session", "validate", take=BOXING),
 }
 """Faults by kind."""
@@ -144,7 +151,7 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
 def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math.inf) -> Path:
     """Record the capture of a fault and seed into a folder, in which it must not exist yet.
 
-    `seconds` cuts the capture [s]. UnknownName for another kind of fault.
+    `seconds` cuts it shorter [s]. UnknownName for another kind of fault.
     """
     if kind not in PLANTED_FAULTS:
         raise UnknownName("planted fault", kind, PLANTED_FAULTS)
@@ -163,8 +170,8 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         "posing": False,
         "harness": VERSION,
     }
-    path = folder / f"{kind.replace(' ', '_')}_{seed}.rec"
-    record_capture(path, wire_format, wire, note, seconds=seconds)
+    path = folder / f"{kind}_{seed}.rec"
+    record_capture(path, wire_format, wire, note, seconds=min(seconds, PLANTED_FAULTS[kind].seconds))
     return path
 
 

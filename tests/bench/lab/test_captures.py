@@ -80,6 +80,6 @@ def test_a_scale_is_planted_relative_to_an_earlier_capture_of_the_session(monkey
 
 def test_every_fault_has_something_to_find() -> None:
     without = [kind for kind, fault in PLANTED_FAULTS.items() if not fault.numbers]
-    assert without == [captures.NO_FAULT, "exchanged", "none validated", captures.EARLIER]
+    assert without == [captures.NO_FAULT, "exchanged", "none_validated", captures.EARLIER]
     with pytest.raises(UnknownName):
         planted_capture("smoke", 1, Path())

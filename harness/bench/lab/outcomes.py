@@ -1,0 +1,130 @@
+"""What a lab's verbs find in planted captures: computed in processes, and stored as one small file for each capture."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from harness.bench.lab.captures import planted_capture
+from harness.core.fields import build
+from harness.core.progress import ProgressCallback
+from harness.errors import BadFile, HarnessError
+from harness.experiment.executors import TaskExecutor
+from harness.results.digests import read_result_json, write_result_json
+from harness.results.manifest import source_hash
+from harness.study.trust.characterization import characterize_capture
+from harness.study.trust.named_departures import NamedDeparture
+
+_STORED = "an outcome of `harness bench lab --truth`"
+_ADVICE = "Remove the file; the outcome is then computed again."
+
+
+@dataclass(frozen=True)
+class StoredNumber:
+    """A measured parameter with its 95 % interval."""
+
+    key: str
+    value: float
+    low: float
+    high: float
+
+    def contains(self, value: float) -> bool:
+        """Whether the interval contains a value."""
+        return self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class StoredCheck(StoredNumber):
+    """A measured number that was compared with an expected one."""
+
+    station: str
+    """Station that was measured; "" is all together."""
+    expected: float
+    p_holm: float
+    is_named: bool
+
+
+@dataclass(frozen=True)
+class CaptureOutcome:
+    """What was found in one capture."""
+
+    kind: str
+    seed: int
+    source: str
+    """Hash of the source of the package that found it."""
+    checks: tuple[StoredCheck, ...] = ()
+    parameters: tuple[StoredNumber, ...] = ()
+    """Parameters that were measured."""
+    failure: str = ""
+    """Message with which the verb refused the capture; "" if it did not."""
+
+    @property
+    def named(self) -> tuple[StoredCheck, ...]:
+        """The departures that are named."""
+        return tuple(check for check in self.checks if check.is_named)
+
+
+def collect_outcomes(
+    tasks: Sequence[tuple[str, int]], out: Path, executor: TaskExecutor, progress: ProgressCallback
+) -> dict[tuple[str, int], CaptureOutcome]:
+    """The outcome of each kind and seed, from the files in `out` or computed and stored there.
+
+    Outcomes that another version of the source stored are computed again. Raises BadFile for a damaged file.
+    """
+    found = {task: outcome for task in tasks if (outcome := _read_outcome(outcome_path(out, *task))) is not None}
+    missing = [task for task in tasks if task not in found]
+    for index, future in executor(find_outcome, [(*task, out) for task in missing]):
+        found[missing[index]] = future.result()
+        kind, seed = missing[index]
+        progress(f"{kind} {seed}", len(found), len(tasks))
+    return {task: found[task] for task in tasks}
+
+
+def outcome_path(out: Path, kind: str, seed: int) -> Path:
+    """File of an outcome."""
+    return out / "captures" / kind / f"{seed:04d}.json"
+
+
+def find_outcome(kind: str, seed: int, out: Path) -> CaptureOutcome:
+    """Record a planted capture in a temporary folder, let the verb analyse it, and store the outcome."""
+    with TemporaryDirectory(prefix="harness-lab-") as folder:
+        try:
+            outcome = _analyse(kind, seed, Path(folder))
+        except HarnessError as error:
+            outcome = CaptureOutcome(kind, seed, source_hash(), failure=str(error).replace(folder, "FOLDER"))
+    path = outcome_path(out, kind, seed)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_result_json(path, asdict(outcome))
+    return outcome
+
+
+def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
+    found = characterize_capture(planted_capture(kind, seed, folder))
+    parameters = tuple(
+        StoredNumber(key, one.value, one.low, one.high)
+        for key, one in found.profile.parameters.items()
+        if one.is_measured
+    )
+    return CaptureOutcome(kind, seed, source_hash(), _stored_checks(found.checks), parameters)
+
+
+def _stored_checks(checks: Sequence[NamedDeparture]) -> tuple[StoredCheck, ...]:
+    out = []
+    for check in checks:
+        one = check.departure
+        measured, expected = one.measured, one.expected.value
+        numbers = (one.key, measured.value, measured.low, measured.high)
+        out.append(StoredCheck(*numbers, one.station, expected, check.p_holm, check.is_named))
+    return tuple(out)
+
+
+def _read_outcome(path: Path) -> CaptureOutcome | None:
+    """A stored outcome of this version of the source; None without one."""
+    if not path.exists():
+        return None
+    content = read_result_json(path, _STORED, _ADVICE)
+    try:
+        outcome = build(CaptureOutcome, content, "outcome")
+    except (TypeError, ValueError, HarnessError) as error:
+        raise BadFile(path, f"unusable content ({error})", _STORED, _ADVICE) from error
+    return outcome if outcome.source == source_hash() else None

@@ -1,0 +1,103 @@
+"""The truth table of a lab's verbs: in how many captures each planted fault is named, and with which size."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from math import ceil
+from pathlib import Path
+
+from harness.bench.lab.captures import (
+    NO_FAULT,
+    NO_FAULTS,
+    PLANTED_FAULTS,
+    PlantedNumber,
+    planted_motion,
+    planted_numbers,
+)
+from harness.bench.lab.coverage import coverage_rows
+from harness.bench.lab.outcomes import CaptureOutcome, collect_outcomes
+from harness.bench.lab.planted_worlds import trust_rows
+from harness.core.progress import ProgressCallback
+from harness.experiment.executors import TaskExecutor
+from harness.report.physics.error_comparison import TruthRow
+
+SEEDS = tuple(range(1, 101))
+"""Seeds of the captures. Constants of the estimators were chosen on captures with seeds from 1001 on."""
+WANTED = 0.95
+"""Share of the captures in which a fault has to be named, or nothing where there is none."""
+TOLERANCE = 0.2
+"""Relative error of a size that is as good as lying within its interval."""
+KINDS = tuple(kind for kind, fault in PLANTED_FAULTS.items() if fault.verb == "characterize")
+"""Kinds of captures, a row each."""
+
+
+def lab_truth_rows(
+    seeds: Sequence[int], out: Path, executor: TaskExecutor, progress: ProgressCallback
+) -> list[TruthRow]:
+    """All rows: the planted faults, the coverage of the fitted parameters, and the planted worlds of trust.
+
+    Outcomes of single captures are kept in `out` and used again. Coverage is over twice as many captures without a
+    fault as there are seeds.
+    """
+    more = range(max(seeds) + 1, max(seeds) + 1 + len(seeds))
+    tasks = [(kind, seed) for seed in seeds for kind in KINDS] + [(NO_FAULT, seed) for seed in more]
+    outcomes = collect_outcomes(tasks, out, executor, progress)
+    clean = [outcomes[NO_FAULT, seed] for seed in (*seeds, *more)]
+    return [*fault_rows(seeds, outcomes), *coverage_rows(clean), *trust_rows(seeds)]
+
+
+def needed_captures(count: int) -> int:
+    """Least number of captures of `count` that is `WANTED` of them or more."""
+    return ceil(WANTED * count - 1e-9)
+
+
+def fault_rows(seeds: Sequence[int], outcomes: Mapping[tuple[str, int], CaptureOutcome]) -> list[TruthRow]:
+    """One row for each kind of capture, over its captures of these seeds."""
+    return [fault_row(kind, [outcomes[kind, seed] for seed in seeds]) for kind in KINDS]
+
+
+def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> TruthRow:
+    """The row of one kind of capture."""
+    fault, count, needed = PLANTED_FAULTS[kind], len(outcomes), needed_captures(len(outcomes))
+    minutes = min(planted_motion(kind, 1).duration_s, fault.seconds) / 60.0
+    title, notes = f"{fault.verb}, {fault.title}, {minutes:.3g} min", _notes(kind, outcomes)
+    if kind in NO_FAULTS:
+        clean = sum(not outcome.named and not outcome.failure for outcome in outcomes)
+        return TruthRow(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
+    named = [_is_named(outcome) for outcome in outcomes]
+    sized = [_is_sized(outcome) for outcome in outcomes]
+    both = sum(n and s for n, s in zip(named, sized, strict=True))
+    measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {both}"
+    held_to = f"named with its size in {needed} of {count}"
+    return TruthRow(title, held_to, measured, both >= needed, "", notes)
+
+
+def is_sized(planted: PlantedNumber, value: float, low: float, high: float) -> bool:
+    """Whether a measured number is within `TOLERANCE` of the planted one, or has it within its interval."""
+    return abs(value - planted.value) <= TOLERANCE * abs(planted.value) or low <= planted.value <= high
+
+
+def _is_named(outcome: CaptureOutcome) -> bool:
+    named = {(check.key, check.station) for check in outcome.named}
+    return all((one.key, one.station) in named for one in planted_numbers(outcome.kind, outcome.seed))
+
+
+def _is_sized(outcome: CaptureOutcome) -> bool:
+    checks = {(check.key, check.station): check for check in outcome.checks}
+    found = [(one, checks.get((one.key, one.station))) for one in planted_numbers(outcome.kind, outcome.seed)]
+    return all(check is not None and is_sized(one, check.value, check.low, check.high) for one, check in found)
+
+
+def _notes(kind: str, outcomes: Sequence[CaptureOutcome]) -> str:
+    """What else was named, and what was refused, with the numbers of captures."""
+    parts = []
+    others: Counter[str] = Counter()
+    for outcome in outcomes:
+        planted = {(one.key, one.station) for one in planted_numbers(kind, outcome.seed)}
+        further = {check.key for check in outcome.named if (check.key, check.station) not in planted}
+        others.update(further)
+    if others:
+        listed = ", ".join(f"{key} in {number}" for key, number in others.most_common())
+        parts.append(f"{'named' if kind in NO_FAULTS else 'also named'}: {listed}")
+    if refused := [outcome.failure for outcome in outcomes if outcome.failure]:
+        parts.append(f"refused in {len(refused)}: {refused[0]}")
+    return "; ".join(parts)
