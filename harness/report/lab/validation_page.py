@@ -20,6 +20,7 @@ from harness.report.lab.validation_content import ValidationReport
 from harness.report.lab.validation_tables import (
     accuracy_reasons,
     accuracy_table,
+    number_reasons,
     numbers_table,
     poses_table,
     scores_table,
@@ -100,7 +101,8 @@ def _registration(report: ValidationReport, drawn: Mapping[str, Chart]) -> Marku
     if not report.numbers:
         return Markup()
     chart = chart_figure(drawn["registration"]) if "registration" in drawn else None
-    return join(tag("p", _REGISTRATION), chart, _table(numbers_table(report), "Estimates.", "registration"))
+    table = _table(numbers_table(report), "Below the estimates: 95 % intervals.", "registration")
+    return join(tag("p", _REGISTRATION), chart, table, bullet_list(number_reasons(report)))
 
 
 def _accuracy(report: ValidationReport) -> Markup:
