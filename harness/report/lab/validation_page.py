@@ -17,7 +17,13 @@ from harness.report.lab.stacked_intervals import stack_intervals
 from harness.report.lab.unit_tables import capture_text, stretches_table
 from harness.report.lab.validation_charts import charts
 from harness.report.lab.validation_content import ValidationReport
-from harness.report.lab.validation_tables import accuracy_table, numbers_table, poses_table, scores_table
+from harness.report.lab.validation_tables import (
+    accuracy_reasons,
+    accuracy_table,
+    numbers_table,
+    poses_table,
+    scores_table,
+)
 from harness.report.lab.validation_wording import registration_sentences, validation_answer
 
 _REGISTRATION = (
@@ -52,7 +58,7 @@ def validation_page(report: ValidationReport, drawn: Mapping[str, Chart], missin
         ("Checks", "checks", _checks(report)),
         ("Registration", "registration", _registration(report, drawn)),
         ("Room and mounts", "poses", _table(poses_table(report), _POSES, "room and mounts")),
-        ("Accuracy", "accuracy", _table(accuracy_table(report), _ACCURACY, "accuracy")),
+        ("Accuracy", "accuracy", _accuracy(report)),
         ("Errors over time", "residuals", chart_figure(drawn["residuals"]) if "residuals" in drawn else Markup()),
         ("Reconstruction", "scores", _table(scores_table(report), "Errors of methods on this capture.", "scores")),
         ("Capture", "capture", _capture(report)),
@@ -95,6 +101,10 @@ def _registration(report: ValidationReport, drawn: Mapping[str, Chart]) -> Marku
         return Markup()
     chart = chart_figure(drawn["registration"]) if "registration" in drawn else None
     return join(tag("p", _REGISTRATION), chart, _table(numbers_table(report), "Estimates.", "registration"))
+
+
+def _accuracy(report: ValidationReport) -> Markup:
+    return join(_table(accuracy_table(report), _ACCURACY, "accuracy"), bullet_list(accuracy_reasons(report)))
 
 
 def _table(table: Table, caption: str, label: str) -> Markup:

@@ -69,6 +69,16 @@ def accuracy_table(report: ValidationReport) -> Table:
     return Table(head, rows)
 
 
+def accuracy_reasons(report: ValidationReport) -> list[str]:
+    """Why errors of stations were not measured, each reason once with its stations."""
+    stations: dict[str, list[str]] = {}
+    for row in report.accuracy:
+        for reason in dict.fromkeys((row.position_rms_m.reason, row.orientation_rms_rad.reason)):
+            if reason:
+                stations.setdefault(reason, []).append(row.station)
+    return [f"{', '.join(names)}: {reason}" for reason, names in stations.items()]
+
+
 def _both(number: Measured, shown: Quantity) -> list[str]:
     return [format_value(number, shown), format_ends(number, shown)]
 

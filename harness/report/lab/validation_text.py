@@ -6,6 +6,7 @@ from harness.report.lab.departure_wording import departure_text
 from harness.report.lab.unit_tables import capture_text
 from harness.report.lab.validation_content import ValidationReport
 from harness.report.lab.validation_tables import (
+    accuracy_reasons,
     accuracy_table,
     numbers_table,
     poses_table,
@@ -31,6 +32,7 @@ def format_validation(report: ValidationReport) -> str:
         (f"checks against {report.expected_from}", departures_table(report.checks)),
     ):
         lines += _part(title, table)
+        lines += [f"not measured: {text}" for text in accuracy_reasons(report)] if title == "accuracy" else []
     return "\n".join([*lines, *([""] if report.notes else []), *(f"note: {text}" for text in report.notes)])
 
 

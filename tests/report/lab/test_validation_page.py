@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.errors import ShapeError
+from harness.measure.measured import Measured
 from harness.report.kit.style import to_svg
 from harness.report.lab import validation_page
 from harness.report.lab.validation_charts import charts, largest_of_stretches
@@ -92,6 +93,18 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path) -> None:
     assert f"time offset by position all not measured {NO_STAMPS}" in text_of(page)
     assert validation_answer(report).startswith("walk.is900rec was not held to any expected number")
     assert registration_sentences(report) == ["2,390 of 2,400 frames were matched (99.6 %)."]
+
+
+def test_reasons_stand_below_the_accuracy(tmp_path: Path) -> None:
+    full = made_up_validation()
+    short = Measured.missing("The capture is too short.")
+    rows = tuple(replace(row, position_rms_m=short, position_median_m=short) for row in full.accuracy[:2])
+    report = replace(full, accuracy=(*rows, *full.accuracy[2:]))
+    text = f"{STATIONS[0]}, {STATIONS[1]}: The capture is too short."
+    assert text in text_of(write_validation_page(tmp_path / "page.html", report))
+    assert f"not measured: {text}" in format_validation(report)
+    assert "not measured: " not in format_validation(full)
+    assert validation_answer(report).startswith("walk.is900rec lies 2.8 to 3.1 mm")
 
 
 def test_without_checks_the_answer_has_the_errors_alone() -> None:
