@@ -27,6 +27,9 @@ from harness.study.trust.characterization import PRECISION, Characterization
 from harness.study.trust.expected_values import preset_values
 
 _RATE = "components.excursion.onsets_per_min"
+_TILT = "components.drift.pitch_roll_rad"
+_ORIENTATION_DRIFTS = (_TILT, _TILT, "components.drift.yaw_rad")
+"""Drift of the orientation about each axis."""
 _STATION_KEYS = {
     "white_m": "components.white.position_m",
     "slow_m": "components.drift.position_m",
@@ -73,9 +76,10 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         ),
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         stations=tuple(StationFigures(station, _figures(found, station)) for station in profile.stations),
-        allan_position=_allan(profile.rest, "position_m"),
-        allan_orientation=_allan(profile.rest, "rotation_rad"),
+        allan_position=_allan(found, "position_m"),
+        allan_orientation=_allan(found, "rotation_rad"),
         allan_position_model=_allan_model(found, "components.white.position_m", "components.drift.position_m"),
+        allan_orientation_model=_allan_model(found, "components.white.orientation_rad", *_ORIENTATION_DRIFTS),
         spectra=_spectra(profile.rest),
         episodes=_episodes(found),
         quality=tuple(
@@ -104,33 +108,38 @@ def _figures(found: Characterization, station: str) -> dict[str, Measured]:
     }
 
 
-def _allan(rest: tuple[StaticSeries, ...], name: str) -> tuple[DeviationCurve, ...]:
-    """Allan deviation of each station on one axis; a rest shorter than twice the longest time is left out."""
+def _allan(found: Characterization, name: str) -> tuple[DeviationCurve, ...]:
+    """Allan deviation of each station on one axis, without its episodes."""
     curves = []
-    for station in dict.fromkeys(one.station for one in rest):
-        longest_s = min(max(one.duration_s for one in rest if one.station == station) / 4.0, 300.0)
+    for station in found.profile.stations:
+        own = [one for one in found.profile.episodes.found if one.series.station == station]
+        longest_s = min(max((one.series.duration_s for one in own), default=0.0) / 4.0, 300.0)
         parts = [
-            measure_allan(getattr(one, name), one.valid, one.rate_hz, longest_s=longest_s)
-            for one in rest
-            if one.station == station and one.duration_s >= 2.0 * longest_s
+            measure_allan(
+                getattr(one.series, name), one.series.valid & ~one.disturbed, one.series.rate_hz, longest_s=longest_s
+            )
+            for one in own
+            if one.series.duration_s >= 2.0 * longest_s > 0.0
         ]
-        pooled = pool_allan(parts)
-        low, high = pooled.interval.T
-        curves.append(DeviationCurve(station, pooled.tau_s, pooled.deviation, low, high))
+        if parts:
+            pooled = pool_allan(parts)
+            low, high = pooled.interval.T
+            curves.append(DeviationCurve(station, pooled.tau_s, pooled.deviation, low, high))
     return tuple(curves)
 
 
-def _allan_model(found: Characterization, white: str, drift: str) -> DeviationCurve | None:
-    """Allan deviation of the fitted white noise and drift; None where one of them was not measured."""
+def _allan_model(found: Characterization, white: str, *drifts: str) -> DeviationCurve | None:
+    """Allan deviation of the fitted noise, the mean over the three axes; None where a number was not measured."""
     parameters = found.profile.parameters
-    numbers = [parameters[key] for key in (white, drift, "components.drift.correlation_s")]
+    numbers = [parameters[key] for key in (white, "components.drift.correlation_s", *drifts)]
     if not all(number.is_measured for number in numbers):
         return None
     rate_hz = found.profile.rate_hz
     tau_s = np.exp2(np.arange(int(np.log2(100.0 * rate_hz)) + 1, dtype=np.float64)) / rate_hz
-    deviation = expected_allan(tau_s, rate_hz, *(number.value for number in numbers))
+    noise, correlation_s, *sizes = (number.value for number in numbers)
+    axes = [expected_allan(tau_s, rate_hz, noise, size, correlation_s) ** 2 for size in sizes]
     unknown = np.full(len(tau_s), np.nan)
-    return DeviationCurve("fitted noise and drift", tau_s, deviation, unknown, unknown)
+    return DeviationCurve("fitted noise and drift", tau_s, np.sqrt(np.mean(axes, axis=0)), unknown, unknown)
 
 
 def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:

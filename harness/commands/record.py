@@ -88,6 +88,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.experiment.playback import prepare_playback
+    from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
     RecordingWriter(args.file).close()  # refuses a file that cannot be written before a long simulation
@@ -118,15 +119,20 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         **_plan_note(args),
     }
     seconds = math.inf if args.seconds is None else args.seconds
-    written = record_capture(args.file, simulation.wire_format, simulation.wire, note, seconds=seconds)
+    if left_out := unapplied_kinds(played.fault):
+        print_status(f"faults of the scenario that need a line, and are left out: {', '.join(left_out)}")
+    wire = add_byte_faults(simulation.wire, played.fault, played.seed)
+    written = record_capture(args.file, simulation.wire_format, wire, note, seconds=seconds)
     return _print_recording(args, written.counts)
 
 
 def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     """The entry of a recording's note that names the plan it was made for; none without a plan."""
+    if args.plan is None:
+        return {}
     from harness.study.trust.plan import plan_digest
 
-    return {} if args.plan is None else {"plan": plan_digest(args.plan)}
+    return {"plan": plan_digest(args.plan)}
 
 
 def _record_port(args: argparse.Namespace) -> Outcome:

@@ -16,7 +16,6 @@ from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin, Status
 from harness.live.capture import CapturedFrame, CaptureThread
-from harness.live.clock import HostClockEstimator
 from harness.live.dropping_queue import DroppingQueue
 from harness.live.latency import StageLatencies
 from harness.live.live_statistics import LiveStatistics
@@ -24,6 +23,7 @@ from harness.live.low_latency import collect_garbage, low_latency_mode
 from harness.live.pose import LivePose, Output
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream
+from harness.stream.host_clock import HostClockEstimator
 
 QUEUE_FRAMES = 32
 """Length of the queue of frames, a quarter of a second at 120 Hz. Solving is several times faster than the frame rate,

@@ -12,10 +12,12 @@ from harness.stream.recording.station_readings import StationReadings
 MIN_REST_S = 5.0
 """Shortest rest that is used [s]."""
 _WINDOW_S = 1.0
+_NEIGHBOURS = 2
+"""Windows on either side whose medians must agree with that of a window at rest."""
 _STILL_M, _STILL_RAD = 0.02, float(np.deg2rad(1.5))
 """Largest median distance from the median within a window: far above noise and drift at rest [choice]."""
-_STEP_M, _STEP_RAD = 0.07, float(np.deg2rad(3.0))
-"""Largest step of the median from one window to the next: two opposite excursions of 3 cm are nearer [choice]."""
+_RANGE_M, _RANGE_RAD = 0.07, float(np.deg2rad(4.0))
+"""Largest distance between the medians of near windows: two opposite excursions of 3 cm are nearer [choice]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +57,10 @@ class StaticSeries:
 def find_rest(readings: StationReadings, rate_hz: float) -> Ints:
     """Rows (K, 2), first and end, of the stretches of at least `MIN_REST_S` in which the station rests.
 
-    Windows of one second are at rest if the median distance from their median pose is small, and so is the step from
-    the window before. Echoes, gaps and excursions of up to 3 cm do not end a rest. A window without valid readings, in
-    which the station is lost, does not end it either, but a rest neither begins nor ends with one.
+    Windows of one second are at rest if the median distance from their median pose is small, and if the medians of
+    five consecutive windows are near each other. So motion of 2 cm/s or 1 deg/s is found. Echoes, gaps, excursions of
+    up to 3 cm and a disagreement for one or two windows do not end a rest. A window without valid readings, in which
+    the station is lost, does not end it either, but a rest neither begins nor ends with one.
     """
     size = max(round(_WINDOW_S * rate_hz), 4)
     count = len(readings) // size
@@ -67,17 +70,16 @@ def find_rest(readings: StationReadings, rate_hz: float) -> Ints:
     place = readings.position_m[rows].reshape(count, size, 3)
     turn = readings.tracker_from_station[rows].reshape(count, size, 4)
     seen = (np.isfinite(place[..., 0]) & np.isfinite(turn[..., 0])).sum(axis=1) >= size // 4
-    still, last_m, last_turn = np.zeros(count, bool), None, None
+    still, middle_m, middle_turn = np.zeros(count, bool), np.full((count, 3), np.nan), np.full((count, 4), np.nan)
     for i in np.flatnonzero(seen).tolist():
-        middle_m = np.nanmedian(place[i], axis=0)
-        middle_turn = _mean_orientation(turn[i])
-        near = np.nanmedian(np.linalg.norm(place[i] - middle_m, axis=1)) < _STILL_M
-        near &= np.nanmedian(rotations.angle_between_rad(turn[i], middle_turn)) < _STILL_RAD
-        if last_m is not None and last_turn is not None and still[:i][seen[:i]][-1:].any():
-            near &= np.linalg.norm(middle_m - last_m) < _STEP_M
-            near &= rotations.angle_between_rad(middle_turn, last_turn) < _STEP_RAD
-        still[i], last_m, last_turn = near, middle_m, middle_turn
+        middle_m[i], middle_turn[i] = np.nanmedian(place[i], axis=0), _mean_orientation(turn[i])
+        still[i] = np.nanmedian(np.linalg.norm(place[i] - middle_m[i], axis=1)) < _STILL_M
+        still[i] &= np.nanmedian(rotations.angle_between_rad(turn[i], middle_turn[i])) < _STILL_RAD
     still |= ~seen
+    still &= _agrees_nearby(middle_m, middle_turn)
+    for first, end in find_runs(~still).tolist():
+        if first > 0 and end < count and end - first <= _NEIGHBOURS:
+            still[first:end] = True
     rests = []
     for first, end in find_runs(still).tolist():
         inside = np.flatnonzero(seen[first:end]) + first
@@ -91,15 +93,21 @@ def find_rest(readings: StationReadings, rate_hz: float) -> Ints:
 def static_series(readings: StationReadings, rest: tuple[int, int], rate_hz: float, station: str) -> StaticSeries:
     """The readings from row `rest[0]` to before `rest[1]` on the grid of the station's samples.
 
-    A sample's place is its device time times the rate, rounded, so that a sample that never came leaves a place empty.
-    Of records with one stamp the first is taken. Records without a stamp are left out.
+    A sample that never came leaves a place empty. The grid follows the stamps where their rate is not quite `rate_hz`.
+    Of records with one stamp the first is taken. Suspect records and those without a stamp are left out. If none has
+    a stamp, the places are those in order of arrival.
     """
     rows = np.arange(*rest)
-    rows = rows[np.isfinite(readings.measured_s[rows])]
-    begin_s = float(readings.measured_s[rows[0]])
-    place = np.round((readings.measured_s[rows] - begin_s) * rate_hz).astype(np.int64)
-    _, first = np.unique(place, return_index=True)
-    rows, place = rows[first], place[first]
+    stamped = np.isfinite(readings.measured_s[rows])
+    if stamped.any():
+        rows = rows[stamped & ~readings.suspect[rows]] if (~readings.suspect[rows[stamped]]).any() else rows[stamped]
+        place = _places(readings.measured_s[rows], rate_hz)
+        begin_s = float(readings.measured_s[rows[0]])
+    else:
+        place, begin_s = np.arange(len(rows)), float(readings.received_s[rows[0]])
+    rows, place = rows[place >= 0], place[place >= 0]
+    place, first = np.unique(place, return_index=True)
+    rows = rows[first]
     count = int(place[-1]) + 1
     turn = readings.tracker_from_station[rows]
     valid = np.zeros(count, bool)
@@ -115,6 +123,38 @@ def static_series(readings: StationReadings, rest: tuple[int, int], rate_hz: flo
     return StaticSeries(
         station, rate_hz, begin_s, float(readings.received_s[rows[0]]), position_m, rotation_rad, quality, valid
     )
+
+
+def _agrees_nearby(middle_m: Floats, middle_turn: Floats) -> Bools:
+    """(K,) whether all windows within `_NEIGHBOURS` of each are near each other; NaN is near to everything."""
+    count = len(middle_m)
+    out = np.ones(count, bool)
+    for lag in range(1, 2 * _NEIGHBOURS + 1):
+        apart = np.linalg.norm(middle_m[lag:] - middle_m[:-lag], axis=1) > _RANGE_M
+        apart |= rotations.angle_between_rad(middle_turn[lag:], middle_turn[:-lag]) > _RANGE_RAD
+        for i in np.flatnonzero(apart).tolist():  # the windows that have both of the pair among their neighbours
+            out[max(i + lag - _NEIGHBOURS, 0) : i + _NEIGHBOURS + 1] = False
+    return out
+
+
+def _places(measured_s: Floats, rate_hz: float) -> Ints:
+    """Place (N,) of each record on the grid of its stamps, from 0; -1 for a record whose time runs backwards.
+
+    Steps between records give the places, their regression on the stamps the rate, and this the places without the
+    rounding of single steps.
+    """
+    ahead = measured_s >= np.maximum.accumulate(measured_s)
+    times_s = measured_s[ahead]
+    place = np.concatenate([[0.0], np.cumsum(np.rint(np.diff(times_s) * rate_hz))])
+    if place[-1] > 0.0:
+        centred = place - place.mean()
+        period_s = float(centred @ times_s) / float(centred @ centred)
+        phase_s = float(np.median(times_s - place * period_s))
+        place = np.rint((times_s - phase_s) / period_s)
+        place -= place[0]
+    out = np.full(len(measured_s), -1)
+    out[ahead] = place.astype(np.int64)
+    return out
 
 
 def _mean_orientation(quaternions: Floats) -> Floats:

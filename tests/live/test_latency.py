@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from harness.live.clock import HostClockEstimator
 from harness.live.latency import DurationHistogram, StageLatencies
+from harness.stream.host_clock import HostClockEstimator
 from tests.live.posing import frame
 
 

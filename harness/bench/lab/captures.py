@@ -24,6 +24,7 @@ from harness.mocap import synthetic
 from harness.mocap.synthetic.rig import generate_rig
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.capture import ByteCapture
@@ -44,12 +45,14 @@ NO_FAULTS = (NO_FAULT, "none_validated")
 """Kinds of captures in which nothing may be named."""
 EARLIER = "earlier"
 """Kind of the capture of the same session whose validation the scale is compared with."""
-LOST_SHARE, REPEATED_SHARE, SCALE = 0.05, 0.01, 0.003
+LOST_SHARE, REPEATED_SHARE, SCALE, LATENCY_S = 0.05, 0.01, 0.003, 0.02
+"""Sizes of faults; the latency [s] is that to the first bit, and the last one comes a record later."""
 LEAST_DRAW = 0.05
 """Least size of the draw of a session's scale. With a smaller one no scenario plants the scale, and the next seed of
 the session is taken."""
 _NEXT_SEED = 1_000_000
-_PERFORMER, _BOXING_TAKE = "p1", "boxing_p1_01"
+_PERFORMER, _SESSION = "p1", "boxing_p1_01"
+"""Performer of the boxing, and the take that names the session of all boxing."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class PlantedNumber:
     key: str
     value: float
     station: str = ""
+    is_change: bool = False
+    """Whether the size is the difference from what is expected."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,8 @@ class PlantedFault:
     verb: Literal["characterize", "validate"]
     numbers: tuple[PlantedNumber, ...] = ()
     """Numbers that all have to be named; () where none may be."""
+    exchanged: tuple[str, ...] = ()
+    """Stations that have to be named as exchanged, each with the body that carries it."""
     take: str = FIVE_MINUTES
     seconds: float = SHORT_S
     """Length of the capture [s]; that of the take if it is shorter."""
@@ -136,12 +143,14 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
     "latency": PlantedFault(
         "latency 20 ms",
         "validate",
-        (PlantedNumber("latency_s", 0.02),),
+        (PlantedNumber("latency_s", LATENCY_S + TrackerConfig().record_s),),
         take=BOXING,
-        tracker={"latency_s": 0.02},
+        tracker={"latency_s": LATENCY_S},
     ),
-    "scale": PlantedFault("scale 0.3 %", "validate", (PlantedNumber("scale", SCALE),), take=BOXING),
-    "exchanged": PlantedFault("two stations exchanged", "validate", take=BOXING),
+    "scale": PlantedFault("scale 0.3 %", "validate", (PlantedNumber("scale", SCALE, is_change=True),), take=BOXING),
+    "exchanged": PlantedFault(
+        "two stations exchanged", "validate", exchanged=("left_hand: rhand", "right_hand: lhand"), take=BOXING
+    ),
     "none_validated": PlantedFault("no fault, with a reference", "validate", take=BOXING),
     EARLIER: PlantedFault("an earlier capture of the session", "validate", take=BOXING),
 }
@@ -195,11 +204,10 @@ def planted_scenario(kind: str, seed: int) -> Scenario:
 def planted_motion(kind: str, seed: int) -> Clip:
     """The true motion of a capture: a take of the rig, or boxing that depends on the seed."""
     take = PLANTED_FAULTS[kind].take
-    return (
-        synthetic.generate(BOXING, _PERFORMER, 1, seed=seed, duration_s=BOXING_S)
-        if take == BOXING
-        else generate_rig(take)
-    )
+    if take != BOXING:
+        return generate_rig(take)
+    number = 2 if kind == EARLIER else 1
+    return synthetic.generate(BOXING, _PERFORMER, number, seed=seed, duration_s=BOXING_S)
 
 
 def planted_numbers(kind: str, seed: int) -> tuple[PlantedNumber, ...]:
@@ -226,8 +234,9 @@ def _simulate_line(scenario: Scenario, clip: Clip) -> tuple[WireFormat, ByteCapt
     wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
     trajectory = Trajectory(body, motion)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
+    session = _SESSION if clip.behaviour == BOXING else ""
     readings = simulate_readings(
-        trajectory, mounts, tracker, noise_of(scenario), time_s, seed=scenario.seed, take=clip.name
+        trajectory, mounts, tracker, noise_of(scenario), time_s, seed=scenario.seed, take=clip.name, session=session
     )
     return wire_format, transmit_readings(readings, wire_format, tracker)[1]
 
@@ -241,7 +250,7 @@ def _gaps_of_station(seed: int, until_s: float) -> list[dict[str, Any]]:
 
 def _scale_draw(seed: int) -> float:
     """The draw of `SessionBias` that the scale of the session is multiplied with."""
-    return float(generator(seed, "noise", _BOXING_TAKE, "session", "").normal())
+    return float(generator(seed, "noise", _SESSION, "session", "").normal())
 
 
 def _session_seed(seed: int) -> int:

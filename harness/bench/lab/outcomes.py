@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from harness.bench.lab.captures import planted_capture
+from harness.bench.lab.captures import PLANTED_FAULTS, planted_capture
+from harness.bench.lab.validated_captures import validate_planted
 from harness.core.fields import build
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, HarnessError
@@ -55,6 +56,8 @@ class CaptureOutcome:
     checks: tuple[StoredCheck, ...] = ()
     parameters: tuple[StoredNumber, ...] = ()
     """Parameters that were measured."""
+    exchanged: tuple[str, ...] = ()
+    """Stations that are not where they are said to be, each with the body that carries it: "head: thorax"."""
     failure: str = ""
     """Message with which the verb refused the capture; "" if it did not."""
 
@@ -62,6 +65,11 @@ class CaptureOutcome:
     def named(self) -> tuple[StoredCheck, ...]:
         """The departures that are named."""
         return tuple(check for check in self.checks if check.is_named)
+
+    @property
+    def names_nothing(self) -> bool:
+        """Whether nothing was found to be wrong."""
+        return not self.named and not self.exchanged and not self.failure
 
 
 def collect_outcomes(
@@ -99,6 +107,10 @@ def find_outcome(kind: str, seed: int, out: Path) -> CaptureOutcome:
 
 
 def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
+    if PLANTED_FAULTS[kind].verb == "validate":
+        against = validate_planted(kind, seed, folder)
+        exchanged = tuple(f"{station}: {body}" for station, body in sorted(against.exchanged.items()))
+        return CaptureOutcome(kind, seed, source_hash(), _stored_checks(against.checks), exchanged=exchanged)
     found = characterize_capture(planted_capture(kind, seed, folder))
     parameters = tuple(
         StoredNumber(key, one.value, one.low, one.high)

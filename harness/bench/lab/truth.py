@@ -6,6 +6,7 @@ from math import ceil
 from pathlib import Path
 
 from harness.bench.lab.captures import (
+    EARLIER,
     NO_FAULT,
     NO_FAULTS,
     PLANTED_FAULTS,
@@ -14,7 +15,7 @@ from harness.bench.lab.captures import (
     planted_numbers,
 )
 from harness.bench.lab.coverage import coverage_rows
-from harness.bench.lab.outcomes import CaptureOutcome, collect_outcomes
+from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, collect_outcomes
 from harness.bench.lab.planted_worlds import trust_rows
 from harness.core.progress import ProgressCallback
 from harness.experiment.executors import TaskExecutor
@@ -26,7 +27,7 @@ WANTED = 0.95
 """Share of the captures in which a fault has to be named, or nothing where there is none."""
 TOLERANCE = 0.2
 """Relative error of a size that is as good as lying within its interval."""
-KINDS = tuple(kind for kind, fault in PLANTED_FAULTS.items() if fault.verb == "characterize")
+KINDS = tuple(kind for kind in PLANTED_FAULTS if kind != EARLIER)
 """Kinds of captures, a row each."""
 
 
@@ -61,30 +62,35 @@ def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> TruthRow:
     minutes = min(planted_motion(kind, 1).duration_s, fault.seconds) / 60.0
     title, notes = f"{fault.verb}, {fault.title}, {minutes:.3g} min", _notes(kind, outcomes)
     if kind in NO_FAULTS:
-        clean = sum(not outcome.named and not outcome.failure for outcome in outcomes)
+        clean = sum(outcome.names_nothing for outcome in outcomes)
         return TruthRow(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
     named = [_is_named(outcome) for outcome in outcomes]
     sized = [_is_sized(outcome) for outcome in outcomes]
     both = sum(n and s for n, s in zip(named, sized, strict=True))
+    if not fault.numbers:
+        return TruthRow(title, f"named in {needed} of {count}", f"in {sum(named)}", sum(named) >= needed, "", notes)
     measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {both}"
     held_to = f"named with its size in {needed} of {count}"
     return TruthRow(title, held_to, measured, both >= needed, "", notes)
 
 
-def is_sized(planted: PlantedNumber, value: float, low: float, high: float) -> bool:
+def is_sized(planted: PlantedNumber, check: StoredCheck) -> bool:
     """Whether a measured number is within `TOLERANCE` of the planted one, or has it within its interval."""
-    return abs(value - planted.value) <= TOLERANCE * abs(planted.value) or low <= planted.value <= high
+    value = planted.value + (check.expected if planted.is_change else 0.0)
+    return abs(check.value - value) <= TOLERANCE * abs(planted.value) or check.contains(value)
 
 
 def _is_named(outcome: CaptureOutcome) -> bool:
     named = {(check.key, check.station) for check in outcome.named}
-    return all((one.key, one.station) in named for one in planted_numbers(outcome.kind, outcome.seed))
+    planted = planted_numbers(outcome.kind, outcome.seed)
+    exchanged = PLANTED_FAULTS[outcome.kind].exchanged
+    return all((one.key, one.station) in named for one in planted) and outcome.exchanged == exchanged
 
 
 def _is_sized(outcome: CaptureOutcome) -> bool:
     checks = {(check.key, check.station): check for check in outcome.checks}
     found = [(one, checks.get((one.key, one.station))) for one in planted_numbers(outcome.kind, outcome.seed)]
-    return all(check is not None and is_sized(one, check.value, check.low, check.high) for one, check in found)
+    return not outcome.failure and all(check is not None and is_sized(one, check) for one, check in found)
 
 
 def _notes(kind: str, outcomes: Sequence[CaptureOutcome]) -> str:
@@ -94,6 +100,8 @@ def _notes(kind: str, outcomes: Sequence[CaptureOutcome]) -> str:
     for outcome in outcomes:
         planted = {(one.key, one.station) for one in planted_numbers(kind, outcome.seed)}
         further = {check.key for check in outcome.named if (check.key, check.station) not in planted}
+        if outcome.exchanged != PLANTED_FAULTS[kind].exchanged:
+            further.add(f"exchanged stations ({', '.join(outcome.exchanged) or 'none'})")
         others.update(further)
     if others:
         listed = ", ".join(f"{key} in {number}" for key, number in others.most_common())

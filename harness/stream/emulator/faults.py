@@ -15,10 +15,20 @@ from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadInput
 
-ByteFaultKind = Literal["lost", "garbled", "duplicated", "added"]
+ByteFaultKind = Literal["lost", "garbled", "duplicated", "added", "repeated"]
 FaultEpisodeKind = Literal["burst", "stall", "disconnect", "reset", "lost_station"]
 FaultKind = Literal[
-    "lost", "garbled", "duplicated", "added", "burst", "stall", "disconnect", "reset", "lost_station", "firmware"
+    "lost",
+    "garbled",
+    "duplicated",
+    "added",
+    "repeated",
+    "burst",
+    "stall",
+    "disconnect",
+    "reset",
+    "lost_station",
+    "firmware",
 ]
 BYTE_FAULT_KINDS: tuple[str, ...] = get_args(ByteFaultKind)
 FAULT_EPISODE_KINDS: tuple[str, ...] = get_args(FaultEpisodeKind)
@@ -39,6 +49,7 @@ class Fault:
     """One kind of fault, and when it occurs. Raises BadInput where it is contradictory.
 
     - `lost`, `garbled`, `duplicated`, `added`: one byte of a record or reply is affected.
+    - `repeated`: a record or reply is sent twice.
     - `burst`: every byte is random for a while.
     - `stall`: the line sends nothing, and what it has no room for is dropped.
     - `disconnect`: the line is unplugged.
@@ -49,7 +60,7 @@ class Fault:
 
     kind: FaultKind
     share: Annotated[float, Range(0.0, 1.0)] = 0.0
-    """Share of the records and replies in which a byte is lost, changed, doubled or added, 0 to 1."""
+    """Share of the records and replies in which a byte is lost, changed, doubled or added, or that are sent twice."""
     at_s: Annotated[tuple[float, ...], Range(0.0, 1e6)] = ()
     """Times after power-on [s]."""
     per_minute: Annotated[float, Range(0.0, 6e4)] = 0.0
@@ -143,6 +154,8 @@ def _corrupt(kind: str, data: bytes, at: int, value: bytes) -> bytes:
             return head + bytes([byte_at[0] ^ value[0]]) + tail
         case "duplicated":
             return head + byte_at + byte_at + tail
+        case "repeated":
+            return data + data
         case _:
             return head + value + byte_at + tail
 

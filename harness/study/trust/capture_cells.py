@@ -44,7 +44,17 @@ from harness.simulate.trajectory import Trajectory
 from harness.stream.frame import TrackerFrame, split_frames
 from harness.stream.recording.replay import RecordingStream
 from harness.study.trust.loop_scores import score_loops
-from harness.study.trust.reading_errors import HealthCounts, count_health, ideal_readings, reading_errors
+from harness.study.trust.reading_errors import (
+    HealthCounts,
+    IdealReadings,
+    count_health,
+    ideal_readings,
+    reading_errors,
+    registered_readings,
+)
+from harness.study.trust.reconstruction_scores import measured_calibration, truth_times_s
+from harness.study.trust.truth_motion import truth_of_playback
+from harness.study.trust.validation import validate_capture
 
 _EXPECTED, _ADVICE = "the errors of a finished cell", "Delete the file and run again; finished cells are kept."
 
@@ -93,6 +103,8 @@ class CaptureResult:
     note: Mapping[str, Any]
     frames: int
     damage: tuple[str, ...]
+    notes: tuple[str, ...]
+    """How the capture was related to its motion, where its clock does not tell."""
     stations: tuple[str, ...]
     rate_hz: float
     device: dict[str, dict[str, float | None]] = field(default_factory=dict)
@@ -126,6 +138,10 @@ class _SideFrames:
     loops: tuple[LoopFrames, ...]
     rate_hz: float
     truth: PoseSequence
+    ideal: IdealReadings
+    calibration: Calibration
+    """What methods receive, of all stations."""
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def _columns(self) -> list[NDArray[Any]]:
@@ -173,7 +189,6 @@ class _CaptureRun:
             simulated.append(self._cells(f"seed {seed}", self._identity(seed), load))
             if seed == self.task.seeds[0]:
                 first = load()
-        ideal = [ideal_readings(self.playback, tracker_of(each)) for each in (self.playback.scenario, self.fitted)]
         sides = (self.device, first)
         return CaptureResult(
             clip=str(self.clip),
@@ -181,11 +196,12 @@ class _CaptureRun:
             note=self.note,
             frames=len(self.device.frames),
             damage=self.stream.recording.damage,
+            notes=self.device.notes,
             stations=tuple(self.playback.scenario.worn_stations),
             rate_hz=self.device.rate_hz,
             device=device,
             simulated={str(arm): [each.get(str(arm), {}) for each in simulated] for arm in self.task.arms},
-            readings=tuple(reading_errors(s.frames, s.loops, i) for s, i in zip(sides, ideal, strict=True)),
+            readings=tuple(reading_errors(side.frames, side.loops, side.ideal) for side in sides),
             health=tuple(count_health(side.frames, side.loops, side.rate_hz) for side in sides),
             failures=self.failures,
             methods_s=self.methods_s,
@@ -193,12 +209,62 @@ class _CaptureRun:
 
     @cached_property
     def device(self) -> _SideFrames:
-        """The capture, decoded once."""
+        """The capture, decoded once.
+
+        The frames of a played motion are found by the device's clock. A capture that names no clip itself, and which
+        that clock does not relate to the named one, is registered with it.
+        """
+        try:
+            return self._played()
+        except BadInput:
+            if not self.task.clip or self.note.get("clip"):
+                raise
+        return self._registered()
+
+    def _played(self) -> _SideFrames:
+        """The capture of a motion that an emulator or the simulator played; BadInput for another motion."""
         matched, tracker = match_recording(self.stream, self.playback), self.playback.tracker
         trajectory = Trajectory(self.playback.body, self.playback.take)
         time_s = sampling_times_s(trajectory.duration_s, tracker, len(self.stream.stations))
         truth = compute_poses(self.playback.body.skeleton, trajectory.qpos(time_s.mean(axis=1)))
-        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, truth)
+        ideal = ideal_readings(self.playback, tracker)
+        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, truth, ideal, self.playback.calibration)
+
+    def _registered(self) -> _SideFrames:
+        """The capture of a performer, related to the clip by `validate`, whose room and mounts methods receive.
+
+        BadInput for motion or stations that are not those of the clip.
+        """
+        found = validate_capture(self.task.capture, truth_of_playback(self.playback, 0.0, host_clock=False))
+        if found.exchanged:
+            raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
+        frames, rate_hz = tuple(self.stream), self.playback.tracker.rate_hz
+        trajectory = Trajectory(self.playback.body, self.playback.take)
+        number = np.round(truth_times_s(frames, found.registration) * rate_hz)
+        count = int(trajectory.duration_s * rate_hz) + 1
+        rows = np.flatnonzero((number >= 0.0) & (number < count))
+        highest = np.maximum.accumulate(np.append(-1.0, number[rows]))[:-1]
+        rows = rows[number[rows] > highest]
+        index = number[rows].astype(np.int64)
+        stamps_s = np.array([frames[row].measured_s for row in rows])
+        known_s = found.registration.state.truth_time_s(stamps_s.ravel(), of_position=False).reshape(stamps_s.shape)
+        time_s = np.tile(np.arange(count)[:, None] / rate_hz, (1, stamps_s.shape[1]))
+        time_s[index] = np.where(np.isfinite(known_s), known_s, time_s[index])
+        time_s = np.clip(time_s, 0.0, trajectory.duration_s)
+        calibration = measured_calibration(found.registration)
+        offset_s = found.numbers["time_offset_orientation_s"].value
+        return _SideFrames(
+            frames,
+            (LoopFrames(rows, index),),
+            rate_hz,
+            compute_poses(self.playback.body.skeleton, trajectory.qpos(time_s.mean(axis=1))),
+            registered_readings(trajectory, calibration, time_s),
+            calibration,
+            (
+                f"{self.task.capture.name} was registered with {self.clip}: its clock is {offset_s:.4f} s ahead, and "
+                "methods received the room and mounts that were found; in the simulation they received the true ones.",
+            ),
+        )
 
     @cached_property
     def fitted(self) -> Scenario:
@@ -229,7 +295,8 @@ class _CaptureRun:
         rows: Ints = np.flatnonzero((found.frame_index >= first - 0.5) & (found.frame_index <= last + 0.5))
         loop = LoopFrames(rows, found.frame_index[rows])
         truth = compute_poses(self.playback.body.skeleton, found.truth_qpos)
-        return _SideFrames(found.frames, (loop,), tracker.rate_hz, truth)
+        ideal = ideal_readings(self.playback, tracker)
+        return _SideFrames(found.frames, (loop,), tracker.rate_hz, truth, ideal, self.playback.calibration)
 
     @cached_property
     def _span_s(self) -> tuple[float, float]:
@@ -284,7 +351,7 @@ class _CaptureRun:
         shown = frames.of_stations(rows)
         start = time.perf_counter()
         fitted = evaluation.fit_method(method, arm.method)
-        answers = run_over_frames(fitted, _select_stations(self.playback.calibration, rows), shown)
+        answers = run_over_frames(fitted, _select_stations(frames.calibration, rows), shown)
         self.methods_s += time.perf_counter() - start
         errors = score_loops(self.task.metrics, answers, frames.loops, frames.truth, frames.rate_hz)
         with named_folder_fault(self.task.out):

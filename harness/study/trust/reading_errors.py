@@ -12,6 +12,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
+from harness.core.calibration import Calibration
 from harness.core.runs import find_runs
 from harness.experiment.playback import Playback
 from harness.experiment.score_recording import LoopFrames
@@ -48,6 +49,16 @@ def ideal_readings(playback: Playback, tracker: TrackerConfig) -> IdealReadings:
         trajectory, session.true_mounts, tracker, Noise(), time_s, seed=0, take=playback.take.name
     )
     return IdealReadings(found.position_m, found.turn)
+
+
+def registered_readings(trajectory: Trajectory, calibration: Calibration, time_s: Floats) -> IdealReadings:
+    """Readings of a take at times (E, S) [s] of a tracker whose room and mounts a registration found."""
+    motion = trajectory.station_motion(calibration, time_s)
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    return IdealReadings(
+        rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
+        rotations.multiply(tracker_from_world, motion.world_from_station),
+    )
 
 
 def reading_errors(

@@ -62,7 +62,7 @@ def score_registered(
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
     frames = list(RecordingStream(path))
-    time_s = _truth_times_s(frames, found.registration)
+    time_s = truth_times_s(frames, found.registration)
     trajectory = Trajectory(playback.body, playback.take)
     rows = np.flatnonzero((time_s >= 0.0) & (time_s <= trajectory.duration_s))
     if len(rows) < 2.0 * WARM_UP_S * found.reader.wire.rate_hz:
@@ -92,7 +92,7 @@ def score_registered(
     return out
 
 
-def _truth_times_s(frames: Sequence[TrackerFrame], registration: Registration) -> Floats:
+def truth_times_s(frames: Sequence[TrackerFrame], registration: Registration) -> Floats:
     """(F,) mean time of each frame by the reference's clock [s]; NaN without stamps."""
     stamps_s = np.array([frame.measured_s for frame in frames])
     counted = np.isfinite(stamps_s)

@@ -185,7 +185,9 @@ def judge_study(
         for cell in (*result.device.values(), *(each for seeds in result.simulated.values() for each in seeds))
         for value in cell.values()
     )
-    notes = (f"{unmeasured} errors were not measured: too few frames have an estimate.",) if unmeasured else ()
+    notes = [note for result in results for note in result.notes]
+    if unmeasured:
+        notes.append(f"{unmeasured} errors were not measured: too few frames have an estimate.")
     return replace(
         head,
         health=_compare_health(results),
@@ -196,7 +198,7 @@ def judge_study(
         failures=failures,
         outcome=outcome,
         why=why,
-        notes=notes,
+        notes=tuple(notes),
     )
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.experiment.scenario import load_scenario
-from harness.live.clock import HostClockEstimator
 from harness.stream.codec.commands import set_output_list
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.items import SHORT_LIST
@@ -18,6 +17,7 @@ from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import ByteFaultKind, Fault
 from harness.stream.frame import TrackerFrame
+from harness.stream.host_clock import HostClockEstimator
 from tests.stream.driver.bench import START_S, Adapter, Bench, Device, EmulatedDevice, LineLog, frames_for, make_samples
 
 MAX_RECOVERY_S = 2.0

@@ -25,21 +25,24 @@ def run_emulator(
     return emulator, sent
 
 
-BYTE_FAULTS = {kind: Fault(kind, share=0.1) for kind in ("lost", "garbled", "duplicated", "added")}
+BYTE_FAULTS = {kind: Fault(kind, share=0.1) for kind in ("lost", "garbled", "duplicated", "added", "repeated")}
 
 
 @pytest.mark.parametrize("kind", BYTE_FAULTS)
 def test_byte_faults_change_a_share_of_the_messages_and_are_logged(kind: str) -> None:
     _, sent = run_emulator(BYTE_FAULTS[kind])
-    extra_bytes = {"lost": -1, "garbled": 0, "duplicated": 1, "added": 1}[kind]
+    extra_bytes = {"lost": -1, "garbled": 0, "duplicated": 1, "added": 1}
     damaged = [message for message in sent if message.damage]
     assert 0.05 < len(damaged) / len(sent) < 0.15
     assert all(message.data == message.message.data and message.sound for message in sent if not message.damage)
     for message in damaged:
         assert message.damage == (kind,)
         assert not message.sound
-        assert len(message.data) == len(message.message.data) + extra_bytes
+        more = len(message.message.data) if kind == "repeated" else extra_bytes[kind]
+        assert len(message.data) == len(message.message.data) + more
         assert message.data != message.message.data
+    if kind == "repeated":
+        assert all(message.data == 2 * message.message.data for message in damaged)
     if kind == "duplicated":
         assert all(any(a == b for a, b in zip(message.data, message.data[1:], strict=False)) for message in damaged)
 

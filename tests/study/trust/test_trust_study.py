@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, Outcome, UnknownName
+from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
+from harness.stream.recording.recording import record_capture
 from harness.study.trust import capture_cells
 from harness.study.trust.capture_cells import Arm, CaptureTask, run_capture
 from harness.study.trust.expected_values import preset_components
@@ -70,6 +72,34 @@ def test_errors_of_the_simulation_are_not_those_of_the_device_though_the_seed_is
     both = np.isfinite(device[: len(simulated)]) & np.isfinite(simulated[: len(device)])
     assert both.sum() > 1000
     assert abs(np.corrcoef(device[: len(both)][both], simulated[: len(both)][both])[0, 1]) < 0.3
+
+
+def test_a_capture_of_a_performer_is_registered_with_the_clip(small_study: SmallStudy, tmp_path: Path) -> None:
+    """The room is not that of the scenario, so that only a registration relates the capture to the clip."""
+    text = small_study.plan.with_name("small.toml").read_text(encoding="utf-8").replace("= 3.0", "= 20.0")
+    (tmp_path / "long.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "room.toml").write_text(text + "[tracker]\norigin_m = [0.3, -0.2, 2.6]\n", encoding="utf-8")
+    (tmp_path / "cells").mkdir()
+    found = []
+    for room in ("long.toml", "room.toml"):
+        simulation = prepare_playback(tmp_path / room, clip="boxing_p1_01").simulation
+        capture = tmp_path / f"{room}.rec"
+        record_capture(capture, simulation.wire_format, simulation.wire, {"source": "port"})
+        arm = Arm("ik:previous", "all", simulation.stations)
+        metrics = ("joint_angle_mean_deg",)
+        scenario = tmp_path / "long.toml"
+        task = CaptureTask(capture, "boxing_p1_01", scenario, (arm,), {}, metrics, (1,), None, tmp_path, None)
+        found.append(run_capture(task))
+        with pytest.raises(BadInput, match="Name the clip"):
+            run_capture(replace(task, clip=""))
+    played, registered = found
+    assert (played.notes, len(registered.notes)) == ((), 1)
+    assert "room.toml.rec was registered with boxing_p1_01" in registered.notes[0]
+    errors = [result.device["ik:previous, all"]["joint_angle_mean_deg"] for result in found]
+    assert errors[1] == pytest.approx(errors[0], rel=0.15)
+    for feature in ("position error", "orientation error"):
+        spread = [float(np.nanstd(result.readings[0][feature][0])) for result in found]
+        assert spread[1] == pytest.approx(spread[0], rel=0.15)
 
 
 def test_readings_and_health_of_both_sides_are_alike(finished: Path) -> None:
