@@ -16,7 +16,7 @@ from harness.core.runs import find_runs
 from harness.measure.static_series import StaticSeries
 
 THRESHOLD = 36.0
-"""Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in some hundred hours."""
+"""Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in about ten station hours."""
 STAYS_S = tuple(float(0.4 * 1.2**k) for k in range(19))
 """Durations of the matched filters, from the onset to the beginning of the return [s]."""
 DEFAULT_RAMP_S = 0.2
