@@ -21,7 +21,7 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig
+from harness.mocap.synthetic.rig import generate_rig, stretch_marks
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.session_bias import SessionBias
 from harness.simulate.link import TrackerConfig
@@ -180,7 +180,8 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         "harness": VERSION,
     }
     path = folder / f"{kind}_{seed}.rec"
-    record_capture(path, wire_format, wire, note, seconds=min(seconds, PLANTED_FAULTS[kind].seconds))
+    recorded_s = min(seconds, PLANTED_FAULTS[kind].seconds)
+    record_capture(path, wire_format, wire, note, seconds=recorded_s, marks=stretch_marks(clip.name))
     return path
 
 
