@@ -19,7 +19,9 @@ from harness.measure.registration_model import OWN, SHARED, RegistrationState, l
 OUTLIER = 4.0
 """Residuals larger than this many robust deviations are left out."""
 BLOCK_CORRELATIONS = 5.0
-"""Shortest block of the covariance, in correlation times."""
+"""Length of a block of the covariance, in correlation times."""
+FEWEST_BLOCKS = 6
+"""Blocks are shortened to have this many of them."""
 _AXES = ((0, 1, 2), (3, 4), (5,))
 """Axes of a reading with one noise: position, pitch and roll, yaw."""
 _CHI_MEDIAN = 1.538
@@ -164,7 +166,7 @@ def _whitened_step(
     for s, grid in enumerate(grids):
         residual, slope = _linear(state, s, grids, truths)
         longest_s = max(process.correlation_s for process in noise[s])
-        block_rows = max(round(BLOCK_CORRELATIONS * min(longest_s, 2.0) / grid.period_s), 1)
+        block_rows = max(min(round(BLOCK_CORRELATIONS * longest_s / grid.period_s), len(residual) // FEWEST_BLOCKS), 1)
         gradient = np.zeros((len(residual), SHARED + OWN))
         for process, axes in zip(noise[s], _AXES, strict=True):
             valid = used[s][:, int(axes[0] >= 3)]
