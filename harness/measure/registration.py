@@ -279,7 +279,7 @@ def _start(
     for grid, spline in zip(grids.values(), splines, strict=True):
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
-    solved = solve_hand_eye(paired)
+    solved = solve_hand_eye(paired, with_scale=False)
     return RegistrationState(
         middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, 0.0, 0.0,
         solved.body_from_station, solved.mount_m,

@@ -206,7 +206,9 @@ def _covariance(information: Floats, meat: Floats, blocks: int, fixed: Sequence[
     free = _free(len(information), fixed)
     inside = np.ix_(free, free)
     scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
-    inverse = np.linalg.pinv(information[inside] / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
+    curvature, directions = np.linalg.eigh(information[inside] / scale[:, None] / scale)
+    # A direction that nothing shows keeps a variance, which is then too large to pass.
+    inverse = (directions / np.maximum(curvature, 1e-13)) @ directions.T / scale[:, None] / scale
     sandwich = inverse @ meat[inside] @ inverse
     factor = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
     out = np.zeros_like(information)

@@ -70,6 +70,17 @@ def test_one_body_that_turns_about_two_axes_shows_the_room_for_all(rng: np.rando
     assert rotations.angle_between_rad(found.body_from_station[0], mount) < 1e-7
 
 
+def test_a_body_that_stays_in_place_does_not_show_the_scale(rng: np.random.Generator) -> None:
+    room, zero = rotations.exp(np.array([0.3, 1.0, 0.2])), np.zeros(3)
+    moving = pair_poses(rng, room, np.array([0.3, -1.0, 2.5]), rotations.IDENTITY, zero)
+    still_m = rotations.rotate(room, np.tile([-0.3, 1.0, -2.5], (40, 1)))
+    still = PosePairs(still_m, moving.tracker_from_station, np.zeros((40, 3)), moving.world_from_body)
+    with pytest.raises(BadInput, match="Not observable: the scale"):
+        solve_hand_eye([still])
+    found = solve_hand_eye([still], with_scale=False)
+    assert rotations.angle_between_rad(found.tracker_from_world, room) < 1e-7
+
+
 def test_spread_is_that_about_the_second_axis() -> None:
     angle = np.linspace(-0.3, 0.3, 1001)
     turns = np.stack([2.0 * angle, np.zeros_like(angle), np.roll(angle, 300)], axis=1)

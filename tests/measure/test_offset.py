@@ -63,7 +63,7 @@ def test_all_pairs_share_one_offset(rng: np.random.Generator) -> None:
 
 def test_little_overlap_is_refused(rng: np.random.Generator) -> None:
     short = SpeedSeries(0.0, PERIOD_S, series(rng, 100))
-    with pytest.raises(BadInput, match="overlap by at most 2.5 s"):
+    with pytest.raises(BadInput, match=r"overlap by at most 2\.5 s"):
         time_offset([short], [SpeedSeries(0.0, PERIOD_S, series(rng, 4000))])
     with pytest.raises(BadInput, match="different periods"):
         time_offset([short], [SpeedSeries(0.0, 0.02, series(rng, 4000))])
