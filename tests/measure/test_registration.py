@@ -1,17 +1,26 @@
 """Registration of captures with known errors."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from harness.body.humanoid import build_body
+from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.humanoid24 import pack
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.measured import Measured
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.measure.registration import MountFit, Registration, register
+from harness.mocap import synthetic
+from harness.mocap.library import MotionLibrary
+from harness.simulate.noise import noise_preset
+from tests.measure.boxing_captures import BoxingCapture, capture_boxing
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
 
 NAMES = ("hand", "head", "foot")
@@ -193,3 +202,45 @@ def test_intervals_contain_the_truth() -> None:
     shares = {key: float(np.mean(values)) for key, values in covered.items()}
     print(shares)
     assert all(0.9 <= share <= 0.99 for share in shares.values()), shares
+
+
+def check_figures(captures: list[BoxingCapture]) -> None:
+    """The figures of a minute of boxing: each capture, and the median rotation."""
+    angles = []
+    for capture in captures:
+        found = register(capture.stations, capture.truths, pairs=capture.body_of)
+        values = found.values
+        late_s = 20e-6 * found.reference_s
+        assert values["time_offset_orientation_s"].value == pytest.approx(late_s, abs=0.5e-3)
+        assert values["position_ahead_s"].value == pytest.approx(0.002, abs=0.6e-3)
+        assert values["clock_ratio_ppm"].value == pytest.approx(20.0, abs=10.0)
+        assert values["scale"].value == pytest.approx(capture.scale, abs=1e-3)
+        assert values["heading_rad"].value == pytest.approx(0.0, abs=np.deg2rad(0.5))
+        assert np.linalg.norm(found.tracker_origin_m - capture.tracker_origin_m) < 0.002
+        angles.append(rotations.angle_between_rad(found.world_from_tracker, capture.world_from_tracker))
+        for station, (mount_m, mount) in capture.mounts.items():
+            measured = found.mounts[station]
+            assert np.linalg.norm(measured.position_m - mount_m) < 0.002, station
+            angles.append(rotations.angle_between_rad(measured.body_from_station, mount))
+    print("largest and median angle", np.rad2deg([np.max(angles), np.median(angles)]))
+    assert np.max(angles) < np.deg2rad(0.5)
+    assert np.median(angles) < np.deg2rad(0.3)
+
+
+@pytest.mark.long
+def test_a_minute_of_synthetic_boxing_meets_the_figures() -> None:
+    captures = []
+    for performer in ("p1", "p2"):
+        clip = synthetic.generate("boxing", performer, 1, seed=3, duration_s=60.0, rate_hz=120.0)
+        qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)
+        take = BodyMotion(clip.name, clip.subject, clip.source, clip.behaviour, 120.0, qpos)
+        captures += [capture_boxing(build_body(), take, noise_preset("default"), seed) for seed in (1,)]
+    check_figures(captures)
+
+
+@pytest.mark.long
+def test_real_boxing_meets_the_figures(mocap: Path) -> None:
+    clips = [MotionLibrary(mocap).load(name) for name in ("13_17", "14_02")]
+    moved = [(name, *retarget_to_own_body(clip)) for name, clip in zip(("13_17", "14_02"), clips, strict=True)]
+    print({name: len(take) / take.rate_hz for name, _, take in moved})
+    check_figures([capture_boxing(body, take, noise_preset("default"), 1) for _, body, take in moved])
