@@ -4,18 +4,20 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
+from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.measure.offset import SpeedSeries, angular_speed, time_offset
 
 PERIOD_S = 0.025
 
 
-def series(rng: np.random.Generator, count: int) -> np.ndarray:
-    return np.convolve(rng.normal(size=count + 8), np.hanning(9), "valid")
+def series(rng: np.random.Generator, count: int) -> Floats:
+    out: Floats = np.convolve(rng.normal(size=count + 8), np.hanning(9), "valid")
+    return out
 
 
 def test_angular_speed_of_steady_rotation() -> None:
-    time_s = 5.0 + PERIOD_S * np.arange(100)
+    time_s = 5.0 + PERIOD_S * np.arange(100.0)
     turn = rotations.exp(np.array([0.0, 0.0, 3.0]) * time_s[:, None])
     valid = np.arange(100) != 50
     found = angular_speed(time_s, turn, valid, PERIOD_S)
@@ -39,11 +41,12 @@ def test_offset_of_shifted_series_with_gaps(shift: int, rng: np.random.Generator
 
 
 def test_offset_of_a_fraction_of_a_step(rng: np.random.Generator) -> None:
-    time_s = np.arange(2000) * PERIOD_S
+    time_s = np.arange(2000.0) * PERIOD_S
     hz, phase = rng.uniform(0.2, 2.0, 12), rng.uniform(0.0, 6.28, 12)
 
-    def speed(t: np.ndarray) -> np.ndarray:
-        return np.sin(6.283 * hz[:, None] * t + phase[:, None]).sum(axis=0)
+    def speed(t: Floats) -> Floats:
+        out: Floats = np.sin(6.283 * hz[:, None] * t + phase[:, None]).sum(axis=0)
+        return out
 
     first = SpeedSeries(0.0, PERIOD_S, speed(time_s - 0.3 * PERIOD_S))
     found = time_offset([first], [SpeedSeries(0.0, PERIOD_S, speed(time_s))])

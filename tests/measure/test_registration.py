@@ -99,17 +99,16 @@ def test_noise_echoes_excursions_and_gaps_are_withstood(rng: np.random.Generator
 
 
 @pytest.mark.parametrize(
-    ("key", "change"),
+    ("key", "tracker"),
     [
-        ("heading_rad", {"heading_rad": float(np.deg2rad(5.0))}),
-        ("scale", {"scale": 0.003}),
-        ("time_offset_orientation_s", {"offset_s": 0.02}),
-        ("time_offset_position_s", {"offset_s": 0.02, "ahead_s": -0.005}),
-        ("clock_ratio_ppm", {"ratio": 80e-6}),
+        ("heading_rad", replace(NOISY, heading_rad=float(np.deg2rad(5.0)))),
+        ("scale", replace(NOISY, scale=0.003)),
+        ("time_offset_orientation_s", replace(NOISY, offset_s=0.02)),
+        ("time_offset_position_s", replace(NOISY, offset_s=0.02, ahead_s=-0.005)),
+        ("clock_ratio_ppm", replace(NOISY, ratio=80e-6)),
     ],
 )
-def test_a_fault_is_measured_with_its_size(key: str, change: dict[str, float], rng: np.random.Generator) -> None:
-    tracker = replace(NOISY, **change)
+def test_a_fault_is_measured_with_its_size(key: str, tracker: Tracker, rng: np.random.Generator) -> None:
     stations, truths, mounts = make_capture(rng, tracker, 30.0)
     found = register(stations, truths)
     true = {name: value for name, _, value in list_errors(found, tracker, mounts, 15.0)}[key]
