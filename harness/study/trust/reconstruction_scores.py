@@ -97,5 +97,5 @@ def truth_times_s(frames: Sequence[TrackerFrame], registration: Registration) ->
     stamps_s = np.array([frame.measured_s for frame in frames])
     counted = np.isfinite(stamps_s)
     mean_s = np.where(counted, stamps_s, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    out = registration.state.truth_time_s(mean_s, of_position=False)
+    out = registration.state.truth_time_s(mean_s)
     return np.where(counted.any(axis=1), out, np.nan)

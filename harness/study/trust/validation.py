@@ -196,7 +196,7 @@ def _latency_s(readings: Mapping[str, StationReadings], registration: Registrati
     delays = []
     for station in registration.mounts:
         known = np.isfinite(readings[station].measured_s)
-        at_s = registration.state.truth_time_s(readings[station].measured_s[known], of_position=False)
+        at_s = registration.state.truth_time_s(readings[station].measured_s[known])
         delays.append(readings[station].received_s[known] - at_s)
     middle = float(np.median(np.concatenate(delays)))
     offset = registration.values["time_offset_orientation_s"]
