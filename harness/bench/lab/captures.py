@@ -10,8 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from harness.body.retargeting import retarget_to_own_body
 from harness.core.fields import replace_fields
 from harness.core.motion import Clip
@@ -29,6 +27,8 @@ from harness.simulate.simulation import sampling_times_s, simulate_readings, tra
 from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
+from harness.stream.emulator.faults import Fault
+from harness.stream.emulator.faulty_capture import add_byte_faults
 from harness.stream.recording.recording import record_capture
 
 SCENARIO = "lab"
@@ -81,6 +81,7 @@ class PlantedFault:
     """Length of the capture [s]; that of the take if it is shorter."""
     components: Mapping[str, Any] = field(default_factory=dict)
     tracker: Mapping[str, Any] = field(default_factory=dict)
+    line: tuple[Fault, ...] = ()
 
 
 PLANTED_FAULTS: Mapping[str, PlantedFault] = {
@@ -111,7 +112,10 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
         "station lost 5 %", "characterize", (PlantedNumber("components.dropout.share", LOST_SHARE, STATION),)
     ),
     "duplicates": PlantedFault(
-        "duplicates 1 %", "characterize", (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),)
+        "duplicates 1 %",
+        "characterize",
+        (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),),
+        line=(Fault("repeated", share=REPEATED_SHARE),),
     ),
     "clock": PlantedFault(
         "clock 80 ppm",
@@ -166,8 +170,7 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         raise UnknownName("planted fault", kind, PLANTED_FAULTS)
     scenario, clip = planted_scenario(kind, seed), planted_motion(kind, seed)
     wire_format, wire = _simulate_line(scenario, clip)
-    if kind == "duplicates":
-        wire = repeat_records(wire, seed)
+    wire = add_byte_faults(wire, scenario.fault, scenario.seed)
     note = {
         "source": "simulation",
         "scenario": SCENARIO,
@@ -198,7 +201,7 @@ def planted_scenario(kind: str, seed: int) -> Scenario:
         stations[STATION], stations[OTHER_STATION] = stations[OTHER_STATION], stations[STATION]
         scenario = replace(scenario, stations=stations)
     tracker = replace_fields(scenario.tracker, dict(fault.tracker), "tracker")
-    return replace(scenario, components=components, tracker=tracker)
+    return replace(scenario, components=components, tracker=tracker, fault=fault.line)
 
 
 def planted_motion(kind: str, seed: int) -> Clip:
@@ -217,14 +220,6 @@ def planted_numbers(kind: str, seed: int) -> tuple[PlantedNumber, ...]:
         return numbers
     sign = math.copysign(1.0, _scale_draw(_session_seed(seed)))
     return tuple(replace(number, value=sign * number.value) for number in numbers)
-
-
-def repeat_records(wire: ByteCapture, seed: int) -> ByteCapture:
-    """The capture of a line on which a share of the records is sent twice, both in one chunk."""
-    size = len(wire.data) // len(wire.ends)
-    twice = generator(seed, "planted", "repeated").random(len(wire.ends)) < REPEATED_SHARE
-    records = np.frombuffer(wire.data, np.uint8).reshape(-1, size)
-    return ByteCapture(np.repeat(records, 1 + twice, axis=0).tobytes(), size * np.cumsum(1 + twice), wire.received_s)
 
 
 def _simulate_line(scenario: Scenario, clip: Clip) -> tuple[WireFormat, ByteCapture]:
