@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.body.retargeting import retarget_to_own_body
+from harness.core.arrays import Floats
 from harness.core.fields import replace_fields
 from harness.core.motion import Clip
 from harness.core.package_data import VERSION
@@ -241,6 +242,13 @@ def _gaps_of_station(seed: int, until_s: float) -> list[dict[str, Any]]:
     more = Dropout(share=1.0 - (1.0 - LOST_SHARE) / (1.0 - Dropout.share))
     gaps = more.gaps(generator(seed, "planted", "lost"), until_s)
     return [{"station": STATION, "from_s": begin_s, "to_s": end_s, "fade_s": 0.0} for begin_s, end_s, _ in gaps]
+
+
+def station_offset_m(seed: int, station: str) -> Floats:
+    """(3,) offset of a station in its housing in the session of a boxing capture, in the station's axes [m]."""
+    draw = generator(seed, "noise", _SESSION, "session", station).normal(size=3)
+    out: Floats = SessionBias.station_offset_m * draw
+    return out
 
 
 def _scale_draw(seed: int) -> float:
