@@ -62,7 +62,6 @@ def validation_report(
         ),
         notes=(
             *found.truth.notes,
-            *(f"{key}: {number.reason}" for key, number in found.numbers.items() if number.reason),
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),
     )

@@ -20,12 +20,15 @@ from harness.report.lab.validation_content import ValidationReport
 from harness.report.lab.validation_tables import (
     accuracy_reasons,
     accuracy_table,
+    number_reasons,
     numbers_table,
     poses_table,
     scores_table,
 )
 from harness.report.lab.validation_wording import registration_sentences, validation_answer
 
+_FEWEST_CHECKS = 5
+"""Checks that are shown where none is a departure."""
 _REGISTRATION = (
     "These numbers were estimated from the capture and its reference, and taken out before errors were computed. An "
     "error that looks like one of them is therefore here and not in the errors of the stations."
@@ -83,14 +86,14 @@ def _lead(report: ValidationReport) -> Markup:
 def _checks(report: ValidationReport) -> Markup:
     if not report.checks:
         return Markup()
-    named = tuple(report.departures)
+    shown = len(report.departures) or _FEWEST_CHECKS
     table = html_table(
-        stack_intervals(departures_table(named or report.checks)),
+        stack_intervals(departures_table(report.checks, shown)),
         "The least likely first. Below the numbers: 95 % intervals. A departure has a p of at most 0.05 after Holm's "
         "correction.",
         label="checks",
     )
-    if not named:
+    if shown >= len(report.checks):
         return table
     every = html_table(stack_intervals(departures_table(report.checks)), "The least likely first.", label="all checks")
     return join(table, details(f"All {count_noun(len(report.checks), 'check')}", every))
@@ -100,7 +103,8 @@ def _registration(report: ValidationReport, drawn: Mapping[str, Chart]) -> Marku
     if not report.numbers:
         return Markup()
     chart = chart_figure(drawn["registration"]) if "registration" in drawn else None
-    return join(tag("p", _REGISTRATION), chart, _table(numbers_table(report), "Estimates.", "registration"))
+    table = _table(numbers_table(report), "Below the estimates: 95 % intervals.", "registration")
+    return join(tag("p", _REGISTRATION), chart, table, bullet_list(number_reasons(report)))
 
 
 def _accuracy(report: ValidationReport) -> Markup:

@@ -2,10 +2,11 @@
 
 import math
 
-from harness.core.number_format import MINUS, NOT_MEASURED, format_fixed, format_share
+from harness.core.number_format import format_fixed, format_number, format_share
 from harness.core.text_table import Table
 from harness.measure.measured import Measured
 from harness.report.kit.metric_labels import metric_label
+from harness.report.lab.check_table import ALL_STATIONS
 from harness.report.lab.quantities import Quantity, format_ends, format_value, quantity
 from harness.report.lab.stacked_intervals import INTERVAL
 from harness.report.lab.validation_content import ROOM, ValidationReport
@@ -19,16 +20,18 @@ def numbers_table(report: ValidationReport) -> Table:
     rows = [
         [
             quantity(one.key).label,
-            one.station or "all",
+            one.station or ALL_STATIONS,
             format_value(one.measured, quantity(one.key)),
             format_ends(one.measured, quantity(one.key)),
-            one.measured.reason,
         ]
         for one in report.numbers
     ]
-    if not any(row[-1] for row in rows):
-        return Table(["number", "station", "estimate", INTERVAL], [row[:-1] for row in rows], 2)
-    return Table(["number", "station", "estimate", INTERVAL, "because"], rows, 2)
+    return Table(["number", "station", "estimate", INTERVAL], rows, 2)
+
+
+def number_reasons(report: ValidationReport) -> list[str]:
+    """Why numbers of the registration were not measured."""
+    return [f"{quantity(one.key).label}: {one.measured.reason}" for one in report.numbers if one.measured.reason]
 
 
 def poses_table(report: ValidationReport) -> Table:
@@ -94,9 +97,12 @@ def scores_table(report: ValidationReport) -> Table:
     metrics = list(dict.fromkeys(one.metric for one in report.scores))
     methods = list(dict.fromkeys(one.method for one in report.scores))
     values = {(one.method, one.metric): one.value for one in report.scores}
-    rows = [[method, *(_score(values.get((method, metric))) for metric in metrics)] for method in methods]
+    rows = [
+        [method, *(format_number(values.get((method, metric)), _unit(metric)) for metric in metrics)]
+        for method in methods
+    ]
     return Table(["method", *(metric_label(metric) if metric in DEFINITIONS else metric for metric in metrics)], rows)
 
 
-def _score(value: float | None) -> str:
-    return NOT_MEASURED if value is None else f"{value:.3g}".replace("-", MINUS)
+def _unit(metric: str) -> str:
+    return DEFINITIONS[metric].unit if metric in DEFINITIONS else ""

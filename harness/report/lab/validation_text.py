@@ -8,6 +8,7 @@ from harness.report.lab.validation_content import ValidationReport
 from harness.report.lab.validation_tables import (
     accuracy_reasons,
     accuracy_table,
+    number_reasons,
     numbers_table,
     poses_table,
     scores_table,
@@ -24,15 +25,14 @@ def format_validation(report: ValidationReport) -> str:
     lines += [f"- {departure_text(check)}" for check in report.departures]
     lines += [*registration_sentences(report), "", capture_text(report.capture), f"reference: {report.truth}"]
     lines += [f"damage: {text}" for text in report.capture.damage]
-    for title, table in (
-        ("registration", numbers_table(report)),
-        ("room and mounts", without_intervals(poses_table(report))),
-        ("accuracy", without_intervals(accuracy_table(report))),
-        ("reconstruction", scores_table(report)),
-        (f"checks against {report.expected_from}", departures_table(report.checks)),
+    for title, table, reasons in (
+        ("registration", numbers_table(report), number_reasons(report)),
+        ("room and mounts", without_intervals(poses_table(report)), []),
+        ("accuracy", without_intervals(accuracy_table(report)), accuracy_reasons(report)),
+        ("reconstruction", scores_table(report), []),
+        (f"checks against {report.expected_from}", departures_table(report.checks), []),
     ):
-        lines += _part(title, table)
-        lines += [f"not measured: {text}" for text in accuracy_reasons(report)] if title == "accuracy" else []
+        lines += [*_part(title, table), *(f"not measured: {text}" for text in reasons)]
     return "\n".join([*lines, *([""] if report.notes else []), *(f"note: {text}" for text in report.notes)])
 
 

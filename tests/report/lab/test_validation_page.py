@@ -90,7 +90,7 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path) -> None:
     report = without_truth_of_time()
     page = write_validation_page(tmp_path / "page.html", report)
     assert section_ids(page) == ["registration", "command"]
-    assert f"time offset by position all not measured {NO_STAMPS}" in text_of(page)
+    assert f"time offset by position all not measured time offset by position: {NO_STAMPS}" in text_of(page)
     assert validation_answer(report).startswith("walk.is900rec was not held to any expected number")
     assert registration_sentences(report) == ["2,390 of 2,400 frames were matched (99.6 %)."]
 
@@ -132,6 +132,7 @@ def test_the_text_has_the_answer_first_and_fits_a_terminal() -> None:
     for title in ("registration", "room and mounts", "accuracy", "reconstruction", "checks against the preset default"):
         assert f"\n\n{title}\n" in joined
     assert "head                2.50      3.20       7.10" in joined
+    assert "not measured: time offset by position: The stream" in format_validation(without_truth_of_time())
     assert "note: Latency is known to 0.4 ms" in joined
 
 
