@@ -13,6 +13,7 @@ from harness.bench.lab.captures import STATION
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber, collect_outcomes, outcome_path
 from harness.errors import BadFile, BadInput
 from harness.experiment.executors import process_executor, run_in_process
+from harness.results.manifest import source_hash
 
 R = TypeVar("R")
 TASKS = [("clock", 1), ("none", 1), ("clock", 2)]
@@ -24,7 +25,7 @@ def _no_progress(step: str, done: int, planned: int) -> None:
 
 def _outcome(kind: str, seed: int, folder: Path) -> CaptureOutcome:
     check = StoredCheck("components.white.position_m", 0.1 * seed, 0.0, None, STATION, 0.3, 1e-9, True)
-    return CaptureOutcome(kind, seed, outcomes.source_hash(), (check,), (StoredNumber("a", 1.0, 0.5, 2.0),))
+    return CaptureOutcome(kind, seed, source_hash(), (check,), (StoredNumber("a", 1.0, 0.5, 2.0),))
 
 
 def _refuse(function: Callable[..., R], tasks: Sequence[tuple[Any, ...]]) -> Generator[tuple[int, Future[R]]]:

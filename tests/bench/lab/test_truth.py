@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.bench.lab import truth
-from harness.bench.lab.captures import NO_FAULT, PLANTED_FAULTS, STATION, planted_numbers
+from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STATION, planted_numbers
 from harness.bench.lab.coverage import coverage_rows
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber
 from harness.bench.lab.registration_errors import PROMISES, registration_rows
@@ -37,7 +37,7 @@ def test_every_kind_is_met_when_all_is_found_and_missed_when_nothing_is() -> Non
     assert all(row.met for row in rows)
     assert not any(row.note for row in rows)
     nothing = {(kind, seed): CaptureOutcome(kind, seed, "") for kind in KINDS for seed in seeds}
-    assert [row.met for row in fault_rows(seeds, nothing)] == [kind in truth.NO_FAULTS for kind in KINDS]
+    assert [row.met for row in fault_rows(seeds, nothing)] == [kind in NO_FAULTS for kind in KINDS]
 
 
 def test_a_size_may_be_near_or_within_its_interval() -> None:
