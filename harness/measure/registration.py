@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.errors import BadInput
+from harness.errors import BadInput, NotComparable
 from harness.measure.correlated_errors import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
 from harness.measure.measured import NORMAL_QUANTILE, Measured
@@ -171,8 +171,9 @@ def register(
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput that names what
-    is not observable: no stamps, too little overlap, too few matched records, another motion, motion about one axis.
+    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps
+    and for another motion. NotComparable for little overlap, few matched records and motion about one axis; it names
+    what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
@@ -245,7 +246,7 @@ def _make_grids(
     due = len(grids) * max((end_s - begin_s) / period_s, 1.0)
     matched = min(sum(int(grid.known.sum()) for grid in grids.values()) / due, 1.0)
     if matched < least_matched:
-        raise BadInput(
+        raise NotComparable(
             f"{100.0 * matched:.1f} % of the records due in the overlap have a pose and a reference.",
             f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings.",
         )
@@ -302,7 +303,7 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
     for what, unit, values in checks:
         worst = float(np.max(values))
         if not worst <= MOST_DEVIATION[unit]:
-            raise BadInput(
+            raise NotComparable(
                 f"Not observable from this motion: {what} (standard deviation {worst:.2g} {unit}).",
                 "Turn every body about two axes and move through the room.",
             )

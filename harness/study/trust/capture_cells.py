@@ -235,7 +235,7 @@ class _CaptureRun:
 
         BadInput for motion or stations that are not those of the clip.
         """
-        found = validate_capture(self.task.capture, truth_of_playback(self.playback, 0.0, host_clock=False))
+        found = validate_capture(self.task.capture, truth_of_playback(self.playback, host_clock=False))
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
         frames, rate_hz = tuple(self.stream), self.playback.tracker.rate_hz
