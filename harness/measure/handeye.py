@@ -137,7 +137,7 @@ def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bo
     solution: Floats = np.asarray(np.linalg.lstsq(normal, right, rcond=1e-12)[0], dtype=np.float64)
     factor = float(solution[0]) if with_scale else 1.0
     if not factor > 0.1:
-        raise BadInput(
+        raise NotComparable(
             f"Reported positions explain {factor:.2f} of the motion.",
             "Not observable: the scale. Move through the room, and give the reference in metres.",
         )

@@ -27,7 +27,7 @@ _LONGEST_STEP = 1.0
 _TOLERANCE = 1e-5
 """Expected gain of the log-likelihood below which the search ends."""
 _ROUGH_TOLERANCE = 3e-3
-"""Step of the logarithms along a profile of the likelihood."""
+"""Expected gain below which a search along a profile of the likelihood ends."""
 _MOST_STEPS = 60
 
 

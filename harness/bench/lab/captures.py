@@ -172,10 +172,24 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
     scenario, clip = planted_scenario(kind, seed), planted_motion(kind, seed)
     wire_format, wire = _simulate_line(scenario, clip)
     wire = add_byte_faults(wire, scenario.fault, scenario.seed)
-    note = {
+    path = folder / f"{kind}_{seed}.rec"
+    record_capture(
+        path,
+        wire_format,
+        wire,
+        simulation_note(scenario, clip.name),
+        seconds=min(seconds, PLANTED_FAULTS[kind].seconds),
+        marks=stretch_marks(clip.name),
+    )
+    return path
+
+
+def simulation_note(scenario: Scenario, clip: str) -> dict[str, Any]:
+    """The note that `harness record sim:` writes for a clip of a scenario."""
+    return {
         "source": "simulation",
-        "scenario": SCENARIO,
-        "clip": clip.name,
+        "scenario": scenario.name,
+        "clip": clip,
         "seed": scenario.seed,
         "noise": scenario.noise,
         "stations": list(scenario.stations),
@@ -183,10 +197,6 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         "posing": False,
         "harness": VERSION,
     }
-    path = folder / f"{kind}_{seed}.rec"
-    recorded_s = min(seconds, PLANTED_FAULTS[kind].seconds)
-    record_capture(path, wire_format, wire, note, seconds=recorded_s, marks=stretch_marks(clip.name))
-    return path
 
 
 def planted_scenario(kind: str, seed: int) -> Scenario:
