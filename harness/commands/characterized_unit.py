@@ -1,7 +1,13 @@
 """The report on a characterised unit, from what its capture showed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
+from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
+from harness.measure.episode_fit import SeriesEpisodes
+from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.measured import Measured
 from harness.measure.recording_time import events_for_precision
 from harness.measure.spectrum import measure_spectrum, pool_spectra
@@ -11,6 +17,7 @@ from harness.report.lab.unit_content import (
     CaptureSummary,
     DensityCurve,
     DepartureCheck,
+    DeviationCurve,
     EpisodeMark,
     ParameterRow,
     QualityClass,
@@ -35,6 +42,8 @@ _STATION_KEYS = {
     "duplicate_share": "timing.duplicate_share",
 }
 """Name of a figure of a station -> key of the number."""
+_LONGEST_TAU_S = 300.0
+"""Longest averaging time of the model's Allan deviation [s]."""
 
 
 def unit_report(found: Characterization, path: Path, command: str, out: Path | None) -> UnitReport:
@@ -69,6 +78,10 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         ),
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         stations=tuple(StationFigures(station, _figures(found, station)) for station in profile.stations),
+        allan_position=_allan(profile.episodes.found, "position_m"),
+        allan_orientation=_allan(profile.episodes.found, "rotation_rad"),
+        allan_position_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 0, (1, 1, 1)),
+        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 2, (3, 3, 4)),
         spectra=_spectra(profile.rest),
         episodes=_episodes(found),
         quality=tuple(
@@ -103,6 +116,39 @@ def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:
         pooled = pool_spectra([measure_spectrum(one.position_m, one.rate_hz) for one in rest if one.station == station])
         curves.append(DensityCurve(station, pooled.frequency_hz, pooled.density_m2_hz))
     return tuple(curves)
+
+
+def _allan(found: tuple[SeriesEpisodes, ...], name: str) -> tuple[DeviationCurve, ...]:
+    """Allan deviation of each station over the readings that no episode displaces."""
+    curves = []
+    for station in dict.fromkeys(one.series.station for one in found):
+        pooled: AllanDeviation = pool_allan(
+            [
+                measure_allan(getattr(one.series, name), one.series.valid & ~one.disturbed, one.series.rate_hz)
+                for one in found
+                if one.series.station == station
+            ]
+        )
+        known = pooled.pairs > 0
+        low, high = pooled.interval[known].T
+        curves.append(DeviationCurve(station, pooled.tau_s[known], pooled.deviation[known], low, high))
+    return tuple(curve for curve in curves if len(curve.tau_s))
+
+
+def _allan_model(
+    noise: Mapping[str, Measured], rate_hz: float, white: int, drifts: tuple[int, int, int]
+) -> DeviationCurve | None:
+    """Allan deviation of the fitted noise on one axis, the mean square of three; rows are those of `NOISE_KEYS`."""
+    values = [noise[key] for key in NOISE_KEYS]
+    used = [values[row] for row in (white, *drifts, -1)]
+    if not all(one.is_measured for one in used):
+        return None
+    tau_s = np.exp2(np.arange(int(np.log2(_LONGEST_TAU_S * rate_hz)) + 1, dtype=np.float64)) / rate_hz
+    square = np.mean(
+        [expected_allan(tau_s, rate_hz, used[0].value, one.value, used[-1].value) ** 2 for one in used[1:-1]], axis=0
+    )
+    unknown = np.full(len(tau_s), np.nan)
+    return DeviationCurve("fitted noise", tau_s, np.sqrt(square), unknown, unknown)
 
 
 def _episodes(found: Characterization) -> tuple[EpisodeMark, ...]:
