@@ -18,8 +18,20 @@ def departures_sentence(name: str, checks: Sequence[DepartureCheck], expected_fr
         return f"{name} was not held to any expected number: nothing that is expected could be measured."
     if not found:
         return f"{name} shows no departure from {expected_from} in {counted}."
-    faults = list_first([_fault(check) for check in found], 4)
+    faults = list_first([_fault(check) for check in condense_departures(checks)], 4)
     return f"{name} departs from {expected_from} in {len(found)} of {counted}: {faults}."
+
+
+def condense_departures(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
+    """The departures, without those of single stations where all stations depart, together and each."""
+    named = [check for check in checks if check.is_named]
+    departing = {(check.departure.key, check.departure.station) for check in named}
+    common = set()
+    for key in {key for key, station in departing if not station}:
+        stations = {one.departure.station for one in checks if one.departure.key == key} - {""}
+        if len(stations) > 1 and all((key, station) in departing for station in stations):
+            common.add(key)
+    return [check for check in named if not check.departure.station or check.departure.key not in common]
 
 
 def _fault(check: DepartureCheck) -> str:

@@ -12,7 +12,7 @@ from harness.report.kit.markup import Markup, bullet_list, details, join, tag
 from harness.report.kit.style import Chart
 from harness.report.kit.table import html_table
 from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import departure_text
+from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.stacked_intervals import stack_intervals
 from harness.report.lab.unit_charts import charts
 from harness.report.lab.unit_content import ParameterRow, UnitReport
@@ -86,7 +86,7 @@ def _lead(report: UnitReport) -> Markup:
     """The departures, then what the unit is like."""
     described = " ".join(description(report))
     return join(
-        bullet_list([departure_text(check) for check in report.departures]),
+        bullet_list([departure_text(check) for check in condense_departures(report.checks)]),
         tag("p", described) if described else None,
     )
 

@@ -2,7 +2,7 @@
 
 from harness.core.text_table import Table
 from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import departure_text
+from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.unit_content import UnitReport
 from harness.report.lab.unit_tables import (
     capture_text,
@@ -20,7 +20,11 @@ _WIDTH, _MOST_CHECKS = 118, 8
 
 def format_unit(report: UnitReport) -> str:
     """The text of a measured unit; parts without content are left out."""
-    lines = [answer(report), *(f"- {departure_text(check)}" for check in report.departures), *description(report)]
+    lines = [
+        answer(report),
+        *(f"- {departure_text(check)}" for check in condense_departures(report.checks)),
+        *description(report),
+    ]
     lines += ["", capture_text(report.capture), *(f"damage: {text}" for text in report.capture.damage)]
     lines += _part("", stretches_table(report.capture))
     lines += _part("error model", parameters_table(report.parameters))

@@ -12,7 +12,7 @@ from harness.report.kit.markup import Markup, bullet_list, details, join, tag
 from harness.report.kit.style import Chart
 from harness.report.kit.table import html_table
 from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import departure_text
+from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.stacked_intervals import stack_intervals
 from harness.report.lab.unit_tables import capture_text, stretches_table
 from harness.report.lab.validation_charts import charts
@@ -79,7 +79,7 @@ def validation_page(report: ValidationReport, drawn: Mapping[str, Chart], missin
 
 
 def _lead(report: ValidationReport) -> Markup:
-    faults = bullet_list([*report.exchanged, *(departure_text(check) for check in report.departures)])
+    faults = bullet_list([*report.exchanged, *(departure_text(check) for check in condense_departures(report.checks))])
     return join(faults, tag("p", " ".join(registration_sentences(report))))
 
 

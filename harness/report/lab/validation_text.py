@@ -2,7 +2,7 @@
 
 from harness.core.text_table import Table
 from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import departure_text
+from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.unit_tables import capture_text
 from harness.report.lab.validation_content import ValidationReport
 from harness.report.lab.validation_tables import (
@@ -22,7 +22,7 @@ _WIDTH = 118
 def format_validation(report: ValidationReport) -> str:
     """The text of a validated capture; parts without content are left out."""
     lines = [validation_answer(report), *(f"- {text}" for text in report.exchanged)]
-    lines += [f"- {departure_text(check)}" for check in report.departures]
+    lines += [f"- {departure_text(check)}" for check in condense_departures(report.checks)]
     lines += [*registration_sentences(report), "", capture_text(report.capture), f"reference: {report.truth}"]
     lines += [f"damage: {text}" for text in report.capture.damage]
     for title, table, reasons in (

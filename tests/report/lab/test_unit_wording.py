@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.measure.departures import compare_with_expected
 from harness.measure.measured import Measured
-from harness.report.lab.departure_wording import departure_text
+from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.unit_content import DepartureCheck, ParameterRow, RecordingAdvice
 from harness.report.lab.unit_wording import advice_text, answer, description
 from tests.report.fabricate_lab import exact, made_up_unit, number, without_content, without_faults
@@ -27,8 +27,20 @@ def test_the_answer_names_the_faults_and_their_sizes() -> None:
     assert answer(clock).endswith("in 1 of 1 check: error of the clock's rate (4.0 times as much).")
 
 
+def test_a_departure_of_all_stations_is_told_once() -> None:
+    key = "components.echo.share"
+    together, head = check(key, number(0.09, 0.1), 0.03), check(key, number(0.09, 0.1), 0.03, "head")
+    other = check(key, number(0.09, 0.1), 0.03, "torso")
+    sound = replace(other, p_holm=1.0)
+    assert condense_departures([together, head, other]) == [together]
+    assert condense_departures([together, head, sound]) == [together, head]
+    assert condense_departures([replace(together, p_holm=1.0), head, other]) == [head, other]
+    unit = replace(made_up_unit(), checks=(together, head, other))
+    assert answer(unit).endswith("in 3 of 3 checks: share of echoes (3.0 times as much).")
+
+
 def test_many_faults_are_counted() -> None:
-    one = check("components.echo.share", number(0.09, 0.1), 0.03)
+    one = check("components.echo.share", number(0.09, 0.1), 0.03, "head")
     assert answer(replace(made_up_unit(), checks=(one,) * 6)).endswith("(3.0 times as much) and 2 more.")
 
 
