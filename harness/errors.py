@@ -152,6 +152,12 @@ class BadInput(HarnessError):
         return f"{self.place}{shorten(self.what, 2 * MAX_TEXT)} {shorten(self.advice, 2 * MAX_TEXT)}"
 
 
+class NotComparable(BadInput):
+    """Sound input that has too little in common to be compared."""
+
+    outcome = Outcome.NOT_COMPARABLE
+
+
 class NothingMeasured(HarnessError):
     """A folder of results without a measured cell: *incomplete* if cells failed, otherwise *not comparable*."""
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from harness.bench.lab.speed import bench_lab
 from harness.bench.leak_check import bench_leak_check
 from harness.bench.live_viewer import bench_live_viewer
 from harness.bench.load import bench_load
@@ -49,6 +50,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "load": lambda seed, large, runs: bench_load(seed),
     "stream": lambda seed, large, runs: bench_stream(seed),
     "physics": lambda seed, large, runs: bench_physics(seed),
+    "lab": lambda seed, large, runs: bench_lab(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "serve": lambda seed, large, runs: bench_serve(seed, runs=runs),
     "view": lambda seed, large, runs: bench_live_viewer(seed, runs=runs),

@@ -1,10 +1,13 @@
 """The report on a characterised unit, from what its capture showed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from harness.measure.allan import expected_allan, measure_allan, pool_allan
+from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
+from harness.measure.episode_fit import SeriesEpisodes
+from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.measured import Measured
 from harness.measure.recording_time import events_for_precision
 from harness.measure.spectrum import measure_spectrum, pool_spectra
@@ -27,9 +30,6 @@ from harness.study.trust.characterization import PRECISION, Characterization
 from harness.study.trust.expected_values import preset_values
 
 _RATE = "components.excursion.onsets_per_min"
-_TILT = "components.drift.pitch_roll_rad"
-_ORIENTATION_DRIFTS = (_TILT, _TILT, "components.drift.yaw_rad")
-"""Drift of the orientation about each axis."""
 _STATION_KEYS = {
     "white_m": "components.white.position_m",
     "slow_m": "components.drift.position_m",
@@ -42,6 +42,8 @@ _STATION_KEYS = {
     "duplicate_share": "timing.duplicate_share",
 }
 """Name of a figure of a station -> key of the number."""
+_LONGEST_TAU_S = 300.0
+"""Longest averaging time of the model's Allan deviation [s]."""
 
 
 def unit_report(found: Characterization, path: Path, command: str, out: Path | None) -> UnitReport:
@@ -76,10 +78,10 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         ),
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         stations=tuple(StationFigures(station, _figures(found, station)) for station in profile.stations),
-        allan_position=_allan(found, "position_m"),
-        allan_orientation=_allan(found, "rotation_rad"),
-        allan_position_model=_allan_model(found, "components.white.position_m", "components.drift.position_m"),
-        allan_orientation_model=_allan_model(found, "components.white.orientation_rad", *_ORIENTATION_DRIFTS),
+        allan_position=_allan(profile.episodes.found, "position_m"),
+        allan_orientation=_allan(profile.episodes.found, "rotation_rad"),
+        allan_position_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 0, (1, 1, 1)),
+        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 2, (3, 3, 4)),
         spectra=_spectra(profile.rest),
         episodes=_episodes(found),
         quality=tuple(
@@ -108,46 +110,45 @@ def _figures(found: Characterization, station: str) -> dict[str, Measured]:
     }
 
 
-def _allan(found: Characterization, name: str) -> tuple[DeviationCurve, ...]:
-    """Allan deviation of each station on one axis, without its episodes."""
-    curves = []
-    for station in found.profile.stations:
-        own = [one for one in found.profile.episodes.found if one.series.station == station]
-        longest_s = min(max((one.series.duration_s for one in own), default=0.0) / 4.0, 300.0)
-        parts = [
-            measure_allan(
-                getattr(one.series, name), one.series.valid & ~one.disturbed, one.series.rate_hz, longest_s=longest_s
-            )
-            for one in own
-            if one.series.duration_s >= 2.0 * longest_s > 0.0
-        ]
-        if parts:
-            pooled = pool_allan(parts)
-            low, high = pooled.interval.T
-            curves.append(DeviationCurve(station, pooled.tau_s, pooled.deviation, low, high))
-    return tuple(curves)
-
-
-def _allan_model(found: Characterization, white: str, *drifts: str) -> DeviationCurve | None:
-    """Allan deviation of the fitted noise, the mean over the three axes; None where a number was not measured."""
-    parameters = found.profile.parameters
-    numbers = [parameters[key] for key in (white, "components.drift.correlation_s", *drifts)]
-    if not all(number.is_measured for number in numbers):
-        return None
-    rate_hz = found.profile.rate_hz
-    tau_s = np.exp2(np.arange(int(np.log2(100.0 * rate_hz)) + 1, dtype=np.float64)) / rate_hz
-    noise, correlation_s, *sizes = (number.value for number in numbers)
-    axes = [expected_allan(tau_s, rate_hz, noise, size, correlation_s) ** 2 for size in sizes]
-    unknown = np.full(len(tau_s), np.nan)
-    return DeviationCurve("fitted noise and drift", tau_s, np.sqrt(np.mean(axes, axis=0)), unknown, unknown)
-
-
 def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:
     curves = []
     for station in dict.fromkeys(one.station for one in rest):
         pooled = pool_spectra([measure_spectrum(one.position_m, one.rate_hz) for one in rest if one.station == station])
         curves.append(DensityCurve(station, pooled.frequency_hz, pooled.density_m2_hz))
     return tuple(curves)
+
+
+def _allan(found: tuple[SeriesEpisodes, ...], name: str) -> tuple[DeviationCurve, ...]:
+    """Allan deviation of each station over the readings that no episode displaces."""
+    curves = []
+    for station in dict.fromkeys(one.series.station for one in found):
+        pooled: AllanDeviation = pool_allan(
+            [
+                measure_allan(getattr(one.series, name), one.series.valid & ~one.disturbed, one.series.rate_hz)
+                for one in found
+                if one.series.station == station
+            ]
+        )
+        known = pooled.pairs > 0
+        low, high = pooled.interval[known].T
+        curves.append(DeviationCurve(station, pooled.tau_s[known], pooled.deviation[known], low, high))
+    return tuple(curve for curve in curves if len(curve.tau_s))
+
+
+def _allan_model(
+    noise: Mapping[str, Measured], rate_hz: float, white: int, drifts: tuple[int, int, int]
+) -> DeviationCurve | None:
+    """Allan deviation of the fitted noise on one axis, the mean square of three; rows are those of `NOISE_KEYS`."""
+    values = [noise[key] for key in NOISE_KEYS]
+    used = [values[row] for row in (white, *drifts, -1)]
+    if not all(one.is_measured for one in used):
+        return None
+    tau_s = np.exp2(np.arange(int(np.log2(_LONGEST_TAU_S * rate_hz)) + 1, dtype=np.float64)) / rate_hz
+    square = np.mean(
+        [expected_allan(tau_s, rate_hz, used[0].value, one.value, used[-1].value) ** 2 for one in used[1:-1]], axis=0
+    )
+    unknown = np.full(len(tau_s), np.nan)
+    return DeviationCurve("fitted noise", tau_s, np.sqrt(square), unknown, unknown)
 
 
 def _episodes(found: Characterization) -> tuple[EpisodeMark, ...]:

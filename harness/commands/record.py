@@ -88,6 +88,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.experiment.playback import prepare_playback
+    from harness.mocap.synthetic.rig import stretch_marks
     from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
@@ -122,7 +123,8 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     if left_out := unapplied_kinds(played.fault):
         print_status(f"faults of the scenario that need a line, and are left out: {', '.join(left_out)}")
     wire = add_byte_faults(simulation.wire, played.fault, played.seed)
-    written = record_capture(args.file, simulation.wire_format, wire, note, seconds=seconds)
+    marks = () if playback.posing else stretch_marks(str(playback.clip_evaluation.part))
+    written = record_capture(args.file, simulation.wire_format, wire, note, seconds=seconds, marks=marks)
     return _print_recording(args, written.counts)
 
 

@@ -61,6 +61,7 @@ def validation_report(
             for station, body in found.exchanged.items()
         ),
         notes=(
+            *found.notes,
             *found.truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),

@@ -60,7 +60,7 @@ def find_echoes(series: StaticSeries, limit_m: float) -> EchoBursts:
     away = np.zeros(len(series), bool)
     for _ in range(2):  # the second median is of the readings that are no echoes
         filled_m = hold(series.position_m, series.valid & ~away)
-        middle_m = np.stack([ndimage.median_filter(axis, window, mode="nearest") for axis in filled_m.T], axis=1)
+        middle_m = np.stack([ndimage.median_filter(axis, window, mode="mirror") for axis in filled_m.T], axis=1)
         away = series.valid & (np.linalg.norm(position_m - middle_m, axis=1) > limit_m)
         if away.sum() > 0.5 * series.valid.sum():
             break

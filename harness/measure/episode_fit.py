@@ -18,7 +18,6 @@ from harness.measure.excursions import (
     ExcursionEvent,
     ExcursionNoise,
     ExcursionSearch,
-    Innovations,
 )
 from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
 from harness.measure.measured import NORMAL_QUANTILE, Measured
@@ -43,9 +42,9 @@ EPISODE_KEYS = (
     "components.dropout.coast_s",
     "components.dropout.tilt_rad",
 )
-_INJECTED = 400
+_INJECTED = 200
 """Least number of excursions that are injected, if the capture has any."""
-_MOST_ROUNDS = 6
+_MOST_ROUNDS = 3
 _APART_S = 1.5
 """Time to the nearest other excursion from which on size and duration of an excursion are certain [s]."""
 _BEFORE_S, _AFTER_S = 0.2, 0.6
@@ -243,7 +242,8 @@ def _fit_excursions(
     found: Sequence[SeriesEpisodes], searches: Sequence[ExcursionSearch], noise: ExcursionNoise
 ) -> tuple[dict[str, Measured], dict[str, Measured]]:
     alone = [event for one in found for event in _isolated(one.excursions)]
-    sizes_m, stays_s = np.array([event.size_m for event in alone]), np.array([event.stay_s for event in alone])
+    sizes_m = np.array([event.size_m for event in alone])
+    stays_s = np.array([event.stay_s for event in alone if event.is_timed])
     errors_m = np.array([event.size_m / np.sqrt(event.score) for event in alone])
     smallest, largest, mean_m = fit_uniform(sizes_m, float(np.median(errors_m)) if len(alone) else 0.0, strays=_STRAYS)
     shortest, longest, mean_s = fit_uniform(stays_s, _STAY_ERROR_S, strays=_STRAYS)
@@ -287,12 +287,9 @@ def _fit_rate(
     detected = sum(len(_counted(one.excursions)) for one in found)
     if not detected:
         return Measured(0.0, 0.0, _NONE_SEEN / minutes, 0)
-    recovery, spread = 1.0, 1.0 / np.sqrt(detected)
-    rate_per_min = detected / minutes
-    for _ in range(2):
-        recovery, relative, dispersion = _recover(found, searches, noise, rate_per_min, ends_m, ends_s)
-        rate_per_min = detected / minutes / recovery
-        spread = float(np.sqrt(dispersion / detected + relative**2))
+    recovery, relative, dispersion = _recover(found, searches, noise, detected / minutes, ends_m, ends_s)
+    rate_per_min = detected / minutes / recovery
+    spread = float(np.sqrt(dispersion / detected + relative**2))
     low, high = (rate_per_min * float(np.exp(sign * NORMAL_QUANTILE * spread)) for sign in (-1.0, 1.0))
     return Measured(rate_per_min, low, high, detected)
 
@@ -317,13 +314,12 @@ def _recover(
     injected: list[int] = []
     recovered: list[int] = []
     rounds = 0
-    while rounds < 2 or (rounds < _MOST_ROUNDS and sum(injected) < _INJECTED):
+    while rounds < 1 or (rounds < _MOST_ROUNDS and sum(injected) < _INJECTED):
         for number, (one, search) in enumerate(zip(found, searches, strict=True)):
             rng = generator(0, "injected excursions", rounds, number)
             detector = ExcursionDetector(one.series.rate_hz, noise)
             displacement_m, onsets = _draw_displacement(rng, one.series, rate_per_min, ends_m, ends_s)
-            added = detector.innovations_of(displacement_m, search.residual.valid)
-            again = detector.search(Innovations(search.residual.values + added, search.residual.valid), "")
+            again = detector.search(detector.displaced(search.residual, displacement_m), "")
             injected.append(onsets)
             recovered.append(len(_counted(again.events)))
         rounds += 1

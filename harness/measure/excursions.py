@@ -1,8 +1,9 @@
 """Excursions at rest: displacements of seconds that come and go (`components.excursion`).
 
-White noise and a Gauss-Markov process together are an ARMA(1,1) process, whose innovations are white. In the
-innovations of the position a filter that is matched to a displacement of some duration finds it, the three axes summed;
-under noise alone the sum is chi-square with three degrees of freedom. Found displacements are subtracted, and the
+The innovations of a Kalman filter for white noise and a Gauss-Markov process are white, also after gaps. In the
+innovations of the position a filter that is matched to a displacement of some onset and duration finds it, the three
+axes summed; under noise alone the sum is chi-square with three degrees of freedom. A displacement is a rise and a
+return, so that one filter for a rise gives the sums of all durations. Found displacements are subtracted, and the
 search goes on until nothing is left.
 """
 
@@ -10,24 +11,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
-from harness.core.runs import find_runs
 from harness.measure.static_series import StaticSeries
 
-THRESHOLD = 36.0
+THRESHOLD = 45.0
 """Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in some hundred hours."""
-STAYS_S = tuple(float(0.4 * 1.2**k) for k in range(19))
-"""Durations of the matched filters, from the onset to the beginning of the return [s]."""
+LONGEST_STAY_S = 10.6
+"""Longest excursion that is searched, from the onset to the beginning of the return [s]."""
 DEFAULT_RAMP_S = 0.2
+_SHORTEST_STAY_S = 0.3
+_STEP_S = 0.025
+"""Step of the onsets that are searched [s]; that of the durations is twice as long."""
 _EDGE_S = 0.3
 """An excursion that begins earlier in the series has begun before it, and is not counted [s]."""
-_TAIL_S = 0.5
+_TAIL_S = 0.8
 """Time after an excursion in which its innovations fade [s]."""
-_SHORT_GAP, _AFTER_GAP = 8, 3
-"""Longest gap after which nothing is left out, and samples that are left out after a longer one: the position may have
-drifted meanwhile."""
-_ROUNDS = 5
+_SHARED_EDGE_S = 0.3
+"""Edges of two excursions that are nearer may be one [s]."""
+_SEEN = 0.8
+"""Share of samples around an edge that must count for its time to be certain."""
+_ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -54,28 +58,34 @@ class ExcursionEvent:
     """Squared signal-to-noise ratio."""
     is_whole: bool
     """Whether it begins and ends within the series."""
+    is_timed: bool
+    """Whether its rise and its return are seen; in a gap their times are uncertain."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """An excursion in units of the innovations."""
+    """An excursion, its times in samples."""
 
     onset: float
     """Place of the onset, in samples."""
     stay_s: float
     size: Floats
-    """(3,) displacement in standard deviations of an innovation."""
+    """(3,) displacement [m]."""
     score: float
 
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """Innovations of a series in units of their standard deviation."""
+    """Innovations of a series in units of their standard deviation, and the filter that made them."""
 
     values: Floats
     """(N, 3) innovations; 0 where samples do not count."""
     valid: Bools
     """(N,) samples that count."""
+    gain: Floats
+    """(N,) gain of the Kalman filter."""
+    deviation_m: Floats
+    """(N,) standard deviation of an innovation [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,47 +100,66 @@ class ExcursionDetector:
     """Finds excursions in series of one rate."""
 
     def __init__(self, rate_hz: float, noise: ExcursionNoise, ramp_s: float = DEFAULT_RAMP_S) -> None:
-        self._rate_hz, self._noise, self._ramp_s = rate_hz, noise, ramp_s
-        self._ar = float(np.exp(-1.0 / (rate_hz * noise.correlation_s)))
-        gain, self._sigma_m = _steady_state(self._ar, noise.drift_m, noise.white_m)
-        self._ma = self._ar * (1.0 - gain)
-        shapes = [self._shape(stay_s) for stay_s in STAYS_S]
-        self._bank = [self._filter(shape[:, None], np.ones(len(shape), bool))[:, 0] for shape in shapes]
+        self._rate_hz, self._noise, self._ramp_s = rate_hz, noise, max(ramp_s, 1e-6)
+        self._correlation = float(np.exp(-1.0 / (rate_hz * noise.correlation_s)))
+        self._white_m = max(noise.white_m, 1e-3 * noise.drift_m, 1e-9)
+        self._stride = max(round(_STEP_S * rate_hz), 1)
+        longest = round(LONGEST_STAY_S * rate_hz)
+        self._stays = np.arange(max(round(_SHORTEST_STAY_S * rate_hz), 1), longest + 1, 2 * self._stride)
+        self._power, self._edge_power = self._undisturbed_power()
+
+    def _undisturbed_power(self) -> tuple[Floats, float]:
+        """Power of excursions of the durations (D,) that are searched, and of a rise alone, without any gap."""
+        start = 2 * round(2.0 * self._rate_hz)
+        count = start + int(self._stays[-1]) + round((self._ramp_s + _TAIL_S) * self._rate_hz) + 2
+        nothing = self._whiten(np.zeros((count, 3)), np.ones(count, bool))
+        power = [self._fit_power(nothing, float(start), float(stay)) for stay in self._stays.tolist()]
+        return np.array(power), float(self._rise_power(nothing)[start])
+
+    def _fit_power(self, innovations: Innovations, onset: float, stay: float) -> float:
+        return fit_trapezoid(*self._arguments(innovations, onset, stay / self._rate_hz))[0]
+
+    def _rise_power(self, innovations: Innovations) -> Floats:
+        """(N,) power of a rise that begins at each sample, as far as its innovations have faded."""
+        horizon = round((self._ramp_s + _TAIL_S) * self._rate_hz)
+        arrays = innovations.valid, innovations.gain, innovations.deviation_m
+        return rise_power(*arrays, self._ramp_s * self._rate_hz, horizon, self._correlation)
 
     def innovations(self, series: StaticSeries, left_out: Bools) -> Innovations:
-        """Innovations of a series, without the samples in `left_out` (N,) and those that follow a long gap."""
+        """Innovations of a series without the samples in `left_out` (N,)."""
         valid = series.valid & ~left_out
-        for first, end in find_runs(~valid).tolist():
-            if end - first > _SHORT_GAP:
-                valid[end : end + _AFTER_GAP] = False
-        position_m = series.position_m - np.nanmedian(series.position_m[valid], axis=0) if valid.any() else None
-        if position_m is None:
-            return Innovations(np.zeros((len(series), 3)), valid)
-        return Innovations(self._filter(np.where(valid[:, None], position_m, 0.0), valid) / self._sigma_m, valid)
+        if not valid.any():
+            return self._whiten(np.zeros((len(series), 3)), valid)
+        place_m = series.position_m - np.nanmedian(series.position_m[valid], axis=0)
+        return self._whiten(np.where(valid[:, None], place_m, 0.0), valid)
 
-    def _filter(self, values: Floats, valid: Bools) -> Floats:
-        """Innovations (K, A) of values (K, A) that hold their last valid one; 0 where they are not valid."""
-        from scipy import signal
+    def _whiten(self, place_m: Floats, valid: Bools) -> Innovations:
+        gain, deviation_m = kalman_gains(valid, self._correlation, self._noise.drift_m**2, self._white_m**2)
+        return Innovations(whiten(place_m, valid, gain, deviation_m, self._correlation), valid, gain, deviation_m)
 
-        row = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), -1))
-        held = np.where((row >= 0)[:, None], values[row], 0.0)
-        out: Floats = signal.lfilter([1.0, -self._ar], [1.0, -self._ma], held, axis=0)
-        return np.where(valid[:, None], out, 0.0)
+    def displaced(self, innovations: Innovations, displacement_m: Floats) -> Innovations:
+        """The innovations of the same series with a displacement (N, 3) added [m]."""
+        valid, gain, deviation_m = innovations.valid, innovations.gain, innovations.deviation_m
+        added = whiten(displacement_m, valid, gain, deviation_m, self._correlation)
+        return Innovations(innovations.values + added, valid, gain, deviation_m)
 
     def search(self, innovations: Innovations, station: str) -> ExcursionSearch:
         """Find the excursions in innovations, strongest first, and take them out."""
-        residual = Innovations(innovations.values.copy(), innovations.valid)
+        valid, gain, deviation_m = innovations.valid, innovations.gain, innovations.deviation_m
+        residual = Innovations(innovations.values.copy(), valid, gain, deviation_m)
+        rise = self._rise_power(residual)
         found: list[_Fit] = []
         for _ in range(_ROUNDS):
             new = []
-            for start in self._strongest(residual):
-                fit = self._refine(residual, *start)
+            for start in self._strongest(residual, rise):
+                fit = self._refine_edges(residual, *start)
                 if fit.score >= THRESHOLD:
                     new.append(self._subtract(residual, fit))
             if not new:
                 break
             found = [fit for fit in self._refit(residual, found + new) if fit.score >= THRESHOLD]
-        events = [self._event(station, len(residual.valid), fit) for fit in sorted(found, key=lambda fit: fit.onset)]
+            found = self._merge(residual, found)
+        events = [self._event(station, residual.valid, fit) for fit in sorted(found, key=lambda fit: fit.onset)]
         return ExcursionSearch(events, residual)
 
     def _refit(self, residual: Innovations, fits: list["_Fit"]) -> list["_Fit"]:
@@ -142,59 +171,72 @@ class ExcursionDetector:
             out.append(self._subtract(residual, again) if again.score >= THRESHOLD else again)
         return out
 
+    def _merge(self, residual: Innovations, fits: list["_Fit"]) -> list["_Fit"]:
+        """Make one excursion of two that have an edge in common, where one explains the innovations nearly as well."""
+        out = sorted(fits, key=lambda fit: fit.onset)
+        number = 0
+        while number < len(out) - 1:
+            merged = None
+            for other in range(number + 1, len(out)):
+                merged = self._merge_two(residual, out[number], out[other])
+                if merged is not None:
+                    out = sorted([fit for i, fit in enumerate(out) if i not in (number, other)] + [merged], key=_onset)
+                    number = max(number - 1, 0)
+                    break
+            number += merged is None
+        return out
+
+    def _merge_two(self, residual: Innovations, one: "_Fit", other: "_Fit") -> "_Fit | None":
+        """One excursion in the place of two, subtracted; None, and nothing changed, if two are needed."""
+        edges = [(fit.onset, fit.onset + fit.stay_s * self._rate_hz) for fit in (one, other)]
+        common = _SHARED_EDGE_S * self._rate_hz
+        if not any(abs(a - b) < common for a in edges[0] for b in edges[1]):
+            return None
+        places = sorted(edges[0] + edges[1])
+        rows = slice(max(int(places[0]) - 1, 0), int(places[-1] + (self._ramp_s + _TAIL_S) * self._rate_hz) + 3)
+        kept = residual.values[rows].copy()
+        for fit in (one, other):
+            self._add(residual, fit.onset, fit.stay_s, fit.size)
+        best: _Fit | None = None
+        for begin in edges[0] + edges[1]:
+            for end in edges[0] + edges[1]:
+                if end - begin >= 1.0:
+                    fit = self._fit(residual, begin, (end - begin) / self._rate_hz)
+                    best = fit if best is None or fit.score > best.score else best
+        if best is not None:
+            merged = self._subtract(residual, self._refine_edges(residual, best.onset, best.stay_s))
+            if float(np.sum(residual.values[rows] ** 2)) < float(np.sum(kept**2)) + THRESHOLD:
+                return merged
+        residual.values[rows] = kept
+        return None
+
     def _subtract(self, residual: Innovations, fit: "_Fit") -> "_Fit":
         self._add(residual, fit.onset, fit.stay_s, -fit.size)
         return fit
 
-    def innovations_of(self, displacement_m: Floats, valid: Bools) -> Floats:
-        """Innovations (N, 3) that a displacement (N, 3) [m] adds to those of a series with these valid samples."""
-        return self._filter(displacement_m, valid) / self._sigma_m
-
-    def _shape(self, stay_s: float, fraction: float = 0.0) -> Floats:
-        """Share (K,) of a displacement that begins this fraction of a period after the first sample."""
-        ramp_s = max(self._ramp_s, 1e-6)
-        count = int(np.ceil((stay_s + ramp_s + _TAIL_S) * self._rate_hz)) + 1
-        since_s = (np.arange(count) - fraction) / self._rate_hz
-        out: Floats = np.clip(np.minimum(since_s, stay_s + ramp_s - since_s) / ramp_s, 0.0, 1.0)
-        return out
-
-    def _strongest(self, residual: Innovations) -> list[tuple[int, float]]:
+    def _strongest(self, residual: Innovations, rise: Floats) -> list[tuple[float, float]]:
         """Onsets and stays of the strongest excursions that do not touch each other."""
-        from scipy import signal
-
-        best = np.full(len(residual.valid), -1.0)
-        which = np.zeros(len(residual.valid), dtype=np.int64)
-        for number, template in enumerate(self._bank):
-            if len(template) > len(residual.valid):
-                continue
-            matched = signal.oaconvolve(residual.values, template[::-1, None], mode="full", axes=0)[len(template) - 1 :]
-            score = np.sum(matched**2, axis=1) / np.sum(template**2)
-            better = score > best
-            best[better], which[better] = score[better], number
-        found: list[tuple[int, float]] = []
+        count, ramp = len(residual.valid), self._ramp_s * self._rate_hz
+        arrays = residual.values, residual.valid, residual.gain, residual.deviation_m
+        place = transpose_whiten(*arrays, self._correlation)
+        best, which = search_durations(
+            *rise_products(place, ramp), rise, self._stays, self._power, self._edge_power, self._stride
+        )
+        before = int(np.ceil(ramp))
+        found: list[tuple[float, float]] = []
         while True:
-            onset = int(np.argmax(best))
-            if best[onset] < THRESHOLD:
+            number = int(np.argmax(best))
+            if best[number] < THRESHOLD:
                 return found
-            stay_s = STAYS_S[which[onset]]
-            found.append((onset, stay_s))
-            reach = round((stay_s + 1.0) * self._rate_hz)
-            best[max(onset - reach, 0) : onset + reach] = -1.0
-
-    def _refine(self, residual: Innovations, onset: float, stay_s: float) -> "_Fit":
-        """The best excursion near a place: first coarsely, then to a fraction of a period."""
-        best = self._fit(residual, onset, stay_s)
-        reach_s = max(0.2 * stay_s, 0.15)
-        for _ in range(2):
-            middle = best
-            for begins_s in np.linspace(-reach_s, reach_s, 9).tolist():
-                for ends_s in np.linspace(-reach_s, reach_s, 9).tolist():
-                    longer_s = middle.stay_s + ends_s - begins_s
-                    if longer_s * self._rate_hz >= 1.0:
-                        fit = self._fit(residual, middle.onset + begins_s * self._rate_hz, longer_s)
-                        best = fit if fit.score > best.score else best
-            reach_s *= 0.25
-        return self._refine_edges(residual, best.onset, best.stay_s)
+            onset, stay = number * self._stride - before, int(self._stays[which[number]])
+            found.append((float(onset), stay / self._rate_hz))
+            reach = round(self._rate_hz)
+            first, last = onset - reach - int(self._stays[-1]), min(onset + stay + reach, count)
+            for other in range(max((first + before) // self._stride, 0), (last + before) // self._stride + 1):
+                if other < len(best):
+                    end = other * self._stride - before + int(self._stays[which[other]])
+                    if end > onset - reach:
+                        best[other] = -1.0
 
     def _refine_edges(self, residual: Innovations, onset: float, stay_s: float) -> "_Fit":
         """Onset and end of an excursion, in turn, by steps that become smaller."""
@@ -213,58 +255,191 @@ class ExcursionDetector:
 
     def _fit(self, residual: Innovations, onset: float, stay_s: float) -> "_Fit":
         """The displacement of least squares of an excursion with this onset and stay."""
-        power, x, y, z = fit_trapezoid(residual.values, residual.valid, *self._timing(onset, stay_s))
+        power, x, y, z = fit_trapezoid(*self._arguments(residual, onset, stay_s))
         if power <= 0.0:
             return _Fit(onset, stay_s, np.zeros(3), 0.0)
         size = np.array([x, y, z]) / power
         return _Fit(onset, stay_s, size, float(size @ size) * power)
 
     def _add(self, innovations: Innovations, onset: float, stay_s: float, size: Floats) -> None:
-        add_trapezoid(innovations.values, innovations.valid, *self._timing(onset, stay_s), size)
+        add_trapezoid(*self._arguments(innovations, onset, stay_s), size)
 
-    def _timing(self, onset: float, stay_s: float) -> tuple[float, float, float, int, float, float]:
-        """What the compiled functions need: onset, stay, ramp and tail in samples, and the two coefficients."""
-        ramp = max(self._ramp_s, 1e-6) * self._rate_hz
-        return onset, stay_s * self._rate_hz, ramp, round(_TAIL_S * self._rate_hz), self._ar, self._ma
+    def _arguments(
+        self, innovations: Innovations, onset: float, stay_s: float
+    ) -> tuple[Floats, Bools, Floats, Floats, float, float, float, int, float]:
+        """What the compiled functions need: the filter; onset, stay, ramp and tail in samples; and the correlation."""
+        rate_hz = self._rate_hz
+        return (
+            innovations.values,
+            innovations.valid,
+            innovations.gain,
+            innovations.deviation_m,
+            onset,
+            stay_s * rate_hz,
+            self._ramp_s * rate_hz,
+            round(_TAIL_S * rate_hz),
+            self._correlation,
+        )
 
-    def _event(self, station: str, samples: int, fit: "_Fit") -> ExcursionEvent:
-        length_m = self._sigma_m * float(np.sqrt(fit.size @ fit.size))
+    def _event(self, station: str, valid: Bools, fit: "_Fit") -> ExcursionEvent:
+        length_m = float(np.sqrt(fit.size @ fit.size))
         variance_m2 = length_m**2 / max(fit.score, 1e-9)  # of one axis
         end = fit.onset + (fit.stay_s + 2.0 * self._ramp_s) * self._rate_hz
-        whole = fit.onset >= _EDGE_S * self._rate_hz and end < samples
+        whole = fit.onset >= _EDGE_S * self._rate_hz and end < len(valid)
         size_m = float(np.sqrt(max(length_m**2 - 2.0 * variance_m2, 0.0)))
-        return ExcursionEvent(station, fit.onset / self._rate_hz, fit.stay_s, size_m, fit.score, whole)
+        timed = all(self._is_seen(valid, edge) for edge in (fit.onset, fit.onset + fit.stay_s * self._rate_hz))
+        return ExcursionEvent(station, fit.onset / self._rate_hz, fit.stay_s, size_m, fit.score, whole, timed)
+
+    def _is_seen(self, valid: Bools, edge: float) -> bool:
+        """Whether most samples around a rise or a return that begins at this sample count."""
+        ramp = self._ramp_s * self._rate_hz
+        first, last = int(edge - 0.5 * ramp), int(edge + 1.5 * ramp) + 1
+        return first >= 0 and last <= len(valid) and bool(valid[first:last].mean() > _SEEN)
 
 
-def _steady_state(ar: float, drift_m: float, white_m: float) -> tuple[float, float]:
-    """Gain of the Kalman filter after many samples, and the standard deviation of its innovations [m]."""
-    process = drift_m**2 * (1.0 - ar**2)
-    white = max(white_m, 1e-3 * drift_m, 1e-9) ** 2
-    # The predicted variance p solves p = ar^2 p w / (p + w) + q.
-    half = 0.5 * (process - white * (1.0 - ar**2))
-    predicted = half + np.sqrt(half**2 + process * white)
-    return float(predicted / (predicted + white)), float(np.sqrt(predicted + white))
+def _onset(fit: _Fit) -> float:
+    return fit.onset
+
+
+@compiled
+def kalman_gains(
+    valid: Bools, correlation: float, drift_variance: float, white_variance: float
+) -> tuple[Floats, Floats]:
+    """Gain and standard deviation of the innovation (N,) at each sample; both are 0 where it is not valid."""
+    count = len(valid)
+    gain, deviation = np.zeros(count), np.zeros(count)
+    variance = drift_variance
+    for i in range(count):
+        variance = correlation**2 * variance + drift_variance * (1.0 - correlation**2)
+        if valid[i]:
+            gain[i] = variance / (variance + white_variance)
+            deviation[i] = np.sqrt(variance + white_variance)
+            variance *= 1.0 - gain[i]
+    return gain, deviation
+
+
+@compiled
+def whiten(values: Floats, valid: Bools, gain: Floats, deviation: Floats, correlation: float) -> Floats:
+    """Innovations (N, A) of values (N, A), in standard deviations; 0 where they are not valid."""
+    count, axes = values.shape
+    out = np.zeros((count, axes))
+    state = np.zeros(axes)
+    for i in range(count):
+        for a in range(axes):
+            state[a] *= correlation
+            if valid[i]:
+                innovation = values[i, a] - state[a]
+                state[a] += gain[i] * innovation
+                out[i, a] = innovation / deviation[i]
+    return out
+
+
+@compiled
+def transpose_whiten(values: Floats, valid: Bools, gain: Floats, deviation: Floats, correlation: float) -> Floats:
+    """The transpose of `whiten`, a linear map, applied to innovations (N, A)."""
+    count, axes = values.shape
+    out = np.zeros((count, axes))
+    state = np.zeros(axes)
+    for back in range(count):
+        i = count - 1 - back
+        for a in range(axes):
+            if valid[i]:
+                out[i, a] = values[i, a] / deviation[i] + gain[i] * state[a]
+                state[a] -= out[i, a]
+            state[a] *= correlation
+    return out
+
+
+@compiled
+def rise_power(valid: Bools, gain: Floats, deviation: Floats, ramp: float, horizon: int, correlation: float) -> Floats:
+    """(N,) power of the innovations of a rise of unit height that begins at each sample, within `horizon` samples."""
+    count = len(valid)
+    out = np.zeros(count)
+    for onset in range(count):
+        state = 0.0
+        for i in range(onset, min(onset + horizon, count)):
+            state *= correlation
+            if valid[i]:
+                innovation = min((i - onset) / ramp, 1.0) - state
+                state += gain[i] * innovation
+                out[onset] += (innovation / deviation[i]) ** 2
+    return out
+
+
+@compiled
+def rise_products(place: Floats, ramp: float) -> tuple[Floats, int]:
+    """Products (K, 3) of the transposed innovations (N, 3) with a rise at each sample, and how many begin before 0."""
+    count, before = len(place), int(np.ceil(ramp))
+    out = np.zeros((count + before, 3))
+    total = np.zeros(3)  # of all samples after the ramp
+    for back in range(count + before):
+        onset = count - 1 - back
+        reached = onset + before
+        if 0 <= reached < count:
+            for a in range(3):
+                total[a] += place[reached, a]
+        for a in range(3):
+            out[onset + before, a] = total[a]
+        for i in range(max(onset, 0), min(reached, count)):
+            for a in range(3):
+                out[onset + before, a] += place[i, a] * (i - onset) / ramp
+    return out, before
+
+
+@compiled
+def search_durations(
+    products: Floats, before: int, rise: Floats, stays: Ints, power: Floats, edge_power: float, stride: int
+) -> tuple[Floats, Ints]:
+    """The best score of an excursion that begins at each `stride`th sample, and the number of its duration (K,).
+
+    `rise` is the power of a rise at each sample, `power` that of the durations without gaps, `edge_power` that of a
+    rise without gaps. An excursion whose rise or return falls into a gap has the less power.
+    """
+    count = len(products)
+    places = (count + stride - 1) // stride
+    best, which = np.full(places, -1.0), np.zeros(places, dtype=np.int64)
+    for place in range(places):
+        k = place * stride
+        begins = rise[max(k - before, 0)] - edge_power
+        for number in range(len(stays)):
+            end = k + stays[number]
+            x, y, z = products[k, 0], products[k, 1], products[k, 2]
+            ends = -edge_power
+            if end < count:
+                x -= products[end, 0]
+                y -= products[end, 1]
+                z -= products[end, 2]
+                if end >= before:
+                    ends = rise[end - before] - edge_power
+            total = max(power[number] + begins + ends, 0.3 * power[number])
+            score = (x * x + y * y + z * z) / total
+            if score > best[place]:
+                best[place], which[place] = score, number
+    return best, which
 
 
 @compiled
 def fit_trapezoid(
-    values: Floats, valid: Bools, onset: float, stay: float, ramp: float, tail: int, ar: float, ma: float
+    values: Floats,
+    valid: Bools,
+    gain: Floats,
+    deviation: Floats,
+    onset: float,
+    stay: float,
+    ramp: float,
+    tail: int,
+    correlation: float,
 ) -> tuple[float, float, float, float]:
-    """Power of an excursion's innovations, and their products with innovations (N, 3); times are in samples.
-
-    Where a sample is not valid, the displacement is held, and the innovation does not count.
-    """
+    """Power of an excursion's innovations, and their products with innovations (N, 3); times are in samples."""
     first = max(int(np.floor(onset)), 0)
     last = min(int(np.floor(onset)) + int(np.ceil(stay + ramp)) + tail + 1, len(valid))
-    power, x, y, z = 0.0, 0.0, 0.0, 0.0
-    before, innovation = 0.0, 0.0
+    power, x, y, z, state = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last):
-        now = before
+        state *= correlation
         if valid[i]:
-            now = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0)
-        innovation = now - ar * before + ma * innovation
-        before = now
-        if valid[i]:
+            innovation = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0) - state
+            state += gain[i] * innovation
+            innovation /= deviation[i]
             power += innovation * innovation
             x += innovation * values[i, 0]
             y += innovation * values[i, 1]
@@ -276,24 +451,23 @@ def fit_trapezoid(
 def add_trapezoid(
     values: Floats,
     valid: Bools,
+    gain: Floats,
+    deviation: Floats,
     onset: float,
     stay: float,
     ramp: float,
     tail: int,
-    ar: float,
-    ma: float,
+    correlation: float,
     size: Floats,
 ) -> None:
     """Add an excursion of size (3,) to innovations (N, 3) in place; see `fit_trapezoid`."""
     first = max(int(np.floor(onset)), 0)
     last = min(int(np.floor(onset)) + int(np.ceil(stay + ramp)) + tail + 1, len(valid))
-    before, innovation = 0.0, 0.0
+    state = 0.0
     for i in range(first, last):
-        now = before
+        state *= correlation
         if valid[i]:
-            now = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0)
-        innovation = now - ar * before + ma * innovation
-        before = now
-        if valid[i]:
+            innovation = max(min(min(i - onset, onset + stay + ramp - i) / ramp, 1.0), 0.0) - state
+            state += gain[i] * innovation
             for axis in range(3):
-                values[i, axis] += innovation * size[axis]
+                values[i, axis] += innovation / deviation[i] * size[axis]

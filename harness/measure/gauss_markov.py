@@ -1,20 +1,17 @@
-"""White noise and first-order Gauss-Markov noise of stations at rest, by maximum likelihood.
+"""White noise and first-order Gauss-Markov drift of readings at rest: parameters, likelihood and whitening.
 
-Each axis is the sum of white noise, of a Gauss-Markov process (`components.drift`) and of a constant. The likelihood is
-exact, by a Kalman filter with one state, so that gaps and masked samples need no filling. The constant is estimated by
-generalised least squares, with the correction of restricted maximum likelihood (Patterson & Thompson 1971, Biometrika
-58). Intervals come from the observed information of the logarithms.
+Each axis of a series is a constant, plus drift with the covariance s^2 exp(-t / tau), plus white noise. The likelihood
+is that of a Kalman filter over the records that are used, so it is exact with any gaps (Schweppe 1965, IEEE Trans.
+Inf. Theory 11). The constant is integrated out with a flat prior (restricted likelihood), which removes the bias of
+subtracting a mean (Harville 1977, J. Am. Stat. Assoc. 72).
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import math
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
-from harness.errors import BadInput
-from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.measure.static_series import StaticSeries
 
 NOISE_KEYS = (
@@ -25,192 +22,120 @@ NOISE_KEYS = (
     "components.drift.yaw_rad",
     "components.drift.correlation_s",
 )
-"""Parameters of the fit, in the order of its vector of logarithms."""
-_LEAST, _MOST = (
-    np.log([1e-7, 1e-7, 1e-8, 1e-8, 1e-8, 0.02]),
-    np.log([0.5, 0.5, 0.5, 0.5, 0.5, 300.0]),
-)
-"""Bounds of the logarithms; a parameter at its lower bound cannot be told from none."""
-MOST_SAMPLES = 400_000
-"""Samples that the likelihood of all stations uses; of longer recordings pieces are taken, evenly spread."""
-_PIECE_S = 60.0
-_STEP = 0.02
-"""Step of the logarithms in numerical derivatives."""
+"""Dotted keys of the parameters, in the order of their vectors."""
+AXIS_GROUPS = ((0, 1), (2, 3), (2, 4))
+"""Rows of the white noise and of the drift of each group of axes: position, pitch and roll, yaw."""
+CORRELATION = 5
+"""Row of the correlation time."""
 
 
-@dataclass(frozen=True)
-class NoiseFit:
-    """Parameters by `NOISE_KEYS`, of all stations together and of each."""
+class NoiseSample:
+    """Columns of position, of pitch and roll, and of yaw of one series, and the rows that are used."""
 
-    all_stations: Mapping[str, Measured]
-    by_station: Mapping[str, Mapping[str, Measured]]
-    samples: int
-    """Number of samples that the likelihood used."""
+    def __init__(self, series: StaticSeries, left_out: Bools) -> None:
+        self.used = np.ascontiguousarray(series.valid & ~left_out)
+        self.rate_hz = series.rate_hz
+        self.readings = int(self.used.sum())
+        self.duration_s = series.duration_s
+        turn = series.rotation_rad
+        self.groups = tuple(np.ascontiguousarray(part) for part in (series.position_m, turn[:, :2], turn[:, 2:]))
+
+    def log_likelihood(self, number: int, white: float, drift: float, correlation_s: float) -> float:
+        """Restricted log-likelihood of a group of axes."""
+        correlation = math.exp(-1.0 / (self.rate_hz * correlation_s))
+        return series_log_likelihood(self.groups[number], self.used, correlation, drift**2, white**2)
+
+    def spread(self, number: int) -> Floats:
+        """Standard deviation of each axis of a group; empty without two readings."""
+        part = self.groups[number][self.used]
+        out: Floats = np.std(part, axis=0) if len(part) > 1 else np.zeros(0)
+        return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """Consecutive samples of one station: positions (N, 3), pitch and roll (N, 2), yaw (N, 1), and which count."""
+def whiten(columns: Floats, used: Bools, rate_hz: float, white: float, drift: float, correlation_s: float) -> Floats:
+    """Innovations of columns (N, A) over their standard deviations, for noise with these parameters; NaN if not used.
 
-    station: str
-    period_s: float
-    axes: tuple[Floats, Floats, Floats]
-    valid: Bools
-
-
-def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools], *, by_station: bool = True) -> NoiseFit:
-    """Fit the noise of stations at rest; `left_out` masks samples (N,) of each series, such as excursions.
-
-    Without `by_station` only all stations together are fitted. BadInput without any valid sample.
+    Noise becomes independent normal values of unit variance. The map is linear, so it applies to a signal that is
+    added to the noise as well.
     """
-    pieces = _choose_pieces(series, left_out)
-    samples = sum(int(piece.valid.sum()) for piece in pieces)
-    if samples < 100:
-        raise BadInput(
-            f"{samples} undisturbed samples at rest cannot show the noise.", "Record a longer static stretch."
-        )
-    together, logarithms = _fit(pieces, start_values(series, left_out))
-    stations = dict.fromkeys(piece.station for piece in pieces) if by_station else {}
-    single = {
-        station: _fit([piece for piece in pieces if piece.station == station], logarithms)[0] for station in stations
-    }
-    return NoiseFit(together, single, samples)
-
-
-def start_values(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> Floats:
-    """Rough logarithms (6,) of the parameters, from medians of differences, which outliers hardly change.
-
-    The variance of differences grows from twice the white noise at a lag of one sample to the sum of both at 4 s.
-    """
-
-    def spreads(name: str, *columns: int) -> tuple[float, float]:
-        short, long = [], []
-        for one, mask in zip(series, left_out, strict=True):
-            values = np.where((one.valid & ~mask)[:, None], getattr(one, name)[:, list(columns)], np.nan)
-            lag = max(round(4.0 * one.rate_hz), 2)
-            short.append(values[1:] - values[:-1])
-            long.append(values[lag:] - values[:-lag])
-        near, far = (float(np.nanmedian(np.abs(np.concatenate(parts)))) for parts in (short, long))
-        return near / 0.6745 / np.sqrt(2.0), far / 0.6745 / np.sqrt(2.0)
-
-    position, tilt, yaw = spreads("position_m", 0, 1, 2), spreads("rotation_rad", 0, 1), spreads("rotation_rad", 2)
-    drift = [np.sqrt(max(long**2 - short**2, (0.1 * short) ** 2)) for short, long in (position, tilt, yaw)]
-    values = np.array([0.9 * position[0], drift[0], 0.9 * tilt[0], drift[1], drift[2], 1.0])
-    out: Floats = np.clip(np.log(np.maximum(values, 1e-12)), _LEAST + 1e-3, _MOST - 1e-3)
-    return out
-
-
-def _choose_pieces(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> list[_Piece]:
-    """All samples, or evenly spread pieces of `_PIECE_S` if there are more than `MOST_SAMPLES`."""
-    total = sum(len(one) for one in series)
-    stride = max(-(-total // MOST_SAMPLES), 1)
-    pieces, number = [], 0
-    for one, mask in zip(series, left_out, strict=True):
-        size = len(one) if stride == 1 else round(_PIECE_S * one.rate_hz)
-        for begin in range(0, len(one), size):
-            number += 1
-            if (number - 1) % stride:
-                continue
-            rows = slice(begin, begin + size)
-            valid = one.valid[rows] & ~mask[rows]
-            place, turn = (np.where(valid[:, None], a[rows], 0.0) for a in (one.position_m, one.rotation_rad))
-            axes = place, np.ascontiguousarray(turn[:, :2]), np.ascontiguousarray(turn[:, 2:])
-            pieces.append(_Piece(one.station, 1.0 / one.rate_hz, axes, valid))
-    return pieces
-
-
-def _fit(pieces: Sequence[_Piece], start: Floats) -> tuple[dict[str, Measured], Floats]:
-    """The parameters with their intervals, and the logarithms (6,) of the maximum."""
-    from scipy import optimize
-
-    def cost(logarithms: Floats) -> float:
-        return -_log_likelihood(pieces, logarithms)
-
-    found = optimize.minimize(
-        cost, start, method="L-BFGS-B", bounds=list(zip(_LEAST, _MOST, strict=True)),
-        options={"ftol": 1e-9, "maxiter": 60},
-    )  # fmt: skip
-    best: Floats = found.x
-    free = np.flatnonzero((best > _LEAST + 0.05) & (best < _MOST - 0.05))
-    deviation = np.full(len(best), np.inf)
-    information = _second_derivatives(cost, best, free)
-    covariance = np.linalg.pinv(information)
-    deviation[free] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    samples = sum(int(piece.valid.sum()) for piece in pieces)
-    return {key: _measured(float(best[i]), float(deviation[i]), samples) for i, key in enumerate(NOISE_KEYS)}, best
-
-
-def _measured(logarithm: float, deviation: float, samples: int) -> Measured:
-    if not 0.0 < deviation < 1.0:
-        return Measured.missing("The noise of this capture does not show it.")
-    half = NORMAL_QUANTILE * deviation
-    value, low, high = (float(np.exp(logarithm + shift)) for shift in (0.0, -half, half))
-    return Measured(value, low, high, samples)
-
-
-def _second_derivatives(cost: Callable[[Floats], float], at: Floats, free: Ints) -> Floats:
-    """Matrix of second derivatives in the free directions, by central differences."""
-    count = len(free)
-    steps = np.zeros((count, len(at)))
-    steps[np.arange(count), free] = _STEP
-    out = np.zeros((count, count))
-    middle = cost(at)
-    ahead, behind = ([cost(at + sign * step) for step in steps] for sign in (1.0, -1.0))
-    for i in range(count):
-        out[i, i] = (ahead[i] - 2.0 * middle + behind[i]) / _STEP**2
-        for j in range(i):
-            mixed = cost(at + steps[i] + steps[j]) - ahead[i] - ahead[j] + 2.0 * middle
-            mixed += cost(at - steps[i] - steps[j]) - behind[i] - behind[j]
-            out[i, j] = out[j, i] = mixed / (2.0 * _STEP**2)
-    return out
-
-
-def _log_likelihood(pieces: Sequence[_Piece], logarithms: Floats) -> float:
-    white_m, drift_m, white_rad, tilt_rad, yaw_rad, correlation_s = np.exp(logarithms)
-    deviations = ((white_m, drift_m), (white_rad, tilt_rad), (white_rad, yaw_rad))
-    total = 0.0
-    for piece in pieces:
-        correlation = float(np.exp(-piece.period_s / correlation_s))
-        for values, (white, drift) in zip(piece.axes, deviations, strict=True):
-            total += series_log_likelihood(values, piece.valid, correlation, float(drift**2), float(white**2))
-    return total
+    correlation = math.exp(-1.0 / (rate_hz * correlation_s))
+    return _whiten(
+        np.ascontiguousarray(columns, np.float64), np.ascontiguousarray(used), correlation, drift**2, white**2
+    )
 
 
 @compiled
 def series_log_likelihood(
-    values: Floats, valid: Bools, correlation: float, drift_variance: float, white_variance: float
+    columns: Floats, used: Bools, correlation: float, drift_variance: float, white_variance: float
 ) -> float:
-    """Restricted log-likelihood of A independent axes (N, A) with one constant each, up to a constant.
+    """Restricted log-likelihood of A independent axes (N, A) with one unknown constant each, over the used rows (N,).
 
-    `correlation` is that of the Gauss-Markov process from one sample to the next.
+    `correlation` is that of the drift from one row to the next. The variance of a prediction becomes constant soon
+    after each gap; its logarithm is then not computed again.
     """
-    count, axes = values.shape
-    variance = drift_variance  # stationary before the first sample
-    state, unit = np.zeros(axes), 0.0
-    cross, square = np.zeros(axes), np.zeros(axes)
-    norm, log_determinant = 0.0, 0.0
-    for i in range(count):
-        variance = correlation**2 * variance + drift_variance * (1.0 - correlation**2)
-        unit *= correlation
-        for a in range(axes):
-            state[a] *= correlation
-        if not valid[i]:
+    rows, axes = columns.shape
+    predicted = np.zeros(axes)
+    squares = np.zeros(axes)
+    crosses = np.zeros(axes)
+    one, ones = 0.0, 0.0
+    variance, noise = drift_variance, drift_variance * (1.0 - correlation * correlation)
+    total, gain, log_innovation, inverse = 0.0, 0.0, 0.0, 0.0
+    steady = False
+    count = 0
+    for row in range(rows):
+        if not used[row]:
+            variance = correlation * correlation * variance + noise
+            one *= correlation
+            for axis in range(axes):
+                predicted[axis] *= correlation
+            steady = False
             continue
-        innovation_variance = variance + white_variance
-        gain = variance / innovation_variance
-        unit_innovation = 1.0 - unit
-        for a in range(axes):
-            innovation = values[i, a] - state[a]
-            state[a] += gain * innovation
-            square[a] += innovation * innovation / innovation_variance
-            cross[a] += innovation * unit_innovation / innovation_variance
-        unit += gain * unit_innovation
-        norm += unit_innovation * unit_innovation / innovation_variance
-        log_determinant += np.log(innovation_variance)
-        variance *= 1.0 - gain
-    if norm <= 0.0:
+        if not steady:
+            innovation = variance + white_variance
+            gain = variance / innovation
+            inverse = 1.0 / innovation
+            log_innovation = math.log(innovation)
+            after = correlation * correlation * variance * white_variance * inverse + noise
+            steady = abs(after - variance) <= 1e-14 * variance
+            variance = after
+        count += 1
+        total += log_innovation
+        rest = 1.0 - one
+        ones += rest * rest * inverse
+        one = correlation * (one + gain * rest)
+        for axis in range(axes):
+            error = columns[row, axis] - predicted[axis]
+            squares[axis] += error * error * inverse
+            crosses[axis] += error * rest * inverse
+            predicted[axis] = correlation * (predicted[axis] + gain * error)
+    if count < 2:
         return 0.0
-    total = 0.0
-    for a in range(axes):
-        total -= 0.5 * (square[a] - cross[a] ** 2 / norm + log_determinant + np.log(norm))
-    return total
+    misfit = 0.0
+    for axis in range(axes):
+        misfit += squares[axis] - crosses[axis] * crosses[axis] / ones
+    constant = (count - 1) * math.log(2.0 * math.pi)
+    out: float = -0.5 * (misfit + axes * (total + math.log(ones) + constant))
+    return out
+
+
+@compiled
+def _whiten(columns: Floats, used: Bools, correlation: float, drift_variance: float, white_variance: float) -> Floats:
+    """Innovations of columns (N, A) over their standard deviations; NaN where not used."""
+    rows, axes = columns.shape
+    out = np.full((rows, axes), np.nan)
+    predicted = np.zeros(axes)
+    variance, noise = drift_variance, drift_variance * (1.0 - correlation * correlation)
+    for row in range(rows):
+        innovation = variance + white_variance
+        gain = variance / innovation
+        scale = 1.0 / math.sqrt(innovation)
+        for axis in range(axes):
+            if used[row]:
+                error = columns[row, axis] - predicted[axis]
+                out[row, axis] = error * scale
+                predicted[axis] += gain * error
+            predicted[axis] *= correlation
+        if used[row]:
+            variance *= white_variance / innovation
+        variance = correlation * correlation * variance + noise
+    return out

@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
-from harness.errors import BadInput
+from harness.errors import NotComparable
 
 LEAST_TURN_RAD = 0.05
 """Least spread of the body's orientations about a second axis [rad]; a smaller one is motion about one axis."""
@@ -60,7 +60,7 @@ class HandEye:
 def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> HandEye:
     """Solve for the room and the mount of each station by least squares.
 
-    BadInput if no station turns about two axes: the room's and the mounts' turn about the only axis is then
+    NotComparable if no station turns about two axes: the room's and the mounts' turn about the only axis is then
     not observable.
     """
     require_two_axes(stations)
@@ -70,10 +70,10 @@ def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) ->
 
 
 def require_two_axes(stations: Sequence[PosePairs]) -> None:
-    """Raise BadInput unless a body turns about two axes."""
+    """Raise NotComparable unless a body turns about two axes."""
     spread = max((second_spread_rad(pairs.world_from_body) for pairs in stations), default=0.0)
     if not spread >= LEAST_TURN_RAD:
-        raise BadInput(
+        raise NotComparable(
             f"The bodies turn about one axis only: {np.rad2deg(spread):.1f} deg (RMS) about a second one.",
             "Not observable: each mount's rotation about this axis, and its position along it. Turn about two axes.",
         )
@@ -136,4 +136,9 @@ def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bo
         right += flat.T @ values.reshape(-1)
     solution: Floats = np.asarray(np.linalg.lstsq(normal, right, rcond=1e-12)[0], dtype=np.float64)
     factor = float(solution[0]) if with_scale else 1.0
+    if not factor > 0.1:
+        raise NotComparable(
+            f"Reported positions explain {factor:.2f} of the motion.",
+            "Not observable: the scale. Move through the room, and give the reference in metres.",
+        )
     return solution[1:4], 1.0 / factor - 1.0, solution[4:].reshape(-1, 3)

@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.errors import BadInput
+from harness.errors import BadInput, NotComparable
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +64,8 @@ def time_offset(
 ) -> TimeOffset:
     """Find the offset at which pairs of angular speeds correlate best; all pairs share the two clocks.
 
-    All series have one period. The offset is refined to a fraction of it by a parabola. BadInput if no offset leaves
-    `least_overlap_s` of overlap [s].
+    All series have one period. The offset is refined to a fraction of it by a parabola. NotComparable if no offset
+    leaves `least_overlap_s` of overlap [s].
     """
     period_s = first[0].period_s
     if any(abs(series.period_s - period_s) > 1e-9 * period_s for series in (*first, *second)):
@@ -83,7 +83,7 @@ def time_offset(
     overlap_s = total[2] * period_s / len(first)
     enough = overlap_s >= least_overlap_s
     if not enough.any():
-        raise BadInput(
+        raise NotComparable(
             f"Capture and reference overlap by at most {overlap_s.max():.1f} s.",
             f"At least {least_overlap_s:g} s of common motion are needed for the time offset.",
         )

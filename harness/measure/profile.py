@@ -18,8 +18,9 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_episodes, fit_episodes
 from harness.measure.excursions import ExcursionNoise
-from harness.measure.gauss_markov import NoiseFit, fit_noise, start_values
 from harness.measure.measured import Measured
+from harness.measure.noise_fit import NoiseFit, fit_noise
+from harness.measure.noise_start import start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
 from harness.measure.timing import TimingAccumulator, TimingMeasurement
@@ -238,12 +239,12 @@ def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit
 
 
 def _excursion_noise(noise: NoiseFit, start: Floats) -> ExcursionNoise:
-    """The fitted noise of the position; rough values stand in for what the fit could not tell."""
+    """The fitted noise of the position; rough values stand in for what the fit could not tell or found to be 0."""
     keys = ("components.white.position_m", "components.drift.position_m", "components.drift.correlation_s")
     fitted = [noise.all_stations[key] for key in keys]
     rough = (start[0], start[1], start[5])
     return ExcursionNoise(
-        *(one.value if one.is_measured else float(value) for one, value in zip(fitted, rough, strict=True))
+        *(one.value if one.value > 0.0 else float(value) for one, value in zip(fitted, rough, strict=True))
     )
 
 

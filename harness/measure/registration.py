@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.errors import BadInput
+from harness.errors import BadInput, NotComparable
 from harness.measure.correlated_errors import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
 from harness.measure.measured import NORMAL_QUANTILE, Measured
@@ -15,10 +15,10 @@ from harness.measure.offset import SpeedSeries, TimeOffset, angular_speed, time_
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
 from harness.measure.registration_model import (
+    AHEAD,
     CLOCK,
     HEADING,
-    OFFSET_ORIENTATION,
-    OFFSET_POSITION,
+    OFFSET,
     OWN,
     ROOM_ORIGIN,
     ROOM_TURN,
@@ -171,8 +171,9 @@ def register(
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput that names what
-    is not observable: no stamps, too little overlap, too few matched records, another motion, motion about one axis.
+    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps
+    and for another motion. NotComparable for little overlap, few matched records and motion about one axis; it names
+    what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
@@ -245,7 +246,7 @@ def _make_grids(
     due = len(grids) * max((end_s - begin_s) / period_s, 1.0)
     matched = min(sum(int(grid.known.sum()) for grid in grids.values()) / due, 1.0)
     if matched < least_matched:
-        raise BadInput(
+        raise NotComparable(
             f"{100.0 * matched:.1f} % of the records due in the overlap have a pose and a reference.",
             f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings.",
         )
@@ -279,9 +280,9 @@ def _start(
     for grid, spline in zip(grids.values(), splines, strict=True):
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
-    solved = solve_hand_eye(paired)
+    solved = solve_hand_eye(paired, with_scale=False)
     return RegistrationState(
-        middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, offset_s, 0.0,
+        middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, 0.0, 0.0,
         solved.body_from_station, solved.mount_m,
     )  # fmt: skip
 
@@ -292,8 +293,8 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
         ("the room's rotation", "rad", deviation[ROOM_TURN]),
         ("the tracker's origin", "m", deviation[ROOM_ORIGIN]),
         ("the heading error", "rad", deviation[[HEADING]]),
-        ("the time offset of orientations", "s", deviation[[OFFSET_ORIENTATION]]),
-        ("the time offset of positions", "s", deviation[[OFFSET_POSITION]]),
+        ("the time offset of orientations", "s", deviation[[OFFSET]]),
+        ("the time offset of positions", "s", deviation[[AHEAD]]),
     ]
     for s, name in enumerate(stations):
         own = deviation[SHARED + OWN * s : SHARED + OWN * (s + 1)]
@@ -302,7 +303,7 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
     for what, unit, values in checks:
         worst = float(np.max(values))
         if not worst <= MOST_DEVIATION[unit]:
-            raise BadInput(
+            raise NotComparable(
                 f"Not observable from this motion: {what} (standard deviation {worst:.2g} {unit}).",
                 "Turn every body about two axes and move through the room.",
             )
@@ -322,12 +323,12 @@ def _result(
     def measured(value: float, index: int, unit: float = 1.0) -> Measured:
         return Measured.normal(unit * value, unit * float(deviation[index]), blocks)
 
-    both = [OFFSET_ORIENTATION, OFFSET_POSITION]
-    apart = float(np.sqrt(np.array([1.0, -1.0]) @ covariance[np.ix_(both, both)] @ np.array([1.0, -1.0])))
+    both = [OFFSET, AHEAD]
+    position_s = float(np.sqrt(np.array([1.0, -1.0]) @ covariance[np.ix_(both, both)] @ np.array([1.0, -1.0])))
     values = {
-        "time_offset_orientation_s": measured(state.offset_orientation_s, OFFSET_ORIENTATION),
-        "time_offset_position_s": measured(state.offset_position_s, OFFSET_POSITION),
-        "position_ahead_s": Measured.normal(state.offset_orientation_s - state.offset_position_s, apart, blocks),
+        "time_offset_orientation_s": measured(state.offset_s, OFFSET),
+        "time_offset_position_s": Measured.normal(state.offset_s - state.ahead_s, position_s, blocks),
+        "position_ahead_s": measured(state.ahead_s, AHEAD),
         "clock_ratio_ppm": measured(state.clock_ratio, CLOCK, 1e6),
         "scale": measured(state.scale, SCALE),
         "heading_rad": measured(state.heading_rad, HEADING),
@@ -343,7 +344,7 @@ def _result(
             station, body, state.mount_m[s], state.body_from_station[s], covariance[own, own], blocks
         )
         grid, residual = grids[station], fit.residuals[s]
-        truth_s = state.truth_time_s(grid.measured_s, of_position=False)
+        truth_s = state.truth_time_s(grid.measured_s)
         errors[station] = StationResiduals(
             truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
         )

@@ -19,7 +19,9 @@ from harness.measure.registration_model import OWN, SHARED, RegistrationState, l
 OUTLIER = 4.0
 """Residuals larger than this many robust deviations are left out."""
 BLOCK_CORRELATIONS = 5.0
-"""Shortest block of the covariance, in correlation times."""
+"""Length of a block of the covariance, in correlation times."""
+FEWEST_BLOCKS = 6
+"""Blocks are shortened to have this many of them."""
 _AXES = ((0, 1, 2), (3, 4), (5,))
 """Axes of a reading with one noise: position, pitch and roll, yaw."""
 _CHI_MEDIAN = 1.538
@@ -164,7 +166,7 @@ def _whitened_step(
     for s, grid in enumerate(grids):
         residual, slope = _linear(state, s, grids, truths)
         longest_s = max(process.correlation_s for process in noise[s])
-        block_rows = max(round(BLOCK_CORRELATIONS * min(longest_s, 2.0) / grid.period_s), 1)
+        block_rows = max(min(round(BLOCK_CORRELATIONS * longest_s / grid.period_s), len(residual) // FEWEST_BLOCKS), 1)
         gradient = np.zeros((len(residual), SHARED + OWN))
         for process, axes in zip(noise[s], _AXES, strict=True):
             valid = used[s][:, int(axes[0] >= 3)]
@@ -204,7 +206,9 @@ def _covariance(information: Floats, meat: Floats, blocks: int, fixed: Sequence[
     free = _free(len(information), fixed)
     inside = np.ix_(free, free)
     scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
-    inverse = np.linalg.pinv(information[inside] / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
+    curvature, directions = np.linalg.eigh(information[inside] / scale[:, None] / scale)
+    # A direction that nothing shows keeps a variance, which is then too large to pass.
+    inverse = (directions / np.maximum(curvature, 1e-13)) @ directions.T / scale[:, None] / scale
     sandwich = inverse @ meat[inside] @ inverse
     factor = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
     out = np.zeros_like(information)

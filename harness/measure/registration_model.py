@@ -1,13 +1,13 @@
 """Model of what registered stations report, with its derivatives.
 
-At device time `d` station s reports, for the true time `t` of each kind of reading,
+At device time d = t + offset + ratio (t - reference_s), for the true time t, station s reports
 
-    position     (1 + scale) R (b(t_p) + B(t_p) m_s - o)
-    orientation  exp(heading z) R B(t_o) Y_s
+    orientation  exp(heading z) R B(t) Y_s
+    position     p(t) + ahead p'(t), p(t) = (1 + scale) R (b(t) + B(t) m_s - o)
 
-with the pose (b, B) of its body in the world, room R = `tracker_from_world` and origin o, mount (m_s, Y_s), and
-d = t + offset + ratio (t - reference_s). Orientation and position have an offset each; the heading error turns
-orientations about the tracker's vertical.
+with the pose (b, B) of its body in the world, room R = `tracker_from_world` and origin o, and mount (m_s, Y_s). The
+heading error turns orientations about the tracker's vertical. The position's error along the velocity is linear, as
+in `components.speed`; a shift in time would bend it, and change the scale of fast motion.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,9 @@ SHARED = 11
 """Number of parameters that all stations share; each station adds `OWN` for its mount."""
 OWN = 6
 ROOM_TURN, ROOM_ORIGIN = slice(0, 3), slice(3, 6)
-SCALE, HEADING, OFFSET_ORIENTATION, OFFSET_POSITION, CLOCK = 6, 7, 8, 9, 10
+SCALE, HEADING, OFFSET, AHEAD, CLOCK = 6, 7, 8, 9, 10
+_STEP_S = 1e-3
+"""Step of the difference that gives accelerations [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +39,10 @@ class RegistrationState:
     """(3,) origin of the tracker's frame in the world [m]."""
     scale: float
     heading_rad: float
-    offset_orientation_s: float
-    offset_position_s: float
+    offset_s: float
+    """Device's clock minus that of the reference, by which orientations agree [s]."""
+    ahead_s: float
+    """Time by which positions run ahead of orientations [s]."""
     clock_ratio: float
     """Rate error of the device's clock; positive runs fast."""
     body_from_station: Floats
@@ -50,10 +54,9 @@ class RegistrationState:
         freeze(self, tracker_from_world=(4,), tracker_origin_m=(3,))
         freeze(self, body_from_station=("S", 4), mount_m=("S", 3))
 
-    def truth_time_s(self, measured_s: Floats, *, of_position: bool) -> Floats:
+    def truth_time_s(self, measured_s: Floats) -> Floats:
         """True times of readings by their device times, both (N,) [s]."""
-        offset_s = self.offset_position_s if of_position else self.offset_orientation_s
-        out: Floats = self.reference_s + (measured_s - self.reference_s - offset_s) / (1.0 + self.clock_ratio)
+        out: Floats = self.reference_s + (measured_s - self.reference_s - self.offset_s) / (1.0 + self.clock_ratio)
         return out
 
     def moved(self, step: Floats) -> "RegistrationState":
@@ -65,8 +68,8 @@ class RegistrationState:
             tracker_origin_m=self.tracker_origin_m + step[ROOM_ORIGIN],
             scale=self.scale + float(step[SCALE]),
             heading_rad=self.heading_rad + float(step[HEADING]),
-            offset_orientation_s=self.offset_orientation_s + float(step[OFFSET_ORIENTATION]),
-            offset_position_s=self.offset_position_s + float(step[OFFSET_POSITION]),
+            offset_s=self.offset_s + float(step[OFFSET]),
+            ahead_s=self.ahead_s + float(step[AHEAD]),
             clock_ratio=self.clock_ratio + float(step[CLOCK]),
             body_from_station=_unit(rotations.multiply(rotations.exp(own[:, :3]), self.body_from_station)),
             mount_m=self.mount_m + own[:, 3:],
@@ -92,21 +95,27 @@ def linearise(
     rate = 1.0 / (1.0 + state.clock_ratio)
     residual, slope = np.zeros((count, 6)), np.zeros((count, 6, SHARED + OWN))
 
-    time_s = state.truth_time_s(measured_s, of_position=True)
-    (body_m, body), (velocity, omega) = truth.poses(time_s), truth.rates(time_s)
+    time_s = state.truth_time_s(measured_s)
+    since_s = (time_s - state.reference_s)[:, None]
+    (_, body), (_, omega) = truth.poses(time_s), truth.rates(time_s)
+
     factor = 1.0 + state.scale
-    in_room = rotations.rotate(room, body_m + rotations.rotate(body, mount_m) - state.tracker_origin_m)
-    speed = rotations.rotate(room, velocity + rotations.rotate(body, rotations.cross(omega, mount_m)))
+    at_m, velocity = _station_point(state, mount_m, time_s, truth)
+    ahead, behind = (_station_point(state, mount_m, time_s + step_s, truth)[1] for step_s in (_STEP_S, -_STEP_S))
+    acceleration = (ahead - behind) / (2.0 * _STEP_S)
+    at_m = at_m + state.ahead_s * velocity
+    arm = rotations.to_matrix(body) + state.ahead_s * rotations.to_matrix(body) @ _skew(omega)
+    in_room = rotations.rotate(room, at_m)
+    by_time = factor * rotations.rotate(room, velocity + state.ahead_s * acceleration)
     residual[:, :3] = position_m - factor * in_room
     slope[:, :3, ROOM_TURN] = -factor * _skew(in_room)
     slope[:, :3, ROOM_ORIGIN] = -factor * rotations.to_matrix(room)
     slope[:, :3, SCALE] = in_room
-    slope[:, :3, OFFSET_POSITION] = -rate * factor * speed
-    slope[:, :3, CLOCK] = -rate * factor * speed * (time_s - state.reference_s)[:, None]
-    slope[:, :3, SHARED + 3 :] = factor * rotations.to_matrix(rotations.multiply(room, body))
+    slope[:, :3, OFFSET] = -rate * by_time
+    slope[:, :3, AHEAD] = factor * rotations.rotate(room, velocity)
+    slope[:, :3, CLOCK] = -rate * by_time * since_s
+    slope[:, :3, SHARED + 3 :] = factor * rotations.to_matrix(room) @ arm
 
-    time_s = state.truth_time_s(measured_s, of_position=False)
-    (_, body), (_, omega) = truth.poses(time_s), truth.rates(time_s)
     headed = rotations.multiply(rotations.about_z(state.heading_rad), room)
     in_tracker = rotations.multiply(headed, body)
     modelled = rotations.multiply(in_tracker, mount)
@@ -114,10 +123,19 @@ def linearise(
     residual[:, 3:] = rotations.log(rotations.multiply(turn, rotations.inverse(modelled)))
     slope[:, 3:, ROOM_TURN] = rotations.to_matrix(rotations.about_z(state.heading_rad))
     slope[:, 5, HEADING] = 1.0
-    slope[:, 3:, OFFSET_ORIENTATION] = -rate * rate_rad_s
-    slope[:, 3:, CLOCK] = -rate * rate_rad_s * (time_s - state.reference_s)[:, None]
+    slope[:, 3:, OFFSET] = -rate * rate_rad_s
+    slope[:, 3:, CLOCK] = -rate * rate_rad_s * since_s
     slope[:, 3:, SHARED : SHARED + 3] = rotations.to_matrix(in_tracker)
     return Linearised(residual, slope)
+
+
+def _station_point(
+    state: RegistrationState, mount_m: Floats, time_s: Floats, truth: TruthSpline
+) -> tuple[Floats, Floats]:
+    """Position of a station relative to the tracker's origin (N, 3) [m] and its velocity (N, 3) [m/s], world axes."""
+    (body_m, body), (velocity, omega) = truth.poses(time_s), truth.rates(time_s)
+    at_m = body_m + rotations.rotate(body, mount_m) - state.tracker_origin_m
+    return at_m, velocity + rotations.rotate(body, rotations.cross(omega, mount_m))
 
 
 def _skew(vectors: Floats) -> Floats:

@@ -94,15 +94,15 @@ def static_series(readings: StationReadings, rest: tuple[int, int], rate_hz: flo
     """The readings from row `rest[0]` to before `rest[1]` on the grid of the station's samples.
 
     A sample that never came leaves a place empty. The grid follows the stamps where their rate is not quite `rate_hz`.
-    Of records with one stamp the first is taken. Suspect records and those without a stamp are left out. If none has
-    a stamp, the places are those in order of arrival.
+    Of records with one stamp the first is taken. Records without a stamp, and those whose stamp runs backwards or
+    beyond the last sound one, are left out. If none has a stamp, the places are those in order of arrival.
     """
     rows = np.arange(*rest)
     stamped = np.isfinite(readings.measured_s[rows])
     if stamped.any():
-        rows = rows[stamped & ~readings.suspect[rows]] if (~readings.suspect[rows[stamped]]).any() else rows[stamped]
-        place = _places(readings.measured_s[rows], rate_hz)
-        begin_s = float(readings.measured_s[rows[0]])
+        rows = rows[stamped]
+        place = _places(readings.measured_s[rows], readings.suspect[rows], rate_hz)
+        begin_s = float(readings.measured_s[rows[place >= 0][0]])
     else:
         place, begin_s = np.arange(len(rows)), float(readings.received_s[rows[0]])
     rows, place = rows[place >= 0], place[place >= 0]
@@ -137,24 +137,26 @@ def _agrees_nearby(middle_m: Floats, middle_turn: Floats) -> Bools:
     return out
 
 
-def _places(measured_s: Floats, rate_hz: float) -> Ints:
-    """Place (N,) of each record on the grid of its stamps, from 0; -1 for a record whose time runs backwards.
+def _places(measured_s: Floats, suspect: Bools, rate_hz: float) -> Ints:
+    """Place (N,) of each record on the grid of its stamps, from 0; -1 for a record that has none.
 
-    Steps between records give the places, their regression on the stamps the rate, and this the places without the
-    rounding of single steps.
+    Steps between records that are not suspect give their places, a regression on the stamps the rate, and this the
+    places of all, without the rounding of single steps.
     """
-    ahead = measured_s >= np.maximum.accumulate(measured_s)
-    times_s = measured_s[ahead]
+    sound = ~suspect if not suspect.all() else np.ones(len(suspect), bool)
+    level_s = np.maximum.accumulate(np.where(sound, measured_s, -np.inf))
+    sound &= measured_s >= level_s
+    times_s = measured_s[sound]
     place = np.concatenate([[0.0], np.cumsum(np.rint(np.diff(times_s) * rate_hz))])
+    period_s, phase_s = 1.0 / rate_hz, float(times_s[0])
     if place[-1] > 0.0:
         centred = place - place.mean()
         period_s = float(centred @ times_s) / float(centred @ centred)
         phase_s = float(np.median(times_s - place * period_s))
-        place = np.rint((times_s - phase_s) / period_s)
-        place -= place[0]
-    out = np.full(len(measured_s), -1)
-    out[ahead] = place.astype(np.int64)
-    return out
+    first, last = np.rint((times_s[[0, -1]] - phase_s) / period_s).tolist()
+    place = np.rint((measured_s - phase_s) / period_s) - first
+    known = (measured_s >= level_s) & (place >= 0.0) & (place <= last - first)
+    return np.where(known, place, -1.0).astype(np.int64)
 
 
 def _mean_orientation(quaternions: Floats) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.measure.measured import Measured
+from harness.measure.robust_slope import robust_slope
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 
 TIMING_KEYS = (
@@ -183,8 +184,6 @@ class TimingAccumulator:
 
     def _clock_drift_ppm(self) -> tuple[Measured, float]:
         """Rate error of the device's clock [1e-6] from the longest session, and the length of it [s]."""
-        from scipy import stats
-
         clocks = max(self._clocks.values(), key=lambda one: len(one.least_s), default=None)
         points = np.array(list(clocks.least_s.values())) if clocks else np.zeros((0, 2))
         if len(points) < _FEWEST_BINS:
@@ -193,7 +192,7 @@ class TimingAccumulator:
         size = -(-len(points) // _MOST_BINS)
         least = np.array([part[np.argmin(part[:, 0])] for part in np.split(points, range(size, len(points), size))])
         span_s = float(least[-1, 1] - least[0, 1])
-        slope, _, low, high = stats.theilslopes(least[:, 0], least[:, 1], 0.95)
+        slope, low, high = robust_slope(least[:, 1], least[:, 0])
         margin = self._resolution_s() / span_s  # rounding of the stamps is no independent noise
         drift, fast, slow = (float(1e6 * (1.0 / (1.0 + one) - 1.0)) for one in (slope, low - margin, high + margin))
         return Measured(drift, slow, fast, len(least)), span_s

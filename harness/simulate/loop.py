@@ -5,6 +5,7 @@ configuration to the first (Flash & Hogan 1985), with noise of its own.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -128,6 +129,24 @@ def looping_trajectory(body: Body, take: BodyMotion, rate_hz: float) -> tuple[Tr
     least_s = trajectory.duration_s + STOP_S + _return_duration_s(ends[0], ends[1]) + START_S
     frames = int(np.ceil(least_s * rate_hz))
     return trajectory.with_return(frames / rate_hz), frames
+
+
+def loop_motion(body: Body, take: BodyMotion, mounts: Sequence[Mount], tracker: TrackerConfig) -> BodyMotion:
+    """The true motion of one loop of `simulate_loop` without physics, at 120 Hz or more: the take, then the way back.
+
+    A reference for recordings of several loops. The way back ends within one frame of the loop's end.
+    """
+    trajectory = Trajectory(body, take)
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
+    turn_s, slot_s = float(time_s[-1, 0]), float(time_s[0, -1])
+    ends = trajectory.qpos(np.array([turn_s, 0.0]))
+    periods = int(np.ceil(_return_duration_s(ends[0], ends[1]) * tracker.rate_hz)) + 1
+    back = _return_motion(take, ends[0], ends[1], periods / tracker.rate_hz + slot_s)
+    rate_hz = max(_BLEND_HZ, take.rate_hz)
+    grid_s = np.arange(round((turn_s + periods / tracker.rate_hz) * rate_hz)) / rate_hz
+    there = grid_s <= turn_s
+    qpos = np.concatenate([trajectory.qpos(grid_s[there]), Trajectory(body, back).qpos(grid_s[~there] - turn_s)])
+    return replace(take, name=back.name, rate_hz=rate_hz, qpos=qpos)
 
 
 def _return_duration_s(last: Floats, first: Floats) -> float:

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from harness.body.retargeting import retarget_to_own_body
+from harness.core.arrays import Floats
 from harness.core.fields import replace_fields
 from harness.core.motion import Clip
 from harness.core.package_data import VERSION
@@ -21,7 +20,7 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig
+from harness.mocap.synthetic.rig import generate_rig, stretch_marks
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.session_bias import SessionBias
 from harness.simulate.link import TrackerConfig
@@ -29,6 +28,8 @@ from harness.simulate.simulation import sampling_times_s, simulate_readings, tra
 from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
+from harness.stream.emulator.faults import Fault
+from harness.stream.emulator.faulty_capture import add_byte_faults
 from harness.stream.recording.recording import record_capture
 
 SCENARIO = "lab"
@@ -81,6 +82,7 @@ class PlantedFault:
     """Length of the capture [s]; that of the take if it is shorter."""
     components: Mapping[str, Any] = field(default_factory=dict)
     tracker: Mapping[str, Any] = field(default_factory=dict)
+    line: tuple[Fault, ...] = ()
 
 
 PLANTED_FAULTS: Mapping[str, PlantedFault] = {
@@ -111,7 +113,10 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
         "station lost 5 %", "characterize", (PlantedNumber("components.dropout.share", LOST_SHARE, STATION),)
     ),
     "duplicates": PlantedFault(
-        "duplicates 1 %", "characterize", (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),)
+        "duplicates 1 %",
+        "characterize",
+        (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),),
+        line=(Fault("repeated", share=REPEATED_SHARE),),
     ),
     "clock": PlantedFault(
         "clock 80 ppm",
@@ -166,12 +171,25 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         raise UnknownName("planted fault", kind, PLANTED_FAULTS)
     scenario, clip = planted_scenario(kind, seed), planted_motion(kind, seed)
     wire_format, wire = _simulate_line(scenario, clip)
-    if kind == "duplicates":
-        wire = repeat_records(wire, seed)
-    note = {
+    wire = add_byte_faults(wire, scenario.fault, scenario.seed)
+    path = folder / f"{kind}_{seed}.rec"
+    record_capture(
+        path,
+        wire_format,
+        wire,
+        simulation_note(scenario, clip.name),
+        seconds=min(seconds, PLANTED_FAULTS[kind].seconds),
+        marks=stretch_marks(clip.name),
+    )
+    return path
+
+
+def simulation_note(scenario: Scenario, clip: str) -> dict[str, Any]:
+    """The note that `harness record sim:` writes for a clip of a scenario."""
+    return {
         "source": "simulation",
-        "scenario": SCENARIO,
-        "clip": clip.name,
+        "scenario": scenario.name,
+        "clip": clip,
         "seed": scenario.seed,
         "noise": scenario.noise,
         "stations": list(scenario.stations),
@@ -179,9 +197,6 @@ def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math
         "posing": False,
         "harness": VERSION,
     }
-    path = folder / f"{kind}_{seed}.rec"
-    record_capture(path, wire_format, wire, note, seconds=min(seconds, PLANTED_FAULTS[kind].seconds))
-    return path
 
 
 def planted_scenario(kind: str, seed: int) -> Scenario:
@@ -198,7 +213,7 @@ def planted_scenario(kind: str, seed: int) -> Scenario:
         stations[STATION], stations[OTHER_STATION] = stations[OTHER_STATION], stations[STATION]
         scenario = replace(scenario, stations=stations)
     tracker = replace_fields(scenario.tracker, dict(fault.tracker), "tracker")
-    return replace(scenario, components=components, tracker=tracker)
+    return replace(scenario, components=components, tracker=tracker, fault=fault.line)
 
 
 def planted_motion(kind: str, seed: int) -> Clip:
@@ -217,14 +232,6 @@ def planted_numbers(kind: str, seed: int) -> tuple[PlantedNumber, ...]:
         return numbers
     sign = math.copysign(1.0, _scale_draw(_session_seed(seed)))
     return tuple(replace(number, value=sign * number.value) for number in numbers)
-
-
-def repeat_records(wire: ByteCapture, seed: int) -> ByteCapture:
-    """The capture of a line on which a share of the records is sent twice, both in one chunk."""
-    size = len(wire.data) // len(wire.ends)
-    twice = generator(seed, "planted", "repeated").random(len(wire.ends)) < REPEATED_SHARE
-    records = np.frombuffer(wire.data, np.uint8).reshape(-1, size)
-    return ByteCapture(np.repeat(records, 1 + twice, axis=0).tobytes(), size * np.cumsum(1 + twice), wire.received_s)
 
 
 def _simulate_line(scenario: Scenario, clip: Clip) -> tuple[WireFormat, ByteCapture]:
@@ -246,6 +253,13 @@ def _gaps_of_station(seed: int, until_s: float) -> list[dict[str, Any]]:
     more = Dropout(share=1.0 - (1.0 - LOST_SHARE) / (1.0 - Dropout.share))
     gaps = more.gaps(generator(seed, "planted", "lost"), until_s)
     return [{"station": STATION, "from_s": begin_s, "to_s": end_s, "fade_s": 0.0} for begin_s, end_s, _ in gaps]
+
+
+def station_offset_m(seed: int, station: str) -> Floats:
+    """(3,) offset of a station in its housing in the session of a boxing capture, in the station's axes [m]."""
+    draw = generator(seed, "noise", _SESSION, "session", station).normal(size=3)
+    out: Floats = SessionBias.station_offset_m * draw
+    return out
 
 
 def _scale_draw(seed: int) -> float:

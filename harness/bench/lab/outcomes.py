@@ -1,11 +1,13 @@
 """What a lab's verbs find in planted captures: computed in processes, and stored as one small file for each capture."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from harness.bench.lab.captures import PLANTED_FAULTS, planted_capture
+from harness.bench.lab.captures import NO_FAULTS, PLANTED_FAULTS, planted_capture
+from harness.bench.lab.registration_errors import registration_errors
 from harness.bench.lab.validated_captures import validate_planted
 from harness.core.fields import build
 from harness.core.progress import ProgressCallback
@@ -26,12 +28,13 @@ class StoredNumber:
 
     key: str
     value: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
+    """Ends of the interval; None where it has no end."""
 
     def contains(self, value: float) -> bool:
         """Whether the interval contains a value."""
-        return self.low <= value <= self.high
+        return (self.low is None or self.low <= value) and (self.high is None or value <= self.high)
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,8 @@ class CaptureOutcome:
     checks: tuple[StoredCheck, ...] = ()
     parameters: tuple[StoredNumber, ...] = ()
     """Parameters that were measured."""
+    errors: dict[str, float] = field(default_factory=dict)
+    """Errors of the registration of a capture without a fault (see `registration_errors`)."""
     exchanged: tuple[str, ...] = ()
     """Stations that are not where they are said to be, each with the body that carries it: "head: thorax"."""
     failure: str = ""
@@ -110,10 +115,12 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
     if PLANTED_FAULTS[kind].verb == "validate":
         against = validate_planted(kind, seed, folder)
         exchanged = tuple(f"{station}: {body}" for station, body in sorted(against.exchanged.items()))
-        return CaptureOutcome(kind, seed, source_hash(), _stored_checks(against.checks), exchanged=exchanged)
+        errors = registration_errors(against, seed) if kind in NO_FAULTS else {}
+        checks = _stored_checks(against.checks)
+        return CaptureOutcome(kind, seed, source_hash(), checks, errors=errors, exchanged=exchanged)
     found = characterize_capture(planted_capture(kind, seed, folder))
     parameters = tuple(
-        StoredNumber(key, one.value, one.low, one.high)
+        StoredNumber(key, one.value, _finite(one.low), _finite(one.high))
         for key, one in found.profile.parameters.items()
         if one.is_measured
     )
@@ -125,9 +132,13 @@ def _stored_checks(checks: Sequence[NamedDeparture]) -> tuple[StoredCheck, ...]:
     for check in checks:
         one = check.departure
         measured, expected = one.measured, one.expected.value
-        numbers = (one.key, measured.value, measured.low, measured.high)
+        numbers = (one.key, measured.value, _finite(measured.low), _finite(measured.high))
         out.append(StoredCheck(*numbers, one.station, expected, check.p_holm, check.is_named))
     return tuple(out)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
 
 
 def _read_outcome(path: Path) -> CaptureOutcome | None:

@@ -17,6 +17,7 @@ from harness.bench.lab.captures import (
 from harness.bench.lab.coverage import coverage_rows
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, collect_outcomes
 from harness.bench.lab.planted_worlds import trust_rows
+from harness.bench.lab.registration_errors import registration_rows
 from harness.core.progress import ProgressCallback
 from harness.experiment.executors import TaskExecutor
 from harness.report.physics.error_comparison import TruthRow
@@ -43,7 +44,13 @@ def lab_truth_rows(
     tasks = [(kind, seed) for seed in seeds for kind in KINDS] + [(NO_FAULT, seed) for seed in more]
     outcomes = collect_outcomes(tasks, out, executor, progress)
     clean = [outcomes[NO_FAULT, seed] for seed in (*seeds, *more)]
-    return [*fault_rows(seeds, outcomes), *coverage_rows(clean), *trust_rows(seeds)]
+    errors = [outcome.errors for seed in seeds if (outcome := outcomes["none_validated", seed]).errors]
+    return [
+        *fault_rows(seeds, outcomes),
+        *registration_rows(errors, len(seeds)),
+        *coverage_rows(clean),
+        *trust_rows(seeds),
+    ]
 
 
 def needed_captures(count: int) -> int:

@@ -35,6 +35,6 @@ def planted_truth(kind: str, seed: int) -> TruthMotion:
         f"clip {clip.name}, {time_s[-1]:.1f} s",
         {bone: TruthPoses(time_s, position_m[:, row], world_from_bone[:, row]) for bone, row in rows.items()},
         dict(zip(calibration.stations, calibration.bones, strict=True)),
-        nominal_mounts(calibration),
+        nominal_mounts(calibration, calibration.stations),
         host_clock=True,
     )

@@ -58,6 +58,12 @@ RIG_TAKES = {
 """Takes by name: a short one of all stretches, five minutes and twenty minutes at rest, and a long one of all."""
 
 
+def stretch_marks(name: str) -> tuple[tuple[float, str], ...]:
+    """Beginning [s] and name of each stretch of a take; none for a clip that is no take of the rig."""
+    take = RIG_TAKES.get(name)
+    return () if take is None else tuple((begin_s, stretch) for stretch, begin_s, _ in take.stretches())
+
+
 def generate_rig(name: str) -> Clip:
     """Generate a take; UnknownName for another name."""
     if name not in RIG_TAKES:

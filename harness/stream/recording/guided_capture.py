@@ -20,7 +20,7 @@ from harness.errors import BadFile
 from harness.stream.driver import DriverConfig, Tracker, open_tracker
 from harness.stream.event_counter import EventCounter
 from harness.stream.frame import TrackerFrame
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import RecordingWriter, read_marks
 
 WATCHED_S = 2.0
 """Time over which the stations are watched for rest and motion [s]."""
@@ -45,10 +45,9 @@ def finished_stretches(path: Path) -> set[str]:
     """Names of the stretches that a recording has in full; empty without a file. BadFile for another file."""
     if not path.exists():
         return set()
-    marks = read_recording(path).marks
     return {
         str(begin["stretch"])
-        for begin, end in pairwise(marks)
+        for begin, end in pairwise(read_marks(path))
         if begin.get("stretch") and end.get("stretch") == "" and end.get("finished") == begin["stretch"]
     }
 
@@ -81,7 +80,7 @@ def capture_stretches(
     with (
         RecordingWriter(path, note) as writer,
         open_tracker(port, config, observer=writer, on_event=events) as device,
-        closing(_frames(device)) as frames,
+        closing(_frames(device, path)) as frames,
     ):
         log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")
         writer.on_mark({"stretch": ""})  # ends one that was cut
@@ -90,8 +89,14 @@ def capture_stretches(
         progress("")
 
 
-def _frames(device: Tracker) -> Generator[TrackerFrame, None, None]:
+def _frames(device: Tracker, path: Path) -> Generator[TrackerFrame, None, None]:
+    """Yield the frames of the device; where they end, the capture is unfinished and BadFile is raised."""
     yield from device
+    raise _unfinished(path)
+
+
+def _unfinished(path: Path) -> BadFile:
+    return BadFile(path, "an unfinished capture", "all stretches", "Give the same command to go on with it.")
 
 
 def _record_stretch(
@@ -136,7 +141,7 @@ def _until_ready(frames: Iterable[TrackerFrame], ready: Callable[[], bool], path
         if not waiting.is_alive():
             break
     if answers == [False]:
-        raise BadFile(path, "an unfinished capture", "all stretches", "Give the same command to go on with it.")
+        raise _unfinished(path)
 
 
 class _RestWatch:

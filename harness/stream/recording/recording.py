@@ -18,13 +18,16 @@ import os
 import stat
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
 from typing import Any, BinaryIO
+
+import numpy as np
 
 from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
@@ -48,6 +51,7 @@ from harness.stream.codec.blocks import (
     encode_block,
     read_blocks,
     read_version,
+    scan_blocks,
 )
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
@@ -59,6 +63,7 @@ _MAX_ANSWER_BYTES = 8192
 """Most bytes of an answer that are repeated next to its decoded values."""
 _KIND_BYTES = 1 << 20
 """Bytes in which the beginning of a recording whose header is damaged must have a whole block."""
+_CHUNKS_PER_WRITE = 4096
 MAX_BYTES = 2048 * MEGABYTE
 """Largest recording that is read: some two days of a full serial line."""
 
@@ -156,16 +161,34 @@ def read_recording(path: Path | str) -> Recording:
 def open_recording(path: Path) -> BinaryIO:
     """Open a recording at its first block, to read it in pieces. Raises BadFile as `read_recording`."""
     file = open_input_file(path, EXPECTED_FILE, MAX_BYTES, "`harness record PORT FILE` makes one.")
-    head = file.read(_KIND_BYTES)
     try:
-        if not head:
+        if not _seek_first_block(path, file):
             raise BadFile(path, "an empty file", EXPECTED_FILE, "Nothing was recorded into it.")
-        _check_kind(path, head)
     except BadFile:
         file.close()
         raise
-    file.seek(len(FILE_HEADER) if read_version(head) else 0)
     return file
+
+
+def _seek_first_block(path: Path, file: BinaryIO) -> bool:
+    """Go to the first block of a file; False in an empty one. Raises BadFile unless it is a recording."""
+    head = file.read(_KIND_BYTES)
+    _check_kind(path, head)
+    file.seek(len(FILE_HEADER) if read_version(head) else 0)
+    return bool(head)
+
+
+def read_marks(path: Path) -> list[dict[str, Any]]:
+    """Return what `Recording.marks` has, from a file that is read in pieces. Raises BadFile as `read_recording`."""
+    parser = Recording(path, b"")
+    with open_recording(path) as file:
+        blocks = (block for block in _whole_blocks(file) if block.kind == MARK)
+        return [{"monotonic_s": block.monotonic_s, **parser.parse_json(block)} for block in blocks]
+
+
+def _whole_blocks(file: BinaryIO) -> Iterator[RecordingBlock]:
+    """Yield the whole blocks of a file from its present position on; it is read in pieces."""
+    return (entry for entry in scan_blocks(file) if isinstance(entry, RecordingBlock))
 
 
 def describe_damage(entries: Iterable[RecordingBlock | DamagedSpan], damage: list[str]) -> Iterator[RecordingBlock]:
@@ -212,9 +235,9 @@ class RecordingWriter:
         self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT, ANSWERED, MARK), 0)
         """Bytes received and sent, and numbers of configurations, events, answers and marks, by block kind."""
         self._note = dict(note or {})
-        existing = self._existing_recording()
+        existing = self._existing_formats()
         self._new = existing is None
-        self._stations = existing.formats[-1].stations if existing and existing.formats else None
+        self._stations = existing[-1].stations if existing else None
         self._file: int | None = None
         self._closed = self._kept = False
         self._lock = Lock()
@@ -222,11 +245,18 @@ class RecordingWriter:
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         """Write bytes received from the device."""
-        self._append_all(RECEIVED, data, monotonic_s, wall_s)
+        self._append(*_split(RECEIVED, data, monotonic_s, wall_s))
+        self.counts[RECEIVED] += len(data)
+
+    def on_simulated(self, chunks: Sequence[tuple[float, bytes]]) -> None:
+        """Write chunks of a simulated line, each with its time of reception on both of the host's clocks [s]."""
+        self._append(*(block for now_s, data in chunks for block in _split(RECEIVED, data, now_s, now_s)))
+        self.counts[RECEIVED] += sum(len(data) for _, data in chunks)
 
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         """Write bytes sent to the device."""
-        self._append_all(SENT, data, monotonic_s, wall_s)
+        self._append(*_split(SENT, data, monotonic_s, wall_s))
+        self.counts[SENT] += len(data)
 
     def on_configured(self, wire: WireFormat, monotonic_s: float | None = None, wall_s: float | None = None) -> None:
         """Write the wire format.
@@ -295,11 +325,6 @@ class RecordingWriter:
     ) -> None:
         self.close()
 
-    def _append_all(self, kind: str, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        for begin in range(0, max(len(data), 1), MAX_PAYLOAD_BYTES):
-            self._append(RecordingBlock(kind, monotonic_s, wall_s, data[begin : begin + MAX_PAYLOAD_BYTES]))
-        self.counts[kind] += len(data)
-
     def _append_json(
         self, kind: str, content: Mapping[str, Any], monotonic_s: float | None = None, wall_s: float | None = None
     ) -> None:
@@ -307,18 +332,18 @@ class RecordingWriter:
         then_s = time.time() if wall_s is None else wall_s
         self._append(RecordingBlock(kind, now_s, then_s, json.dumps(content, default=str).encode()))
 
-    def _append(self, block: RecordingBlock) -> None:
-        with defer_interrupts(), self._lock:  # a block is written whole
-            if self._closed:
+    def _append(self, *blocks: RecordingBlock) -> None:
+        data = b"".join(map(encode_block, blocks))
+        with defer_interrupts(), self._lock:  # blocks are written whole
+            if self._closed or not blocks:
                 return
             try:
                 if self._file is None:
                     self._file = self._open_file()
-                    note = RecordingBlock(
-                        NOTE, block.monotonic_s, block.wall_s, json.dumps(self._note, default=str).encode()
-                    )
-                    _write_all(self._file, encode_block(note))
-                _write_all(self._file, encode_block(block))
+                    first = blocks[0]
+                    note = json.dumps(self._note, default=str).encode()
+                    _write_all(self._file, encode_block(RecordingBlock(NOTE, first.monotonic_s, first.wall_s, note)))
+                _write_all(self._file, data)
             except OSError as error:
                 if is_system_fault(error):
                     kept = "Blocks that were recorded before are kept; free some space and record into another file."
@@ -336,8 +361,8 @@ class RecordingWriter:
         _write_all(file, FILE_HEADER[size:])
         return file
 
-    def _existing_recording(self) -> Recording | None:
-        """Return the recording to continue; None for a new file. Raises BadFile."""
+    def _existing_formats(self) -> list[WireFormat] | None:
+        """Return the wire formats of the recording to continue; None for a new file. Raises BadFile."""
         try:
             mode = self.path.stat().st_mode
             if not stat.S_ISREG(mode):
@@ -345,32 +370,52 @@ class RecordingWriter:
                 raise BadFile(self.path, "no regular file", _WRITABLE_FILE, advice)
             if not os.access(self.path, os.W_OK):
                 raise PermissionError("you may not write to it")
-            data = read_input_file(self.path, EXPECTED_FILE, MAX_BYTES)
+            with open_input_file(self.path, EXPECTED_FILE, MAX_BYTES) as file:
+                _seek_first_block(self.path, file)
+                parser = Recording(self.path, b"")
+                return [parser.format_of(block) for block in _whole_blocks(file) if block.kind == CONFIGURED]
         except FileNotFoundError:
             if not self.path.parent.is_dir():
                 raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None
             return None
         except OSError as error:
             raise _file_error(self.path, error) from error
-        _check_kind(self.path, data)
-        return Recording(self.path, data)
 
 
 def record_capture(
-    path: Path | str, wire: WireFormat, capture: ByteCapture, note: Mapping[str, Any], *, seconds: float = math.inf
+    path: Path | str,
+    wire: WireFormat,
+    capture: ByteCapture,
+    note: Mapping[str, Any],
+    *,
+    seconds: float = math.inf,
+    marks: Sequence[tuple[float, str]] = (),
 ) -> RecordingWriter:
     """Record what a simulated line carried in its first `seconds`, chunk by chunk.
 
-    The simulation's clock serves as both of the host's clocks. Returns the writer, closed, for its counts.
+    The simulation's clock serves as both of the host's clocks. `marks` are the times on it [s] at which stretches
+    begin, in order, and their names. Returns the writer, closed, for its counts.
     """
     ends, received_s = capture.ends.tolist(), capture.received_s.tolist()
+    begins = [0, *ends]
     with RecordingWriter(path, note) as writer:
         start_s = received_s[0] if received_s else 0.0
         writer.on_configured(wire, start_s, start_s)
-        for begin, end, now_s in zip([0, *ends], ends, received_s, strict=False):
-            if now_s - start_s < seconds:
-                writer.on_received(capture.data[begin:end], now_s, now_s)
+        count = int(np.count_nonzero(capture.received_s - start_s < seconds))
+        rows = capture.received_s.searchsorted([at_s for at_s, _ in marks]).tolist()
+        stretch_at = {row: mark for row, mark in zip(rows, marks, strict=True) if row < count}
+        for first, last in pairwise(sorted({*range(0, count, _CHUNKS_PER_WRITE), *stretch_at, count})):
+            if first in stretch_at:
+                at_s, stretch = stretch_at[first]
+                writer.on_mark({"stretch": stretch}, at_s, at_s)
+            writer.on_simulated([(received_s[i], capture.data[begins[i] : ends[i]]) for i in range(first, last)])
     return writer
+
+
+def _split(kind: str, data: bytes, monotonic_s: float, wall_s: float) -> Iterator[RecordingBlock]:
+    """Yield the blocks that hold the data: one, or as many as their length demands."""
+    for begin in range(0, max(len(data), 1), MAX_PAYLOAD_BYTES):
+        yield RecordingBlock(kind, monotonic_s, wall_s, data[begin : begin + MAX_PAYLOAD_BYTES])
 
 
 def _write_all(file: int, data: bytes) -> None:

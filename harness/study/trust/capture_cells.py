@@ -235,7 +235,7 @@ class _CaptureRun:
 
         BadInput for motion or stations that are not those of the clip.
         """
-        found = validate_capture(self.task.capture, truth_of_playback(self.playback, 0.0, host_clock=False))
+        found = validate_capture(self.task.capture, truth_of_playback(self.playback, host_clock=False))
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
         frames, rate_hz = tuple(self.stream), self.playback.tracker.rate_hz
@@ -247,7 +247,7 @@ class _CaptureRun:
         rows = rows[number[rows] > highest]
         index = number[rows].astype(np.int64)
         stamps_s = np.array([frames[row].measured_s for row in rows])
-        known_s = found.registration.state.truth_time_s(stamps_s.ravel(), of_position=False).reshape(stamps_s.shape)
+        known_s = found.registration.state.truth_time_s(stamps_s.ravel()).reshape(stamps_s.shape)
         time_s = np.tile(np.arange(count)[:, None] / rate_hz, (1, stamps_s.shape[1]))
         time_s[index] = np.where(np.isfinite(known_s), known_s, time_s[index])
         time_s = np.clip(time_s, 0.0, trajectory.duration_s)

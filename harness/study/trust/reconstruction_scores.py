@@ -33,12 +33,12 @@ class RegisteredScore:
     """Mean over the frames, in the metric's unit; None if it was not measured."""
 
 
-def measured_calibration(registration: Registration) -> Calibration:
-    """Mounts and room as the registration found them, for methods."""
+def measured_calibration(registration: Registration, names: Sequence[str] = ()) -> Calibration:
+    """Mounts and room as the registration found them, for methods; `names` of the stations replace the capture's."""
     mounts = registration.mounts.values()
     return Calibration(
         kind="registered",
-        stations=tuple(mount.station for mount in mounts),
+        stations=tuple(names) or tuple(mount.station for mount in mounts),
         bones=tuple(mount.body for mount in mounts),
         mount_m=np.array([mount.position_m for mount in mounts]),
         bone_from_station=np.array([mount.body_from_station for mount in mounts]),
@@ -56,7 +56,8 @@ def score_registered(
     """Run methods on the frames of a capture with the registered calibration, and score them on the performer's body.
 
     A frame's true pose is that of the reference at the frame's mean time. Frames outside the reference, and those of
-    the first second, are not scored. BadInput where the reference has no performer or no frame is inside it.
+    the first second, are not scored; of several loops the one with the most frames is. BadInput where the reference has
+    no performer or no frame is inside it.
     """
     playback = found.truth.playback
     if playback is None:
@@ -64,11 +65,14 @@ def score_registered(
     frames = list(RecordingStream(path))
     time_s = truth_times_s(frames, found.registration)
     trajectory = Trajectory(playback.body, playback.take)
-    rows = np.flatnonzero((time_s >= 0.0) & (time_s <= trajectory.duration_s))
+    loop, time_s = np.divmod(time_s, found.truth.loop_s)
+    inside = (time_s >= 0.0) & (time_s <= trajectory.duration_s)
+    most = max(np.unique(loop[inside]), key=lambda number: int(np.sum(loop[inside] == number)), default=0.0)
+    rows = np.flatnonzero(inside & (loop == most))
     if len(rows) < 2.0 * WARM_UP_S * found.reader.wire.rate_hz:
         raise BadInput(f"{len(rows)} frames lie inside the reference.", "Record the motion of the reference.")
     truth_qpos = trajectory.qpos(time_s[rows])
-    kept = CalibrationFile(measured_calibration(found.registration), None)
+    kept = CalibrationFile(measured_calibration(found.registration, tuple(playback.scenario.stations)), None)
     calibrated = playback.with_calibration(kept)
     out = []
     for done, name in enumerate(methods):
@@ -97,5 +101,5 @@ def truth_times_s(frames: Sequence[TrackerFrame], registration: Registration) ->
     stamps_s = np.array([frame.measured_s for frame in frames])
     counted = np.isfinite(stamps_s)
     mean_s = np.where(counted, stamps_s, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    out = registration.state.truth_time_s(mean_s, of_position=False)
+    out = registration.state.truth_time_s(mean_s)
     return np.where(counted.any(axis=1), out, np.nan)

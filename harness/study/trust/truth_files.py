@@ -2,9 +2,10 @@
 
 - C3D: three or more markers for each station. A label is the station's name, a separator (`_`, `-`, `.` or none) and a
   number or a letter: `head_1`, `head1`, `HEAD-A`. Capital and small letters are the same.
-- TUM: a file for each station, NAME.tum in a folder, or one file for a capture of one station. A line is
-  `time x y z qx qy qz qw`; `#` begins a comment.
-- CSV: columns time_s, station, x_m, y_m, z_m, qw, qx, qy, qz, in any order; others are ignored.
+- TUM: a file for each station in a folder, NAME.tum or TAKE.NAME.tum, or one file for a capture of one station. A line
+  is `time x y z qx qy qz qw`; `#` begins a comment.
+- CSV: columns time_s (or measured_s, as `harness replay --csv` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz, in
+  any order; others are ignored. Rows without a time are left out, those without a pose are gaps.
 """
 
 import csv
@@ -22,6 +23,7 @@ from harness.measure.pose_series import TruthPoses
 from harness.mocap.read.c3d import MarkerClip, read_c3d
 from harness.study.trust.truth_motion import TruthMotion, common_names
 
+TRAJECTORY_SUFFIXES = (".c3d", ".tum", ".csv")
 FEWEST_MARKERS = 3
 MAX_TEXT_BYTES = 512 * MEGABYTE
 CSV_COLUMNS = ("time_s", "station", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
@@ -99,7 +101,16 @@ def read_tum(path: Path, stations: Sequence[str]) -> dict[str, TruthPoses]:
             found = f"one trajectory for {len(stations)} stations"
             raise BadFile(path, found, "a folder with NAME.tum for each station", "Name the folder.")
         return {stations[0]: _read_tum_file(path)}
-    return {name: _read_tum_file(path / f"{name}.tum") for name in stations}
+    return {name: _read_tum_file(_tum_file(path, name)) for name in stations}
+
+
+def _tum_file(folder: Path, station: str) -> Path:
+    """The only file of a station in a folder: NAME.tum or, as `harness export` names it, TAKE.NAME.tum. BadFile."""
+    found = sorted(file for file in folder.iterdir() if f".{file.name}".endswith(f".{station}.tum"))
+    if len(found) != 1:
+        count = "no trajectory" if not found else f"{len(found)} trajectories"
+        raise BadFile(folder, f"{count} of station {station!r}", f"one file {station}.tum", "Look at the folder.")
+    return found[0]
 
 
 def _read_tum_file(path: Path) -> TruthPoses:
@@ -116,19 +127,26 @@ def read_csv(path: Path) -> dict[str, TruthPoses]:
     """Trajectories of a table with the columns `CSV_COLUMNS`, station by station. BadFile."""
     expected = f"a table with the columns {', '.join(CSV_COLUMNS)}"
     text = _read_text(path, expected)
-    reader = csv.reader(text.splitlines())
-    head = [name.strip() for name in next(reader, [])]
+    try:
+        lines = list(csv.reader(text.splitlines()))
+    except csv.Error as error:
+        raise BadFile(path, f"no table ({error})", expected, "Is it the right file?") from error
+    head = [name.strip() for name in lines[0]] if lines else []
+    if "time_s" not in head:
+        head = ["time_s" if name == "measured_s" else name for name in head]
     missing = [name for name in CSV_COLUMNS if name not in head]
     if missing:
         raise BadFile(path, f"no column {missing[0]}", expected, "`harness replay --csv` writes such a table.")
     place = [head.index(name) for name in CSV_COLUMNS]
     rows: dict[str, list[list[float]]] = {}
-    for number, row in enumerate(reader, 2):
+    for number, row in enumerate(lines[1:], 2):
         if not row:
             continue
         if len(row) < len(head):
             raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "")
         values = [row[column].strip() for column in place]
+        if not values[0]:
+            continue
         numbers = ["nan" if value == "" else value for value in (values[0], *values[2:])]
         rows.setdefault(values[1], []).append(_numbers(path, number, numbers, 8))
     bodies = {}
@@ -162,7 +180,7 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
         raise BadFile(path, "no times, or one that is no number", "a trajectory", "Look at its first column.")
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.sqrt(np.sum(quaternion**2, axis=1))
-    if np.any(np.abs(length[np.isfinite(length)] - 1.0) > _UNIT_TOLERANCE) or np.isinf(position_m).any():
+    if np.any(np.abs(length - 1.0) > _UNIT_TOLERANCE) or np.isinf(position_m).any():
         raise BadFile(
             path, "a quaternion that is not of length 1", "unit quaternions", "Is the order of columns right?"
         )

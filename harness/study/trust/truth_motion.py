@@ -1,5 +1,6 @@
 """Reference motion of a capture: poses of the bodies that carry the stations, from one of five sources."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,13 +8,23 @@ from pathlib import Path
 import numpy as np
 
 from harness.body.kinematics import bone_poses
+from harness.body.retargeting import retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES
-from harness.errors import BadInput
+from harness.core.motion import BodyMotion, Clip
+from harness.core.skeleton import Skeleton
+from harness.errors import BadFile, BadInput
+from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.experiment.playback import Playback
+from harness.experiment.scenario import Scenario
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
+from harness.simulate.loop import loop_motion
+from harness.simulate.simulation import exact_calibration
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
+
+_MARGIN_S = 0.5
+"""Time for which the loops of an emulator reach beyond a capture [s]."""
 
 
 @dataclass(frozen=True)
@@ -40,60 +51,109 @@ class TruthMotion:
     """Station -> nominal mount, where one is stated."""
     host_clock: bool = False
     """Whether the reference's clock is the host's clock of the capture, so that latency shows."""
+    is_tracker: bool = False
+    """Whether the reference is a tracker too, with errors of its own that a comparison with a preset would name."""
+    loop_s: float = math.inf
+    """Time after which the reference repeats [s]."""
     playback: Playback | None = None
     """The motion of a scenario's performer, on which methods can be scored."""
     notes: tuple[str, ...] = ()
     """What to know about the reference, a sentence each."""
 
 
-def truth_of_playback(playback: Playback, until_s: float, *, host_clock: bool) -> TruthMotion:
-    """The bones of a performer whose motion a simulator or an emulator played, for `until_s` of device time [s].
+def truth_of_playback(
+    playback: Playback, stations: Sequence[str] = (), *, host_clock: bool, device_s: tuple[float, float] | None = None
+) -> TruthMotion:
+    """The bones of a performer whose motion a simulator or an emulator played.
 
-    An emulator plays the take again and again; the way back to its beginning has no reference.
+    `stations` are the capture's names of the playback's stations, by default the same names. With the first and last
+    `device_s` of the capture [s], the motion is that of an emulator's loops, which the device's clock counts from zero.
     """
-    take, calibration = playback.take, playback.calibration
-    position_m, world_from_bone = bone_poses(playback.body.skeleton, take.qpos)
-    time_s = np.arange(len(take)) / take.rate_hz
-    loops = 1
-    if until_s > time_s[-1] + 1.0:
-        loops = int(np.ceil(until_s / playback.samples.loop_s))
-    begins_s = playback.samples.loop_s * np.arange(loops) if loops > 1 else np.zeros(1)
-    times_s = (begins_s[:, None] + time_s).ravel()
-    bodies = {}
-    for bone in dict.fromkeys(calibration.bones):
-        row = BONES.index(bone)
-        place, turn = (np.tile(values[:, row], (loops, 1)) for values in (position_m, world_from_bone))
-        bodies[bone] = TruthPoses(times_s, place, turn)
-    clip = playback.clip_evaluation.part
+    calibration = exact_calibration(playback.body, playback.mounts, playback.tracker)
+    motion, times_s, loop_s = playback.take, np.zeros(1), math.inf
+    if device_s is not None:
+        motion = loop_motion(playback.body, playback.take, playback.mounts, playback.tracker)
+        loop_s = playback.samples.loop_s
+        first, last = (math.floor(max(at_s, 0.0) / loop_s) for at_s in device_s)
+        times_s = loop_s * np.arange(first, last + 1, dtype=np.float64)
+    bodies = _bone_truths(playback.body.skeleton, motion, calibration.bones, times_s)
+    if device_s is not None:  # as long as the capture, so that other loops overlap it less
+        bodies = {bone: _cut(truth, *device_s) for bone, truth in bodies.items()}
+    clip, duration_s = playback.clip_evaluation.part, (len(playback.take) - 1) / playback.take.rate_hz
+    names = tuple(stations) or calibration.stations
     return TruthMotion(
-        f"clip {clip} of the scenario {playback.scenario.name}, {time_s[-1]:.1f} s",
+        f"clip {clip} of the scenario {playback.scenario.name}, {duration_s:.1f} s",
         bodies,
-        dict(zip(calibration.stations, calibration.bones, strict=True)),
-        nominal_mounts(calibration),
+        dict(zip(names, calibration.bones, strict=True)),
+        nominal_mounts(calibration, names),
         host_clock,
-        playback,
+        loop_s=loop_s,
+        playback=playback,
     )
 
 
-def nominal_mounts(calibration: Calibration) -> dict[str, NominalMount]:
-    """The mounts of a calibration by station."""
-    mounts = zip(calibration.stations, calibration.mount_m, calibration.bone_from_station, strict=True)
+def truth_of_clip(clip: Clip, scenario: Scenario, stations: Sequence[str]) -> TruthMotion:
+    """The bones of a clip on the performer's own body, with the stations of a scenario; BadInput for others."""
+    body, take = retarget_to_own_body(clip)
+    mounts = {mount.station: mount for mount in mounts_of(scenario)}
+    missing = [name for name in stations if name not in mounts]
+    if missing:
+        raise BadInput(
+            f"{scenario.name} has no station {missing[0]!r}.", f"Name a scenario with it; it has {', '.join(mounts)}."
+        )
+    calibration = exact_calibration(body, [mounts[name] for name in stations], tracker_of(scenario))
+    return TruthMotion(
+        f"the clip {clip.name}, {clip.duration_s:.1f} s",
+        _bone_truths(body.skeleton, take, calibration.bones, np.zeros(1)),
+        dict(zip(calibration.stations, calibration.bones, strict=True)),
+        nominal_mounts(calibration, calibration.stations),
+    )
+
+
+def _bone_truths(
+    skeleton: Skeleton, motion: BodyMotion, bones: Sequence[str], begins_s: Floats
+) -> dict[str, TruthPoses]:
+    """Poses of bones during a motion that begins at each of these times (L,) [s]."""
+    position_m, world_from_bone = bone_poses(skeleton, motion.qpos)
+    time_s = (begins_s[:, None] + np.arange(len(motion)) / motion.rate_hz).ravel()
+    truths = {}
+    for bone in dict.fromkeys(bones):
+        row = BONES.index(bone)
+        place, turn = (np.tile(values[:, row], (len(begins_s), 1)) for values in (position_m, world_from_bone))
+        truths[bone] = TruthPoses(time_s, place, turn)
+    return truths
+
+
+def _cut(truth: TruthPoses, begin_s: float, end_s: float) -> TruthPoses:
+    kept = (truth.time_s >= begin_s - _MARGIN_S) & (truth.time_s <= end_s + _MARGIN_S)
+    return TruthPoses(truth.time_s[kept], truth.position_m[kept], truth.world_from_body[kept])
+
+
+def nominal_mounts(calibration: Calibration, stations: Sequence[str]) -> dict[str, NominalMount]:
+    """The mounts of a calibration by these names of its stations."""
+    mounts = zip(stations, calibration.mount_m, calibration.bone_from_station, strict=True)
     return {station: NominalMount(mount_m, turn) for station, mount_m, turn in mounts}
 
 
 def truth_of_capture(path: Path, stations: Sequence[str]) -> TruthMotion:
     """Another capture as the reference: its stations are the bodies, those of the same name carry the stations.
 
-    Times are those of its device's clock. BadFile, and BadInput without a common station.
+    Times are those of its device's clock. BadFile, and BadInput unless it has every station.
     """
     reader = CaptureReader(path)
+    readings, notes = read_stations(reader)
     bodies = {}
-    for name, readings in read_stations(reader).items():
-        poses = measured_poses(readings)
+    for name, one in readings.items():
+        poses = measured_poses(one)
         rows = np.flatnonzero(poses.valid & np.isfinite(poses.measured_s))
-        rows = rows[np.diff(poses.measured_s[rows], prepend=-np.inf) > 0.0]
+        highest_s = np.maximum.accumulate(np.append(-np.inf, poses.measured_s[rows]))[:-1]
+        rows = rows[poses.measured_s[rows] > highest_s]
         bodies[name] = TruthPoses(poses.measured_s[rows], poses.position_m[rows], poses.tracker_from_station[rows])
-    return TruthMotion(f"the capture {path.name}", bodies, common_names(stations, bodies))
+    lost = (f"{path.name}: {text}" for text in (*notes, *reader.damage))
+    note = "Scale, heading and clocks are those relative to the other tracker, and are not compared with a preset."
+    return TruthMotion(
+        f"the capture {path.name}", bodies, common_names(stations, bodies), is_tracker=True, notes=(note, *lost)
+    )
 
 
 def common_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> dict[str, str]:
@@ -107,17 +167,30 @@ def common_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> d
     return {name: name for name in stations}
 
 
-def read_stations(reader: CaptureReader) -> dict[str, StationReadings]:
-    """All readings of a capture, station by station."""
-    blocks = list(reader.blocks())
-    names = StationReadings.__dataclass_fields__
+def read_stations(reader: CaptureReader) -> tuple[dict[str, StationReadings], tuple[str, ...]]:
+    """All readings of the longest session of a capture, station by station, and notes on what is left out.
+
+    The device's clock begins anew in each session. BadFile for a capture without a record.
+    """
+    blocks = [block for block in reader.blocks() if block.stations]
+    if not blocks:
+        raise BadFile(reader.path, "no record of a station", "a capture with readings", "Record it again.")
+    records: dict[int, int] = {}
+    for block in blocks:
+        records[block.session] = records.get(block.session, 0) + block.records
+    longest = max(records, key=lambda session: (records[session], -session))
+    others = sum(records.values()) - records[longest]
+    notes = []
+    if others:
+        notes.append(f"{others} records of {len(records) - 1} other session(s) of the device are left out.")
+    if garbage := sum(block.garbage_bytes for block in blocks):
+        notes.append(f"{garbage} bytes belong to no record.")
     out = {}
     for station in reader.wire.stations:
-        parts = [block.stations[station] for block in blocks if block.stations]
-        columns = ([getattr(part, name) for part in parts] for name in names)
-        if parts:
-            out[station] = StationReadings(*(np.concatenate(column) for column in columns))
-    return out
+        parts = [block.stations[station] for block in blocks if block.session == longest]
+        columns = ([getattr(part, name) for part in parts] for name in StationReadings.__dataclass_fields__)
+        out[station] = StationReadings(*(np.concatenate(column) for column in columns))
+    return out, tuple(notes)
 
 
 def measured_poses(readings: StationReadings) -> MeasuredPoses:

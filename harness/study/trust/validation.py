@@ -8,15 +8,24 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
-from harness.errors import BadInput
+from harness.errors import BadInput, NotComparable
+from harness.experiment.scenario import Scenario, load_scenario
 from harness.experiment.score_recording import find_playback
 from harness.measure.accuracy import ErrorQuantiles, error_quantiles
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.measured import Measured
-from harness.measure.pose_series import MeasuredPoses
-from harness.measure.registration import Registration, record_period_s, register, require_stamps
+from harness.measure.pose_series import MeasuredPoses, TruthSpline
+from harness.measure.registration import (
+    LEAST_OVERLAP_S,
+    Registration,
+    coarse_offset,
+    record_period_s,
+    register,
+    require_stamps,
+)
 from harness.measure.station_identity import identify_stations
 from harness.measure.unit_file import UnitFile
+from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.recording.recording import read_recording
@@ -24,12 +33,13 @@ from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
 from harness.study.trust.expected_values import preset_components, preset_values
 from harness.study.trust.named_departures import NamedDeparture, correct_departures
-from harness.study.trust.truth_files import read_truth_file
+from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,
     measured_poses,
     read_stations,
     truth_of_capture,
+    truth_of_clip,
     truth_of_playback,
 )
 
@@ -37,7 +47,9 @@ SESSION_KEYS = ("scale", "heading_rad", "latency_s")
 """Numbers that hold for a session of the device; a unit file keeps them in [session]."""
 _DEFAULT_LATENCY_S, _DEFAULT_BAUD = 0.004, 115200
 """Latency and baud rate of the simulated tracker (`simulate.link.TrackerConfig`)."""
-_NO_HOST_CLOCK = "The reference does not have the clock of the host that recorded the capture."
+_NO_HOST_CLOCK = "reference not on the host's clock"
+_LOOPED_CORRELATION = 0.8
+"""Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +78,8 @@ class Validation:
     expected_from: str
     duration_s: float
     records: int
+    notes: tuple[str, ...] = ()
+    """What of the capture was left out, a sentence each."""
 
     @property
     def named(self) -> tuple[NamedDeparture, ...]:
@@ -80,23 +94,53 @@ def load_truth(
     scenario: str | None = None,
     folder: LibraryFolders | None = None,
 ) -> TruthMotion:
-    """The reference that `truth` names: a capture, a C3D, TUM or CSV file, or a clip of the capture's scenario.
+    """The reference that `truth` names: a capture, a C3D, TUM, CSV or motion file, or a clip of a scenario.
 
-    BadFile, BadInput and UnknownName that name what is missing.
+    Stations and mounts of a clip are those of `scenario`, by default the capture's own. BadFile, BadInput and
+    UnknownName that name what is missing.
     """
     path = Path(truth)
-    stations = CaptureReader(capture).wire.stations
-    if path.is_dir() or path.suffix.lower() in (".c3d", ".tum", ".csv"):
+    stations, suffix = CaptureReader(capture).wire.stations, path.suffix.lower()
+    if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
         return read_truth_file(path, stations)
+    if suffix.lstrip(".") in (*FORMATS, "asf"):
+        return truth_of_clip(read_clip(path), _scenario_of(capture, scenario, path), stations)
     if path.is_file():
         return truth_of_capture(path, stations)
-    stream = RecordingStream(capture)
-    playback = find_playback(stream, scenario=scenario, clip=truth, folder=folder)
-    note = read_recording(capture).note
-    until_s = max(
-        (float(np.nanmax(frame.measured_s)) for frame in stream if np.isfinite(frame.measured_s).any()), default=0.0
-    )
-    return truth_of_playback(playback, until_s, host_clock=note.get("source") == "simulation")
+    playback = find_playback(RecordingStream(capture), scenario=scenario, clip=truth, folder=folder)
+    if read_recording(capture).note.get("source") == "simulation":
+        return truth_of_playback(playback, stations, host_clock=True)
+    readings, _ = read_stations(CaptureReader(capture))
+    stamps_s = np.concatenate([one.stamp_s[np.isfinite(one.stamp_s)] for one in readings.values()])
+    if len(stamps_s):
+        device_s = float(stamps_s.min()), float(stamps_s.max())
+        loops = truth_of_playback(playback, stations, host_clock=False, device_s=device_s)
+        if _plays_in_loops(readings, loops):
+            return loops
+    return truth_of_playback(playback, stations, host_clock=False)
+
+
+def _plays_in_loops(readings: Mapping[str, StationReadings], loops: TruthMotion) -> bool:
+    """Whether the capture moves as an emulator that repeats the clip, not as a performer who did it once."""
+    poses = {station: measured_poses(one) for station, one in readings.items()}
+    if not all(one.valid.any() for one in poses.values()):
+        return False
+    splines = {station: TruthSpline(loops.bodies[loops.body_of[station]]) for station in poses}
+    try:
+        found = coarse_offset(poses, splines, record_period_s(poses), LEAST_OVERLAP_S)
+    except NotComparable:
+        return False
+    return found.correlation >= _LOOPED_CORRELATION
+
+
+def _scenario_of(capture: Path, scenario: str | None, motion: Path) -> Scenario:
+    """The scenario with stations and mounts: the given one, or that of the capture's note. BadInput without one."""
+    name = scenario or read_recording(capture).note.get("scenario")
+    if not isinstance(name, str):
+        raise BadInput(
+            f"Nothing says where the stations are worn in {motion.name}.", "Name a scenario with --scenario."
+        )
+    return load_scenario(name)
 
 
 def validate_capture(
@@ -112,7 +156,7 @@ def validate_capture(
     """
     reader = CaptureReader(capture)
     progress("reading", 0, 3)
-    readings = read_stations(reader)
+    readings, notes = read_stations(reader)
     poses = {station: measured_poses(one) for station, one in readings.items() if station in truth.body_of}
     if not poses:
         raise BadInput(
@@ -155,6 +199,7 @@ def validate_capture(
         expected.name if expected else "the preset default",
         float(host_s.max() - host_s.min()) if len(host_s) else 0.0,
         sum(map(len, readings.values())),
+        notes,
     )
 
 
@@ -196,7 +241,7 @@ def _latency_s(readings: Mapping[str, StationReadings], registration: Registrati
     delays = []
     for station in registration.mounts:
         known = np.isfinite(readings[station].measured_s)
-        at_s = registration.state.truth_time_s(readings[station].measured_s[known], of_position=False)
+        at_s = registration.state.truth_time_s(readings[station].measured_s[known])
         delays.append(readings[station].received_s[known] - at_s)
     middle = float(np.median(np.concatenate(delays)))
     offset = registration.values["time_offset_orientation_s"]
@@ -212,6 +257,8 @@ def _checks(
     expected: UnitFile | None,
     reader: CaptureReader,
 ) -> list[Departure]:
+    if truth.is_tracker:
+        return []
     preset = preset_components()
     record_s = record_size(reader.wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
     known = {

@@ -31,6 +31,8 @@ def _scenario_file(folder: Path, kind: str, seed: int) -> Path:
     lines += ["[motion]", 'source = "builtin"', 'behaviours = ["rig"]', 'test = ["rig_p1_02"]']
     lines += [f"[components.{name}]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in table.items())
               for name, table in scenario.components.items() if isinstance(table, dict)]  # fmt: skip
+    for fault in scenario.fault:
+        lines += ["[[fault]]", f'kind = "{fault.kind}"', f"share = {fault.share}"]
     lists = {name: tables for name, tables in scenario.components.items() if not isinstance(tables, dict)}
     for name, tables in lists.items():
         for table in tables:
@@ -40,7 +42,7 @@ def _scenario_file(folder: Path, kind: str, seed: int) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", ["white", "echoes", "lost", "clock", "stamps"])
+@pytest.mark.parametrize("kind", ["white", "echoes", "lost", "duplicates", "clock", "stamps"])
 def test_a_capture_has_the_bytes_of_the_command_record(kind: str, tmp_path: Path) -> None:
     planted = planted_capture(kind, 7, tmp_path, seconds=SECONDS)
     typed = tmp_path / "typed.rec"

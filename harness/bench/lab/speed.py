@@ -1,0 +1,122 @@
+"""Speed and memory of a lab's verbs: long captures characterised, a minute validated, a trust study and its methods."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from harness.bench.lab.captures import FIVE_MINUTES, SCENARIO, planted_capture, simulation_note
+from harness.bench.lab.verb_cost import BOXING_KIND, measure_verb
+from harness.bench.rows import BenchmarkRow
+from harness.body.retargeting import retarget_to_own_body
+from harness.experiment.clip_evaluation import mounts_of, noise_of
+from harness.experiment.playback import prepare_playback
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.mocap.synthetic.rig import generate_rig
+from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
+from harness.simulate.trajectory import Trajectory
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.reader import WireFormat
+from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.study.trust.trust_study import run_trust_study
+
+RATE_HZ, BAUD = 120.0, 460_800
+"""Rate of each station, and a line that carries six of them."""
+PART_S = 300.0
+"""Length of the parts in which long captures are simulated [s]."""
+TRUST_CLIPS = ("walking_p1_01", "boxing_p1_01")
+TRUST_PLAN = """\
+kind = "trust plan"
+scenario = "demo"
+methods = ["ik", "local_pca", "dynamic_map", "expert_map"]
+seeds = [1, 2]
+[margins]
+mpjae_deg = 1.0
+mpjpe_mm = 10.0
+"""
+
+
+def bench_lab(seed: int) -> list[BenchmarkRow]:
+    """The rows of `harness bench lab`."""
+    with TemporaryDirectory(prefix="harness-lab-") as temporary:
+        folder = Path(temporary)
+        return [*_characterize_rows(seed, folder), _validate_row(seed, folder), _trust_row(seed, folder)]
+
+
+def long_capture(path: Path, seed: int, minutes: float) -> None:
+    """Record six stations at rest at 120 Hz, in parts of `PART_S` with errors of their own, in one session.
+
+    The host reads a frame at a time.
+    """
+    lab = load_scenario(SCENARIO)
+    scenario = replace(lab, seed=seed, tracker=replace(lab.tracker, rate_hz=RATE_HZ, baud=BAUD))
+    wire_format = WireFormat(tuple(scenario.stations), RATE_HZ, scenario.tracker.items)
+    with RecordingWriter(path, simulation_note(scenario, FIVE_MINUTES)) as writer:
+        for part in _parts(scenario, wire_format, round(60.0 * minutes / PART_S)):
+            times_s, size = part.received_s.tolist(), len(part.data) // len(part.ends)
+            stations = len(scenario.stations)
+            if not writer.counts["conf"]:
+                writer.on_configured(wire_format, times_s[0], times_s[0])
+            for first in range(0, len(times_s), stations):
+                end = first + stations
+                writer.on_received(part.data[size * first : size * end], times_s[end - 1], times_s[end - 1])
+
+
+def _parts(scenario: Scenario, wire_format: WireFormat, count: int) -> Iterator[ByteCapture]:
+    body, motion = retarget_to_own_body(generate_rig(FIVE_MINUTES))
+    trajectory, mounts, tracker, noise = (
+        Trajectory(body, motion),
+        mounts_of(scenario),
+        scenario.tracker,
+        noise_of(scenario),
+    )
+    time_s = sampling_times_s(PART_S, tracker, len(mounts))[: round(PART_S * RATE_HZ)]
+    for number in range(count):
+        readings = simulate_readings(
+            trajectory,
+            mounts,
+            tracker,
+            noise,
+            time_s,
+            seed=scenario.seed,
+            take=f"part {number}",
+            begins_s=PART_S * number,
+            session="long",
+        )
+        yield transmit_readings(readings, wire_format, tracker)[1]
+
+
+def _characterize_rows(seed: int, folder: Path) -> list[BenchmarkRow]:
+    rows = []
+    for minutes, target in ((30, "<= 60"), (180, "")):
+        capture = folder / f"{minutes}.rec"
+        long_capture(capture, seed, minutes)
+        cost = measure_verb("characterize", capture)
+        megabytes, name = capture.stat().st_size / 1e6, f"characterize, {minutes} min of six stations at 120 Hz"
+        capture.unlink()
+        rows.append(
+            BenchmarkRow(f"{name}, processor time", cost.processor_s, "s", f"a file of {megabytes:.0f} MB", target)
+        )
+        rows.append(BenchmarkRow(f"{name}, peak memory", cost.peak_bytes / 1e6, "MB", "", "<= 500"))
+    return rows
+
+
+def _validate_row(seed: int, folder: Path) -> BenchmarkRow:
+    cost = measure_verb("validate", planted_capture(BOXING_KIND, seed, folder), seed)
+    return BenchmarkRow("validate, 60 s of six stations, processor time", cost.processor_s, "s", "", "<= 20")
+
+
+def _trust_row(seed: int, folder: Path) -> BenchmarkRow:
+    plan, captures = folder / "plan.toml", []
+    plan.write_text(TRUST_PLAN, encoding="utf-8")
+    for clip in TRUST_CLIPS:
+        playback = prepare_playback("demo", clip=clip, seed=seed)
+        captures.append(folder / f"{clip}.rec")
+        simulation, note = playback.simulation, simulation_note(playback.scenario, clip)
+        record_capture(captures[-1], simulation.wire_format, simulation.wire, note)
+    start_s = time.perf_counter()
+    study = run_trust_study(plan, captures, folder / "study", exploratory=True)
+    total_s = time.perf_counter() - start_s
+    methods = f"training and methods: {study.methods_s:.0f} s"
+    return BenchmarkRow("trust, time over that of its methods", total_s / study.methods_s, "", methods, "<= 1.3")

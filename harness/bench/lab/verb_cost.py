@@ -1,0 +1,58 @@
+"""Cost of a lab's verb on one capture, in a process of its own.
+
+    python -m harness.bench.lab.verb_cost VERB CAPTURE SEED
+
+prints the processor time [s] and the peak memory [bytes] of the whole process as JSON. SEED is that of the planted
+boxing, of which `validate` needs the true motion.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.bench.peak_memory import peak_bytes
+from harness.core.python_process import python_command, python_environment
+
+BOXING_KIND = "none_validated"
+"""Kind of the planted captures that are validated."""
+
+
+@dataclass(frozen=True)
+class VerbCost:
+    """What a verb took."""
+
+    processor_s: float
+    """Processor time of all threads, the start of the process included [s]."""
+    peak_bytes: int
+    """Peak resident memory [bytes]."""
+
+
+def measure_verb(verb: str, capture: Path, seed: int = 0) -> VerbCost:
+    """The cost of `characterize` or `validate` for a capture; RuntimeError when it fails."""
+    command = python_command("-m", "harness.bench.lab.verb_cost", verb, str(capture), str(seed))
+    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{verb} in its own process: {done.stderr.strip()[-2000:]}")
+    return VerbCost(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def run_verb(verb: str, capture: Path, seed: int) -> VerbCost:
+    """Run the library behind a verb in this process; returns the cost of the process so far."""
+    if verb == "characterize":
+        from harness.study.trust.characterization import characterize_capture
+
+        characterize_capture(capture)
+    else:
+        from harness.bench.lab.validated_captures import planted_truth
+        from harness.study.trust.validation import validate_capture
+
+        validate_capture(capture, planted_truth(BOXING_KIND, seed))
+    return VerbCost(time.process_time(), peak_bytes())
+
+
+if __name__ == "__main__":
+    cost = run_verb(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))
+    print(json.dumps({"processor_s": cost.processor_s, "peak_bytes": cost.peak_bytes}))
