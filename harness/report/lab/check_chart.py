@@ -9,6 +9,7 @@ import numpy as np
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
+from harness.report.lab.departure_wording import condense_departures
 from harness.report.lab.quantities import format_both, quantity
 from harness.report.lab.unit_content import DepartureCheck
 
@@ -75,11 +76,12 @@ def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequ
 
 
 def _with_ratio(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
-    """The checks whose numbers have a ratio, those of all stations and those that are named."""
+    """The checks whose numbers have a ratio: those of all stations together, and departures of single ones."""
+    told = condense_departures(checks)
     return [
         check
         for check in checks
-        if (not check.departure.station or check.is_named)
+        if (not check.departure.station or check in told)
         and check.departure.expected.value > 0.0
         and check.departure.measured.value > 0.0
     ]

@@ -51,6 +51,7 @@ def _allan(report: UnitReport) -> Chart:
         ("orientation, one axis [deg]", np.degrees(1.0), report.allan_orientation, report.allan_orientation_model),
     ]
     shown = [group for group in groups if group[2]]
+    has_model = any(model is not None for *_, model in shown)
 
     def draw(figure: "Figure") -> None:
         panels = figure.subplots(1, len(shown), squeeze=False)[0]
@@ -64,7 +65,7 @@ def _allan(report: UnitReport) -> Chart:
         "Allan deviation at rest",
         "How much the means of neighbouring stretches of this length differ. White noise falls by half when the time "
         "is four times as long; noise that lasts makes a hump at about twice its correlation time; drift rises at the "
-        "right. Bands: 95 % intervals. Dashed: the fitted error model.",
+        "right. Bands: 95 % intervals." + (" Dashed: the fitted error model." if has_model else ""),
         "Allan deviation against averaging time of each station; the numbers are in the table below.",
         draw,
         _HEIGHT_IN,

@@ -62,6 +62,14 @@ def test_departures_are_triangles_right_of_one(figures: dict[str, Figure]) -> No
     assert labels[-1] == "rate of excursions, head"
 
 
+def test_stations_that_all_depart_have_no_rows_of_their_own() -> None:
+    unit = made_up_unit()
+    head = unit.checks[-1]
+    torso = replace(head, departure=replace(head.departure, station="pelvis"))
+    axes = figures_of(replace(unit, checks=(*unit.checks, torso)))["checks"].axes[0]
+    assert len(axes.get_yticklabels()) == 8
+
+
 def test_ratios_near_one_have_several_ticks() -> None:
     unit = made_up_unit()
     near = figures_of(replace(unit, checks=unit.checks[1:4]))["checks"].axes[0]
@@ -77,6 +85,8 @@ def test_allan_deviations_are_in_millimetres_and_degrees(figures: dict[str, Figu
     np.testing.assert_allclose(points(orientation.lines[0])[1], np.degrees(unit.allan_orientation[0].deviation))
     assert [line.get_label() for line in position.lines] == [*STATIONS, "fitted model"]
     assert len(position.collections) == len(STATIONS)
+    assert "Dashed" in charts(unit)["allan"].caption
+    assert "Dashed" not in charts(replace(unit, allan_position_model=None))["allan"].caption
     only = figures_of(replace(unit, allan_position=()))["allan"]
     assert [axes.get_ylabel() for axes in only.axes] == ["orientation, one axis [deg]"]
 
