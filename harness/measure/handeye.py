@@ -114,7 +114,7 @@ def _nearest_rotation(matrix: Floats) -> Floats:
     """The rotation nearest to a multiple, of either sign, of a matrix (3, 3)."""
     matrix = matrix * np.sign(np.linalg.det(matrix))
     u, _, v = np.linalg.svd(matrix)
-    out: Floats = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    out: Floats = u @ v
     return out
 
 

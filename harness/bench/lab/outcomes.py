@@ -116,7 +116,7 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
         against = validate_planted(kind, seed, folder)
         exchanged = tuple(f"{station}: {body}" for station, body in sorted(against.exchanged.items()))
         errors = registration_errors(against, seed) if kind in NO_FAULTS else {}
-        checks = _stored_checks(against.checks)
+        checks = stored_checks(against.checks)
         return CaptureOutcome(kind, seed, source_hash(), checks, errors=errors, exchanged=exchanged)
     found = characterize_capture(planted_capture(kind, seed, folder))
     parameters = tuple(
@@ -124,10 +124,11 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
         for key, one in found.profile.parameters.items()
         if one.is_measured
     )
-    return CaptureOutcome(kind, seed, source_hash(), _stored_checks(found.checks), parameters)
+    return CaptureOutcome(kind, seed, source_hash(), stored_checks(found.checks), parameters)
 
 
-def _stored_checks(checks: Sequence[NamedDeparture]) -> tuple[StoredCheck, ...]:
+def stored_checks(checks: Sequence[NamedDeparture]) -> tuple[StoredCheck, ...]:
+    """The checks as they are stored."""
     out = []
     for check in checks:
         one = check.departure

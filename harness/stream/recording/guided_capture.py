@@ -25,8 +25,10 @@ from harness.stream.recording.recording import RecordingWriter, read_marks
 WATCHED_S = 2.0
 """Time over which the stations are watched for rest and motion [s]."""
 _REST_M, _REST_RAD = 0.06, float(np.deg2rad(3.0))
-"""Largest change of the median pose from one half of that time to the other at rest; excursions stay below it."""
-_FEWEST_FRAMES = 8
+"""Largest change of the median pose from the first part of that time to another at rest; excursions stay below it."""
+_PARTS = 5
+"""Parts of that time. Two would not do: a motion is at the same place before and after its turning point."""
+_FEWEST_FRAMES = 2 * _PARTS
 
 
 @dataclass(frozen=True)
@@ -162,26 +164,20 @@ class _RestWatch:
             return None
         place = np.array([frame.position_m for frame in frames])
         turn = np.array([frame.tracker_from_station for frame in frames])
-        half = len(frames) // 2
-        return [
-            name
-            for row, name in enumerate(stations)
-            if _changes(place[:half, row], turn[:half, row], place[half:, row], turn[half:, row])
-        ]
+        return [name for row, name in enumerate(stations) if _changes(place[:, row], turn[:, row])]
 
 
-def _changes(place_m: Floats, turn: Floats, later_m: Floats, later_turn: Floats) -> bool:
-    """Whether the median pose of later readings differs; a station that is lost does not move."""
-    poses = [
-        (values[np.isfinite(values[:, 0])], angles[np.isfinite(angles[:, 0])])
-        for values, angles in ((place_m, turn), (later_m, later_turn))
-    ]
-    if any(len(values) < 2 or len(angles) < 2 for values, angles in poses):
+def _changes(place_m: Floats, turn: Floats) -> bool:
+    """Whether the pose differs between parts of the time, (N, 3) and (N, 4); a station that is lost does not move."""
+    tracked = np.isfinite(place_m[:, 0]) & np.isfinite(turn[:, 0])
+    parts = [rows[tracked[rows]] for rows in np.array_split(np.arange(len(place_m)), _PARTS)]
+    parts = [rows for rows in parts if len(rows)]
+    if len(parts) < 2:
         return False
-    (first_m, first), (second_m, second) = poses
-    step_m = float(np.linalg.norm(np.median(second_m, axis=0) - np.median(first_m, axis=0)))
-    angle = rotations.angle_between_rad(first[len(first) // 2], second[len(second) // 2])
-    return step_m > _REST_M or float(angle) > _REST_RAD
+    middle_m = np.array([np.median(place_m[rows], axis=0) for rows in parts])
+    middle = turn[[rows[len(rows) // 2] for rows in parts]]
+    step_m, angle = np.linalg.norm(middle_m - middle_m[0], axis=1), rotations.angle_between_rad(middle, middle[0])
+    return bool((step_m > _REST_M).any() or (angle > _REST_RAD).any())
 
 
 def _duration_text(seconds: float) -> str:

@@ -1,6 +1,5 @@
 """Captures with planted faults: the bytes of `harness record sim:`, and the fault is in them."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from harness.errors import UnknownName
 from harness.stream.codec.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import Recording, read_recording
 from harness.stream.recording.station_readings import CaptureReader
+from tests.bench.lab.scenario_files import write_scenario
 
 SECONDS = 20.0
 
@@ -22,31 +22,11 @@ def _line(recording: Recording) -> list[tuple[str, float, bytes]]:
     return [(b.kind, b.monotonic_s, b.payload) for b in recording.blocks() if b.kind in (CONFIGURED, RECEIVED)]
 
 
-def _scenario_file(folder: Path, kind: str, seed: int) -> Path:
-    """The scenario of a planted fault as a file that a person could write."""
-    scenario, lab = planted_scenario(kind, seed), planted_scenario(captures.NO_FAULT, seed)
-    lines = ["schema = 1", 'methods = ["ik"]', 'stations = "liu2011"']
-    if scenario.tracker != lab.tracker:
-        lines += ["[tracker]", f"latency_s = {scenario.tracker.latency_s}"]
-    lines += ["[motion]", 'source = "builtin"', 'behaviours = ["rig"]', 'test = ["rig_p1_02"]']
-    lines += [f"[components.{name}]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in table.items())
-              for name, table in scenario.components.items() if isinstance(table, dict)]  # fmt: skip
-    for fault in scenario.fault:
-        lines += ["[[fault]]", f'kind = "{fault.kind}"', f"share = {fault.share}"]
-    lists = {name: tables for name, tables in scenario.components.items() if not isinstance(tables, dict)}
-    for name, tables in lists.items():
-        for table in tables:
-            lines += [f"[[components.{name}]]", *(f"{k} = {json.dumps(v)}" for k, v in table.items())]
-    path = folder / f"{kind}.toml"
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 @pytest.mark.parametrize("kind", ["white", "echoes", "lost", "duplicates", "clock", "stamps"])
 def test_a_capture_has_the_bytes_of_the_command_record(kind: str, tmp_path: Path) -> None:
     planted = planted_capture(kind, 7, tmp_path, seconds=SECONDS)
     typed = tmp_path / "typed.rec"
-    source = f"sim:{_scenario_file(tmp_path, kind, 7)}"
+    source = f"sim:{write_scenario(tmp_path, kind, 7)}"
     assert main(["record", source, str(typed), "--seconds", str(SECONDS), "--seed", "7"]) == 0
     lines = [_line(read_recording(path)) for path in (planted, typed)]
     assert lines[0] == lines[1]

@@ -414,7 +414,8 @@ def test_times_strictly_increase_in_ten_minutes_of_faults() -> None:
             frames += 1
         assert stream.counts["reconnects"] >= 2
     assert frames > 23000
-    assert 0 < unstamped < 100, "damaged stamps cost more than themselves"
+    repeated = sum(4 * frames * fault.share for fault in faults if fault.kind == "repeated")  # has no time of its own
+    assert 0.5 * repeated < unstamped < 100 + 1.2 * repeated, "damaged stamps cost more than themselves"
 
 
 @pytest.mark.slow
