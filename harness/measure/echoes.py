@@ -59,8 +59,11 @@ def find_echoes(series: StaticSeries, limit_m: float) -> EchoBursts:
     position_m = hold(series.position_m, series.valid)
     away = np.zeros(len(series), bool)
     for _ in range(2):  # the second median is of the readings that are no echoes
-        filled_m = hold(series.position_m, series.valid & ~away)
-        middle_m = np.stack([ndimage.median_filter(axis, window, mode="mirror") for axis in filled_m.T], axis=1)
+        used = series.valid & ~away
+        middle_m = np.full_like(position_m, np.nan)
+        columns = [ndimage.median_filter(axis, window, mode="mirror") for axis in series.position_m[used].T]
+        middle_m[used] = np.stack(columns, axis=1)  # a value that is held in a gap does not count several times
+        middle_m = hold(middle_m, used)
         away = series.valid & (np.linalg.norm(position_m - middle_m, axis=1) > limit_m)
         if away.sum() > 0.5 * series.valid.sum():
             break
@@ -75,9 +78,9 @@ def find_echoes(series: StaticSeries, limit_m: float) -> EchoBursts:
         for begin, stop in pairwise(cuts):
             size_m = float(np.linalg.norm(position_m[begin:stop].mean(axis=0) - rest_m))
             bursts.append((begin, stop, size_m, (begin > first or edges[0]) and (stop < end or edges[1])))
-    columns = list(zip(*bursts, strict=True)) if bursts else [(), (), (), ()]
-    begins, ends, sizes, whole = (np.array(column) for column in columns)
-    return EchoBursts(begins, ends, sizes, whole)
+    columns = np.array(bursts, dtype=float).reshape(-1, 4).T
+    begins, ends = columns[:2].astype(np.int64)
+    return EchoBursts(begins, ends, columns[2], columns[3] > 0.0)
 
 
 def hold(values: Floats, valid: Bools) -> Floats:

@@ -51,9 +51,11 @@ _BEFORE_S, _AFTER_S = 0.2, 0.6
 """Samples around an excursion that the noise fit leaves out [s]."""
 _NONE_SEEN = 3.689
 """Upper end of the 95 % interval of the expected number of events of which none was seen (Garwood 1936)."""
-_STRAYS = 0.05
-"""Share of excursions that are expected to be confused with others although they seem alone."""
-_STAY_ERROR_S = 0.03
+_STRAYS = 0.003
+"""Share of episodes that are expected to be confused with others although they seem alone."""
+_ECHO_ERROR_M = 0.001
+"""Error of the size of an echo [m]: that of the undisturbed place between the readings around it."""
+_STAY_ERROR_S = 0.012
 """Error of the duration of an excursion [s]; seen on simulated captures with seeds that no table judges."""
 
 
@@ -136,7 +138,7 @@ def _mean_length(found: Sequence[SeriesEpisodes], name: str) -> float:
 def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], dict[str, Measured]]:
     lengths = np.concatenate([(one.echoes.end - one.echoes.begin)[one.echoes.whole] for one in found])
     sizes_m = np.concatenate([one.echoes.size_m[one.echoes.whole] for one in found])
-    low, high, mean_m = fit_uniform(sizes_m, 0.001)
+    low, high, mean_m = fit_uniform(sizes_m, _ECHO_ERROR_M, strays=_STRAYS)
     fewest, most, mean_records = _integer_ends(lengths)
     parameters = {
         "components.echo.share": _echo_share(found),

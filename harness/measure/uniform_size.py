@@ -8,6 +8,8 @@ from harness.core.arrays import Floats
 from harness.measure.measured import Measured
 
 FEWEST_VALUES = 10
+_TRIMMED = 4
+"""Values at each end that may be strays, when a start is chosen."""
 _CUT = 0.5 * 5.991
 """Half the 95 % quantile of chi-square with two degrees of freedom. Without measurement errors twice the log-likelihood
 ratio of an end has that distribution; with large ones it has one degree of freedom, and the interval is then wider."""
@@ -41,7 +43,10 @@ def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tup
         return -float(np.sum(np.log(np.maximum(density, 1e-300))))
 
     step = width / count
-    start = np.array([values.min(), values.max()]) + step * np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
+    ordered = np.sort(values)
+    trimmed = range(_TRIMMED if strays else 1)  # a stray at an end is a maximum of its own
+    pairs = [(float(ordered[i]), float(ordered[-1 - j])) for i in trimmed for j in trimmed]
+    start = np.array(min(pairs, key=lambda ends: cost(*ends))) + step * np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
 
     def cost_of_ends(ends: Floats) -> float:
         return cost(float(ends[0]), float(ends[1]))
