@@ -12,10 +12,12 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from harness.cli import main
 from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment.scenario import find_scenario
 from harness.stream.codec.blocks import CONFIGURED, FILE_HEADER, RECEIVED
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.driver.transport import open_transport
@@ -23,6 +25,7 @@ from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.recording.frame_table import FRAME_COLUMNS
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
+from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust.plan import plan_digest
 from tests.interrupts import heeding_interrupts
 from tests.stream.recording.test_recording import newer_file
@@ -72,6 +75,39 @@ def test_a_simulation_is_recorded_and_replayed(simulated: Path, capsys: pytest.C
     assert main(["replay", str(simulated), "--json", "--speed", "100"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["frames"], said["records"], said["lost"], said["outcome"]) == (60, 240, [], "pass")
+
+
+def test_a_rig_is_marked_with_its_stretches(tmp_path: Path) -> None:
+    path = tmp_path / "rig.rec"
+    command = ["record", "sim:lab", str(path), "--clip", "rig_p1_01", "--stations", "2", "--rate", "10"]
+    assert main(command) == 0
+    marks = [(mark["monotonic_s"], mark["stretch"]) for mark in read_recording(path).marks]
+    assert marks == [(0.0, "static"), (70.0, "slow"), (110.0, "fast"), (150.0, "covered")]
+    moved_m = {
+        block.stretch: float(np.nanstd(next(iter(block.stations.values())).position_m, axis=0).max())
+        for block in CaptureReader(path).blocks()
+    }
+    assert max(moved_m["static"], moved_m["covered"]) < 0.03 < 0.1 < min(moved_m["slow"], moved_m["fast"])
+
+
+def test_faults_of_records_are_recorded_and_others_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = find_scenario("demo").read_text("utf-8")
+    faults = '[[fault]]\nkind = "repeated"\nshare = 0.1\n[[fault]]\nkind = "stall"\nat_s = [1.0]\nlasts_s = 0.5\n'
+    (tmp_path / "faulty.toml").write_text(text + "\n" + faults, "utf-8")
+    for name in ("demo", str(tmp_path / "faulty.toml")):
+        capsys.readouterr()
+        file = tmp_path / f"{Path(name).stem}.rec"
+        assert main(["record", f"sim:{name}", str(file), "--clip", CLIP, "--seconds", "5"]) == 0
+        said = capsys.readouterr().err
+        assert ("left out: stall" in said) == (name != "demo")
+    twice, once = (
+        [block.payload for block in read_recording(tmp_path / f"{name}.rec").blocks() if block.kind == RECEIVED]
+        for name in ("faulty", "demo")
+    )
+    assert all(one in (other, other + other) for one, other in zip(twice, once, strict=True))
+    assert 0.05 * len(once) < sum(map(len, twice)) / len(once[0]) - len(once) < 0.2 * len(once)
 
 
 def test_frames_come_as_a_table(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:

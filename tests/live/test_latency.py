@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from harness.live.latency import DurationHistogram, StageLatencies
-from harness.stream.host_clock import HostClockEstimator
-from tests.live.posing import frame
 
 
 def test_quantiles_are_those_of_the_values(rng: np.random.Generator) -> None:
@@ -38,33 +36,3 @@ def test_stages_add_up_and_only_the_late_are_late() -> None:
     maxima_ms = {name: durations.as_dict()["max_ms"] for name, durations in stages.by_name().items()}
     wanted_ms = {"last byte to taken": 3.0, "taken to pose": 7.1, "pose to outputs": 2.0, "last byte to pose": 10.1}
     assert maxima_ms == pytest.approx(wanted_ms, abs=1e-6)
-
-
-def test_the_host_time_of_a_measurement_forgets_late_frames(rng: np.random.Generator) -> None:
-    clock, true_s, delay_s = HostClockEstimator(), np.arange(4000) / 75.0, 0.005
-    held_up_s = rng.exponential(0.004, size=4000)
-    drift = 1.0 + 2e-5
-    found_s = [
-        clock.measured_s(frame(1000.0 + t + delay_s + held, 50.0 + drift * t))
-        for t, held in zip(true_s.tolist(), held_up_s.tolist(), strict=True)
-    ]
-    error_s = np.array(found_s) - (1000.0 + true_s + delay_s)
-    assert np.abs(error_s[500:]).max() < 0.002
-    assert np.std(held_up_s) > 0.003
-
-
-def test_a_device_that_sets_its_clock_anew_is_followed() -> None:
-    clock = HostClockEstimator()
-    clock.measured_s(frame(100.0, 50.0))
-    assert clock.measured_s(frame(100.1, 50.1)) == pytest.approx(100.1)
-    assert clock.measured_s(frame(100.2, 0.0)) == pytest.approx(100.2)
-    assert clock.measured_s(frame(100.3, float("nan"))) == 100.3
-
-
-def test_the_host_time_never_steps_back_when_the_delay_shrinks() -> None:
-    """The first frames wait 180 ms in the host; then the wait ends at once."""
-    clock = HostClockEstimator()
-    delays_s = [0.180] * 5 + [0.005] * 20
-    found_s = [clock.measured_s(frame(100.0 + k / 75.0 + late, 50.0 + k / 75.0)) for k, late in enumerate(delays_s)]
-    assert (np.diff(found_s) > 0.0).all()
-    assert found_s[-1] == pytest.approx(100.0 + 24 / 75.0 + 0.005, abs=1e-3)

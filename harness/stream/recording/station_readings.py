@@ -6,9 +6,9 @@ file are skipped, and named by `CaptureReader.damage`.
 """
 
 import math
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -153,8 +153,8 @@ class _Session:
         self._ends: list[int] = []
         self._ends_s: list[float] = []
         self._fed = self._waiting = self._garbage = 0
-        self._parts: list[tuple[Readings, Floats]] = []
-        """Decoded readings and their stamps."""
+        self._parts: list[list[StationReadings]] = [[] for _ in wire.stations]
+        """Decoded readings of each station."""
 
     def add(self, data: bytes, received_s: float) -> None:
         """Add received bytes; they are decoded when there are many of them."""
@@ -170,17 +170,20 @@ class _Session:
     def take(self, stretch: str, *, at_end: bool) -> Iterator[CaptureBlock]:
         """Yield the readings since the last call as one piece, if there are any."""
         self._decode(at_end=at_end)
-        if not self._parts and not self._garbage:
-            return
-        readings = concatenate_readings([part for part, _ in self._parts]) if self._parts else None
-        stamps_s = np.concatenate([stamp_s for _, stamp_s in self._parts]) if self._parts else np.zeros(0)
-        stations = {
-            name: _select(readings, stamps_s, row)
-            for row, name in enumerate(self.wire.stations)
-            if readings is not None
-        }
-        garbage, self._garbage, self._parts = self._garbage, 0, []
-        yield CaptureBlock(stretch, self.number, self.wire, self._configured_s, stations, garbage)
+        if self._parts[0] or self._garbage:
+            garbage, self._garbage = self._garbage, 0
+            yield CaptureBlock(stretch, self.number, self.wire, self._configured_s, self._take_stations(), garbage)
+
+    def _take_stations(self) -> dict[str, StationReadings]:
+        """The decoded readings by station, released one after another; empty without readings."""
+        if not self._parts[0]:
+            return {}
+        stations = {}
+        for row, name in enumerate(self.wire.stations):
+            parts, self._parts[row] = self._parts[row], []
+            stations[name] = _join(parts)
+            del parts
+        return stations
 
     def _decode(self, *, at_end: bool) -> None:
         data = b"".join(self._chunks)
@@ -190,12 +193,18 @@ class _Session:
         self._fed += len(data)
         self._chunks, self._waiting = [], 0
         ends, ends_s = np.array(self._ends, dtype=np.int64), np.array(self._ends_s)
+        decoded: list[tuple[Readings, Floats]] = []
         for event in events:
             if isinstance(event, RecordRun):
                 last_byte = event.offset + event.size * np.arange(1, len(event.table) + 1)
-                self._parts.append(self._readings(event.table, ends_s[ends.searchsorted(last_byte)]))
+                decoded.append(self._readings(event.table, ends_s[ends.searchsorted(last_byte)]))
             elif isinstance(event, Garbage):
                 self._garbage += event.size
+        if decoded:
+            readings = concatenate_readings([part for part, _ in decoded])
+            stamps_s = np.concatenate([stamp_s for _, stamp_s in decoded])
+            for row, parts in enumerate(self._parts):
+                parts.append(_select(readings, stamps_s, row))
         decided = int(ends.searchsorted(self._fed - self._decoder.pending, side="right"))
         self._ends, self._ends_s = self._ends[decided:], self._ends_s[decided:]
 
@@ -228,3 +237,9 @@ def _select(readings: Readings, stamps_s: Floats, row: int) -> StationReadings:
         readings.quality[rows],
         readings.suspect[rows],
     )
+
+
+def _join(parts: Sequence[StationReadings]) -> StationReadings:
+    """The parts of one station, one after another."""
+    columns = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(StationReadings))
+    return StationReadings(*columns)

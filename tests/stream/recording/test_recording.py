@@ -6,8 +6,10 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,8 +17,11 @@ from hypothesis import strategies as st
 from harness.errors import BadFile, SystemFault
 from harness.stream.codec.blocks import (
     BLOCK_MARKER,
+    CONFIGURED,
     FILE_HEADER,
+    MARK,
     MAX_PAYLOAD_BYTES,
+    NOTE,
     RECEIVED,
     SENT,
     VERSION,
@@ -25,10 +30,11 @@ from harness.stream.codec.blocks import (
     encode_block,
     read_blocks,
 )
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.records import RecordFormat
 from harness.stream.line_events import LineEvent
-from harness.stream.recording.recording import Recording, RecordingWriter, read_recording
+from harness.stream.recording.recording import Recording, RecordingWriter, read_marks, read_recording, record_capture
 from tests.stream.wire import FOUR
 
 ENTRIES = [
@@ -331,6 +337,46 @@ def test_an_unusable_format_is_refused(payload: bytes, message: str) -> None:
     data = FILE_HEADER + encode_block(RecordingBlock("conf", 1.0, 2.0, payload))
     with pytest.raises(BadFile, match=message):
         _ = Recording(Path("a.rec"), data).formats
+
+
+def test_a_simulated_line_is_recorded_chunk_by_chunk_with_its_marks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chunks = [b"a" * (i % 3) for i in range(20)] + [b"b" * (MAX_PAYLOAD_BYTES + 1)]
+    capture = ByteCapture(b"".join(chunks), np.cumsum([len(one) for one in chunks]), 5.0 + np.arange(21.0))
+    marks = ((0.0, "static"), (9.5, "slow"), (99.0, "never"))
+    contents = []
+    for name, per_write in (("a.rec", 4096), ("b.rec", 3)):
+        monkeypatch.setattr("harness.stream.recording.recording._CHUNKS_PER_WRITE", per_write)
+        writer = record_capture(tmp_path / name, FOUR, capture, {}, marks=marks)
+        assert (writer.counts[RECEIVED], writer.counts[MARK]) == (len(capture.data), 2)
+        contents.append((tmp_path / name).read_bytes())
+    assert contents[0] == contents[1]
+    blocks = list(read_recording(tmp_path / "a.rec").blocks())
+    assert [block.kind for block in blocks] == [NOTE, CONFIGURED, MARK, *[RECEIVED] * 5, MARK, *[RECEIVED] * 17]
+    received = [block for block in blocks if block.kind == RECEIVED]
+    assert [block.payload for block in received] == [*chunks[:20], chunks[20][:-1], b"b"]
+    assert [block.monotonic_s for block in received] == [*capture.received_s, 25.0]
+    assert [(mark["monotonic_s"], mark["stretch"]) for mark in read_recording(tmp_path / "a.rec").marks] == [
+        (0.0, "static"),
+        (9.5, "slow"),
+    ]
+    record_capture(tmp_path / "c.rec", FOUR, capture, {}, seconds=4.0, marks=marks)
+    assert sum(block.kind == RECEIVED for block in read_recording(tmp_path / "c.rec").blocks()) == 4
+    assert len(read_recording(tmp_path / "c.rec").marks) == 1
+
+
+def test_a_long_recording_is_continued_without_reading_it_whole(tmp_path: Path) -> None:
+    path = write_recording(tmp_path / "a.rec")
+    with RecordingWriter(path) as writer:
+        for i in range(400):
+            writer.on_received(bytes(MAX_PAYLOAD_BYTES), float(i), float(i))
+    tracemalloc.start()
+    RecordingWriter(path).close()
+    assert read_marks(path) == []
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 0.6 * path.stat().st_size
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system does not list open files")

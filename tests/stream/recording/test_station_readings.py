@@ -1,5 +1,6 @@
 """Readings of recordings: as frames have them, in pieces, from damaged files, and with marks."""
 
+import tracemalloc
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -133,6 +134,80 @@ def test_a_damaged_capture_is_read_or_refused(data: st.DataObject, tmp_path_fact
     with suppress(HarnessError):
         reader = CaptureReader(path)
         assert sum(block.records for block in reader.blocks()) <= 60
+
+
+@given(data=st.data())
+def test_records_of_a_damaged_capture_are_those_of_its_frames(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Lost, changed and repeated bytes on the line: frames and readings have the same poses, station by station."""
+    path = tmp_path_factory.mktemp("line") / "one.rec"
+    with RecordingWriter(path) as writer:
+        writer.on_configured(WIRE, 100.0, 100.0)
+        for i, record in enumerate(records(15)):
+            chunk, at = record, data.draw(st.integers(0, len(record) - 1))
+            match data.draw(st.sampled_from(("whole", "whole", "whole", "lost", "changed", "repeated", "cut"))):
+                case "lost":
+                    chunk = record[:at] + record[at + 1 :]
+                case "changed":
+                    chunk = record[:at] + bytes([data.draw(st.integers(0, 255))]) + record[at + 1 :]
+                case "repeated":
+                    chunk = record + record
+                case "cut":
+                    chunk = record[:at]
+            writer.on_received(chunk, 100.01 + i / 120.0, 100.0)
+    frames, blocks = list(RecordingStream(path)), list(CaptureReader(path).blocks())
+    for row, station in enumerate(WIRE.stations):
+        parts = [block.stations[station] for block in blocks if block.stations]
+        for name in ("position_m", "tracker_from_station"):
+            found = np.concatenate(
+                [np.zeros((0, 3 if name == "position_m" else 4)), *(getattr(p, name) for p in parts)]
+            )
+            expected = np.array([getattr(frame, name)[row] for frame in frames]).reshape(-1, found.shape[1])
+            np.testing.assert_array_equal(
+                found[np.isfinite(found).all(axis=1)], expected[np.isfinite(expected).all(axis=1)]
+            )
+
+
+def test_a_repeated_record_is_there_twice(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.on_configured(WIRE, 100.0, 100.0)
+        for i, record in enumerate(records(40)):
+            writer.on_received(record * (2 if i == 61 else 1), 100.01 + i / 120.0, 100.0)
+    (block,) = CaptureReader(tmp_path / "a.rec").blocks()
+    torso = block.stations["torso"]
+    assert [len(readings) for readings in block.stations.values()] == [40, 41, 40]
+    (row,) = np.flatnonzero(np.diff(torso.stamp_s) == 0.0)
+    assert row == 20
+    np.testing.assert_array_equal(torso.position_m[20], torso.position_m[21])
+    assert torso.received_s[20] == torso.received_s[21]
+
+
+def test_a_clock_of_the_host_that_began_anew_parts_the_capture(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.on_configured(WIRE, 100.0, 100.0)
+        for i, record in enumerate(records(40)):
+            now_s = 100.01 + i / 120.0 - (90.0 if i >= 60 else 0.0)
+            writer.on_received(record, now_s, 100.0)
+    blocks = list(CaptureReader(tmp_path / "a.rec").blocks())
+    assert [block.records for block in blocks] == [60, 60]
+    assert all((np.diff(block.stations["head"].received_s) > 0.0).all() for block in blocks)
+
+
+def test_memory_does_not_grow_with_the_length(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.stream.codec.blocks._PIECE_BYTES", 1 << 17)
+    monkeypatch.setattr("harness.stream.recording.station_readings._BATCH_BYTES", 1 << 16)
+    sizes, peaks = [], []
+    for name, frames in (("short.rec", 2000), ("long.rec", 12000)):
+        write(tmp_path / name, frames=frames)
+        sizes.append((tmp_path / name).stat().st_size)
+        tracemalloc.start()
+        found = sum(block.records for block in CaptureReader(tmp_path / name).blocks(20.0))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert found == 3 * frames
+    assert sizes[1] - sizes[0] > 2e6
+    assert peaks[1] - peaks[0] < 6e5
 
 
 def test_a_file_without_readings_is_refused(tmp_path: Path) -> None:
