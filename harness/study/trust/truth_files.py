@@ -4,7 +4,7 @@
   number or a letter: `head_1`, `head1`, `HEAD-A`. Capital and small letters are the same.
 - TUM: a file for each station in a folder, NAME.tum or TAKE.NAME.tum, or one file for a capture of one station. A line
   is `time x y z qx qy qz qw`; `#` begins a comment.
-- CSV: columns time_s (or measured_s, as `harness replay --csv` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz, in
+- CSV: columns time_s (or measured_s, as `harness replay --frames` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz, in
   any order; others are ignored. Rows without a time are left out, those without a pose are gaps.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.input_file import MEGABYTE, read_input_file
-from harness.errors import BadFile
+from harness.errors import BadFile, Outcome
 from harness.measure.pose_series import TruthPoses
 from harness.mocap.read.c3d import MarkerClip, read_c3d
 from harness.study.trust.truth_motion import TruthMotion, common_names
@@ -136,9 +136,11 @@ def read_csv(path: Path) -> dict[str, TruthPoses]:
         head = ["time_s" if name == "measured_s" else name for name in head]
     missing = [name for name in CSV_COLUMNS if name not in head]
     if missing:
-        raise BadFile(path, f"no column {missing[0]}", expected, "`harness replay --csv` writes such a table.")
+        raise BadFile(path, f"no column {missing[0]}", expected, "`harness replay --frames` writes such a table.")
     place = [head.index(name) for name in CSV_COLUMNS]
     rows: dict[str, list[list[float]]] = {}
+    if lines and lines[-1] == [Outcome.PASS.word]:
+        lines.pop()  # the last line of a command's output
     for number, row in enumerate(lines[1:], 2):
         if not row:
             continue
