@@ -32,7 +32,7 @@ scenario = "demo"
 methods = ["ik", "local_pca", "dynamic_map", "expert_map"]
 seeds = [1, 2]
 [margins]
-mpjae_deg = 1.0
+joint_angle_mean_deg = 1.0
 mpjpe_mm = 10.0
 """
 
