@@ -78,9 +78,8 @@ def find_echoes(series: StaticSeries, limit_m: float) -> EchoBursts:
         for begin, stop in pairwise(cuts):
             size_m = float(np.linalg.norm(position_m[begin:stop].mean(axis=0) - rest_m))
             bursts.append((begin, stop, size_m, (begin > first or edges[0]) and (stop < end or edges[1])))
-    columns = np.array(bursts, dtype=float).reshape(-1, 4).T
-    begins, ends = columns[:2].astype(np.int64)
-    return EchoBursts(begins, ends, columns[2], columns[3] > 0.0)
+    table: Floats = np.array(bursts, dtype=np.float64).reshape(-1, 4)
+    return EchoBursts(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2], table[:, 3] > 0.0)
 
 
 def hold(values: Floats, valid: Bools) -> Floats:

@@ -4,8 +4,8 @@
   number or a letter: `head_1`, `head1`, `HEAD-A`. Capital and small letters are the same.
 - TUM: a file for each station in a folder, NAME.tum or TAKE.NAME.tum, or one file for a capture of one station. A line
   is `time x y z qx qy qz qw`; `#` begins a comment.
-- CSV: columns time_s (or measured_s, as `harness replay --frames` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz, in
-  any order; others are ignored. Rows without a time are left out, those without a pose are gaps.
+- CSV: columns time_s (or measured_s, as `harness replay --frames` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz,
+  in any order; others are ignored. Rows without a time are left out, those without a pose are gaps.
 """
 
 import csv

@@ -130,7 +130,7 @@ def frames_table(stations: tuple[str, ...], hidden: int = -1) -> str:
         valid = np.array([number != hidden] + [True] * (len(stations) - 1))
         frame = TrackerFrame(
             100.0 + number / 40.0,
-            number / 40.0 + np.arange(len(stations)) * 1e-3,
+            number / 40.0 + 1e-3 * np.arange(len(stations), dtype=np.float64),
             np.where(valid[:, None], place[number] + np.arange(len(stations))[:, None], np.nan),
             np.where(valid[:, None], turn[number], np.nan),
             valid,
