@@ -12,6 +12,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
 from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
+from harness.measure.episode_share import episode_share
 from harness.measure.excursions import (
     DEFAULT_RAMP_S,
     ExcursionDetector,
@@ -112,7 +113,7 @@ def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> Episo
     parameters, means = _fit_echoes(found)
     gap_parameters, gap_means = _fit_gaps(found, noise)
     excursion_parameters, excursion_means = _fit_excursions(found, searches, noise)
-    burst, gap = (_mean_length(found, name) for name in ("echoes", "gaps"))
+    burst, gap = (_longest(found, name) for name in ("echoes", "gaps"))
     by_station = {}
     for station in dict.fromkeys(one.series.station for one in found):
         own = [one for one in found if one.series.station == station]
@@ -129,10 +130,10 @@ def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> Episo
     )
 
 
-def _mean_length(found: Sequence[SeriesEpisodes], name: str) -> float:
-    """Mean length of the episodes of all stations, in samples; 1 without any."""
+def _longest(found: Sequence[SeriesEpisodes], name: str) -> float:
+    """Length of the longest episode of all stations, in samples; 1 without any."""
     lengths = np.concatenate([getattr(one, name).end - getattr(one, name).begin for one in found])
-    return float(lengths.mean()) if len(lengths) else 1.0
+    return float(lengths.max(initial=1))
 
 
 def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], dict[str, Measured]]:
@@ -164,32 +165,17 @@ def _integer_ends(values: Floats) -> tuple[Measured, Measured, Measured]:
     return Measured(low, max(low - slack, 1), low, count), Measured(high, high, high + slack, count), mean
 
 
-def _echo_share(found: Sequence[SeriesEpisodes], typical: float = 1.0) -> Measured:
-    """Share of valid readings that are echoes; `typical` is the length of a burst where none was found."""
+def _echo_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Measured:
+    """Share of valid readings that are echoes; a burst may have the length `longest`."""
     lengths = np.concatenate([one.echoes.end - one.echoes.begin for one in found]).astype(float)
     valid = sum(int(one.series.valid.sum()) for one in found)
-    return _compound_share(lengths, valid, typical)
+    return episode_share(lengths, valid, longest)
 
 
-def _lost_share(found: Sequence[SeriesEpisodes], typical: float = 1.0) -> Measured:
-    """Share of samples that are lost; `typical` is the length of a gap where none was found."""
+def _lost_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Measured:
+    """Share of samples that are lost; a gap may have the length `longest`."""
     lengths = np.concatenate([one.gaps.end - one.gaps.begin for one in found]).astype(float)
-    return _compound_share(lengths, sum(len(one.series) for one in found), typical)
-
-
-def _compound_share(lengths: Floats, total: int, typical: float) -> Measured:
-    """Share of samples in episodes of these lengths, which come independently of each other.
-
-    Without any episode the interval ends at the upper limit of a count of zero, for episodes of `typical` length.
-    """
-    if not total:
-        return Measured.missing("There is no reading at rest.")
-    if not len(lengths):
-        return Measured(0.0, 0.0, min(_NONE_SEEN * typical / total, 1.0), 0)
-    share = float(lengths.sum()) / total
-    relative = (1.0 - share) * float(np.sqrt(np.sum(lengths**2))) / float(lengths.sum())
-    low, high = (share * float(np.exp(sign * NORMAL_QUANTILE * relative)) for sign in (-1.0, 1.0))
-    return Measured(share, low, min(high, 1.0), len(lengths))
+    return episode_share(lengths, sum(len(one.series) for one in found), longest)
 
 
 def _fit_gaps(
@@ -235,7 +221,8 @@ def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Measured, noise: Excursi
             )
             others[rows] = True
         fitted = noise.white_m, noise.drift_m, noise.correlation_s
-        own, deviation = leaked_tilt_rad(one.series, one.gaps.begin, coast_s.value, others, fitted)
+        coasted = one.gaps.begin[np.isfinite(one.gaps.coast_s)]  # a station that is covered at once does not coast
+        own, deviation = leaked_tilt_rad(one.series, coasted, coast_s.value, others, fitted)
         tilts.append(own)
     return fit_length(np.linalg.norm(np.concatenate(tilts), axis=1), deviation)
 
