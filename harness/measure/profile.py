@@ -30,8 +30,8 @@ STATIC_CORRELATIONS = 10.0
 """Least length of a rest, in correlation times of the drift."""
 REST_STRETCHES = ("", "static")
 """Stretches in which rates of errors are measured; a station that is covered on purpose is left out."""
-MOST_REST_SAMPLES = 2_000_000
-"""Samples at rest that are analysed: 46 minutes of six stations at 120 Hz. It bounds the memory."""
+MOST_REST_SAMPLES = 1_300_000
+"""Samples at rest that are analysed: 30 minutes of six stations at 120 Hz. It bounds the memory."""
 QUALITY_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Edges of the classes of quality."""
 _CAPTURE = "a capture with stations at rest"

@@ -1,15 +1,17 @@
 """Which station is on which body, from their angular speeds, which no mount and no room changes."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
 
 LEAST_GAIN = 0.1
 """Least gain in the mean correlation of the stations concerned with which an exchange is believed [choice]."""
 _FEWEST_STEPS = 20
+_LEAST_OVERLAP_S = 10.0
 
 
 def identify_stations(
@@ -18,10 +20,9 @@ def identify_stations(
     """The body of each station: the stated one, unless another assignment correlates clearly better.
 
     The assignment has the largest sum of correlations between the angular speed of a station and that of a body
-    (Kuhn 1955). Bodies that no station is stated to be on are not considered.
+    (Kuhn 1955), over the time offsets of the stated assignment and of the first station on each body: one of those is
+    right. Bodies that no station is stated to be on are not considered.
     """
-    from scipy import optimize
-
     from harness.measure.registration import coarse_offset, record_period_s
 
     names, bodies = list(stations), list(dict.fromkeys(stated[name] for name in stations))
@@ -29,15 +30,40 @@ def identify_stations(
         return dict(stated)
     splines = {body: TruthSpline(truths[body]) for body in bodies}
     period_s = record_period_s(stations)
-    offset_s = coarse_offset(stations, {name: splines[stated[name]] for name in names}, period_s, 10.0).offset_s
-    correlation = np.array([_correlations(stations[name], splines, offset_s) for name in names])
-    rows, columns = optimize.linear_sum_assignment(-correlation)
-    own = [bodies.index(stated[name]) for name in names]
-    changed = columns != np.array(own)
-    gain = correlation[rows, columns][changed] - correlation[rows, own][changed]
+
+    def correlations(worn: Mapping[str, str]) -> Floats:
+        on = {name: splines[body] for name, body in worn.items()}
+        offset_s = coarse_offset({name: stations[name] for name in worn}, on, period_s, _LEAST_OVERLAP_S).offset_s
+        return np.array([_correlations(stations[name], splines, offset_s) for name in names])
+
+    rows, own = np.arange(len(names)), [bodies.index(stated[name]) for name in names]
+    as_stated = correlations(stated)
+    found = max((_assigned(as_stated), *(_assigned(correlations({names[0]: body})) for body in bodies)), key=_total)
+    changed = found.body != np.array(own)
+    gain = found.correlation[changed] - as_stated[rows, own][changed]
     if not changed.any() or gain.mean() < LEAST_GAIN:
         return dict(stated)
-    return {name: bodies[column] for name, column in zip(names, columns, strict=True)}
+    return {name: bodies[column] for name, column in zip(names, found.body, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Assignment:
+    """The body of each station (N,) and its correlation (N,)."""
+
+    body: Ints
+    correlation: Floats
+
+
+def _assigned(correlation: Floats) -> _Assignment:
+    """The assignment with the largest sum of correlations (N, B)."""
+    from scipy import optimize
+
+    rows, columns = optimize.linear_sum_assignment(-correlation)
+    return _Assignment(columns, correlation[rows, columns])
+
+
+def _total(assignment: _Assignment) -> float:
+    return float(assignment.correlation.sum())
 
 
 def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], offset_s: float) -> list[float]:

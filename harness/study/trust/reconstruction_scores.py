@@ -62,6 +62,9 @@ def score_registered(
     playback = found.truth.playback
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
+    missing = [name for name in found.reader.wire.stations if name not in found.registration.mounts]
+    if missing:
+        raise BadInput(f"{missing[0]} has no mount.", "Methods need the mount of every station of the capture.")
     frames = list(RecordingStream(path))
     time_s = truth_times_s(frames, found.registration)
     trajectory = Trajectory(playback.body, playback.take)

@@ -163,6 +163,12 @@ def validate_capture(
             f"No station of {capture.name} is in the reference.",
             f"The capture has {', '.join(readings)}; the reference carries {', '.join(truth.body_of)}.",
         )
+    require_stamps(poses)
+    if unseen := [station for station, one in poses.items() if not one.valid.any()]:
+        notes = (*notes, f"{', '.join(unseen)}: no pose in the whole capture; left out.")
+        poses = {station: one for station, one in poses.items() if one.valid.any()}
+    if not poses:
+        raise NotComparable(f"No station of {capture.name} has a pose.", "Record positions and orientations.")
     progress("registration", 1, 3)
     pairs, exchanged = _identify(poses, truth)
     registration = register(poses, truth.bodies, pairs=pairs)
@@ -228,7 +234,6 @@ def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFil
 
 def _identify(poses: Mapping[str, MeasuredPoses], truth: TruthMotion) -> tuple[dict[str, str], dict[str, str]]:
     """The body of each station, and those that are not the stated ones."""
-    require_stamps(poses)
     stated = {station: truth.body_of[station] for station in poses}
     found = identify_stations(poses, truth.bodies, stated)
     return found, {station: body for station, body in found.items() if body != stated[station]}

@@ -1,0 +1,202 @@
+"""Validation of simulated captures: what is found, what is named, and what is refused."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.errors import BadInput, NotComparable, Outcome, UnknownName
+from harness.experiment.playback import Playback, prepare_playback
+from harness.measure.unit_file import UnitFile
+from harness.simulate.simulation import TrackerConfig
+from harness.stream.recording.recording import record_capture
+from harness.stream.recording.station_readings import CaptureReader
+from harness.study.trust import validation
+from harness.study.trust.expected_values import preset_components
+from harness.study.trust.reconstruction_scores import measured_calibration, score_registered
+from harness.study.trust.truth_motion import TruthMotion, read_stations
+from harness.study.trust.validation import Validation, load_truth, session_unit, validate_capture
+
+pytestmark = pytest.mark.long
+CLIP = "boxing_p1_01"
+
+
+def capture(playback: Playback, path: Path, seconds: float = np.inf, **note: object) -> Path:
+    simulation = playback.simulation
+    whole = {"source": "simulation", "scenario": "builtin_boxing", "clip": CLIP, "noise": "default", **note}
+    record_capture(path, simulation.wire_format, simulation.wire, whole, seconds=seconds)
+    return path
+
+
+@pytest.fixture(scope="module")
+def boxing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    playback = prepare_playback("builtin_boxing", clip=CLIP, noise="default")
+    return capture(playback, tmp_path_factory.mktemp("validation") / "boxing.rec")
+
+
+@pytest.fixture(scope="module")
+def truth(boxing: Path) -> TruthMotion:
+    return load_truth(boxing, CLIP)
+
+
+@pytest.fixture(scope="module")
+def found(boxing: Path, truth: TruthMotion) -> Validation:
+    return validate_capture(boxing, truth)
+
+
+def test_a_sound_capture_shows_the_preset_and_no_departure(found: Validation) -> None:
+    assert found.named == ()
+    assert not found.exchanged
+    assert found.notes == ()
+    numbers = found.numbers
+    assert numbers["components.speed.ahead_s"].value == pytest.approx(0.002, abs=0.0003)
+    assert numbers["components.clock.drift_ppm"].value == pytest.approx(20.0, abs=10.0)
+    assert numbers["time_offset_orientation_s"].value == pytest.approx(2e-5 * found.registration.reference_s, abs=2e-4)
+    assert numbers["latency_s"].value == pytest.approx(TrackerConfig().latency_s + TrackerConfig().record_s, abs=2e-4)
+    checked = [(check.departure.key, check.departure.station) for check in found.checks]
+    assert {key for key, station in checked if not station} == {
+        "components.speed.ahead_s", "components.clock.drift_ppm", "scale", "heading_rad", "latency_s",
+    }  # fmt: skip
+    assert {station for key, station in checked if key == "mount_turn_rad"} == set(found.registration.mounts)
+
+
+def test_each_station_has_its_errors(found: Validation, boxing: Path) -> None:
+    assert set(found.stations) == set(found.registration.mounts)
+    one = found.stations["right_hand"]
+    assert 0.01 < one.lost_share < 0.03
+    assert one.readings == pytest.approx(0.98 * 800, abs=20)
+    assert found.records == 4800
+    assert found.duration_s == pytest.approx(20.0, abs=0.1)
+
+
+def test_exchanged_stations_are_named_and_have_no_mount_checks(boxing: Path, truth: TruthMotion) -> None:
+    swapped = dict(truth.body_of) | {"left_hand": "rhand", "right_hand": "lhand"}
+    found = validate_capture(boxing, replace(truth, body_of=swapped))
+    assert dict(found.exchanged) == {"left_hand": "lhand", "right_hand": "rhand"}
+    assert found.named == ()
+    assert "left_hand" not in {check.departure.station for check in found.checks}
+
+
+def named_keys(found: Validation) -> set[tuple[str, str]]:
+    return {(check.departure.key, check.departure.station) for check in found.named}
+
+
+def test_numbers_that_differ_from_a_unit_file_are_named(boxing: Path, truth: TruthMotion, found: Validation) -> None:
+    unit = session_unit(found, None, "unit")
+    assert named_keys(validate_capture(boxing, truth, expected=unit)) == set()
+    shifted = {key: replace_value(unit, key, by) for key, by in {"latency_s": 0.01, "heading_rad": 0.05}.items()}
+    for key, other in shifted.items():
+        again = validate_capture(boxing, truth, expected=other)
+        assert named_keys(again) == {(key, "")}
+        assert again.expected_from == other.name
+
+
+def replace_value(unit: UnitFile, key: str, by: float) -> UnitFile:
+    one = unit.session[key]
+    moved = replace(one, value=one.value + by, low=one.low + by, high=one.high + by)
+    return replace(unit, session={**unit.session, key: moved})
+
+
+def test_a_unit_file_gains_what_the_reference_shows(found: Validation) -> None:
+    unit = session_unit(found, None, "unit")
+    assert unit.components["speed"]["ahead_s"] == found.numbers["components.speed.ahead_s"].value
+    assert unit.measured["components.clock.drift_ppm"] == found.numbers["components.clock.drift_ppm"]
+    assert set(unit.session) == {"scale", "heading_rad", "latency_s"}
+    assert unit.components["white"] == preset_components()["white"]
+    known = replace(unit, components=with_clock(unit, 33.0))
+    again = session_unit(found, known, "again")
+    assert again.components["clock"]["drift_ppm"] == 33.0  # a longer capture knows the clock better
+
+
+def with_clock(unit: UnitFile, ppm: float) -> Mapping[str, dict[str, object]]:
+    return {**unit.components, "clock": {**unit.components["clock"], "drift_ppm": ppm}}
+
+
+def test_another_tracker_as_reference_is_compared_with_no_preset(boxing: Path) -> None:
+    found = validate_capture(boxing, load_truth(boxing, str(boxing)))
+    assert found.checks == ()
+    assert found.numbers["time_offset_orientation_s"].value == pytest.approx(0.0, abs=1e-6)
+    assert not found.numbers["latency_s"].is_measured
+    for station, mount in found.registration.mounts.items():
+        assert np.linalg.norm(mount.position_m) < 1e-6, station
+
+
+def test_scores_of_a_registered_capture_are_those_of_the_method(boxing: Path, found: Validation) -> None:
+    scores = {(one.method, one.metric): one.value for one in score_registered(boxing, found, ["ik"])}
+    value = scores["ik", "joint_angle_mean_deg"]
+    assert value is not None
+    assert 1.0 < value < 8.0
+    assert measured_calibration(found.registration, tuple("abcdef")).stations == tuple("abcdef")
+
+
+def test_a_lost_part_of_the_capture_is_reported(boxing: Path, truth: TruthMotion, tmp_path: Path) -> None:
+    """Half of a second is overwritten, and the end is cut off: the rest is used."""
+    data = bytearray(boxing.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 2000] = bytes(2000)
+    path = tmp_path / "damaged.rec"
+    path.write_bytes(data[: 9 * len(data) // 10])
+    found = validate_capture(path, truth)
+    assert found.reader.damage or found.notes
+    assert found.records < 4500
+    assert found.named == ()
+
+
+def test_a_short_capture_cannot_be_compared(boxing: Path, truth: TruthMotion, tmp_path: Path) -> None:
+    playback = prepare_playback("builtin_boxing", clip=CLIP, noise="default")
+    with pytest.raises(NotComparable, match="overlap by at most") as refused:
+        validate_capture(capture(playback, tmp_path / "short.rec", seconds=5.0), truth)
+    assert refused.value.outcome is Outcome.NOT_COMPARABLE
+
+
+def test_another_motion_and_other_stations_are_refused(boxing: Path, truth: TruthMotion) -> None:
+    with pytest.raises(BadInput, match="The motion is not the reference's"):
+        validate_capture(boxing, load_truth(boxing, "boxing_p2_01"))
+    with pytest.raises(BadInput, match="No station of"):
+        validate_capture(boxing, replace(truth, body_of={"nose": "head"}))
+
+
+def test_a_capture_with_gaps_in_one_twentieth_cannot_be_compared(boxing: Path, truth: TruthMotion) -> None:
+    hidden = {}
+    for name, poses in truth.bodies.items():
+        gap = (poses.time_s > 8.0) & (poses.time_s < 10.0)
+        hidden[name] = replace(poses, position_m=np.where(gap[:, None], np.nan, poses.position_m))
+    with pytest.raises(NotComparable, match="At least 95 % must match"):
+        validate_capture(boxing, replace(truth, bodies=hidden))
+
+
+def test_a_capture_without_stamps_is_refused(boxing: Path, truth: TruthMotion, monkeypatch: pytest.MonkeyPatch) -> None:
+    readings, _ = read_stations(CaptureReader(boxing))
+    without = {name: replace(one, measured_s=np.full(len(one), np.nan)) for name, one in readings.items()}
+    monkeypatch.setattr(validation, "read_stations", lambda reader: (without, ()))
+    with pytest.raises(BadInput, match="have no time stamps"):
+        validate_capture(boxing, truth)
+
+
+def test_a_station_without_a_pose_is_left_out(
+    boxing: Path, truth: TruthMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readings, _ = read_stations(CaptureReader(boxing))
+    lost = replace(readings["head"], position_m=np.full((len(readings["head"]), 3), np.nan))
+    monkeypatch.setattr(validation, "read_stations", lambda reader: ({**readings, "head": lost}, ()))
+    found = validate_capture(boxing, truth)
+    assert "head" not in found.registration.mounts
+    assert found.notes == ("head: no pose in the whole capture; left out.",)
+    assert found.named == ()
+    with pytest.raises(BadInput, match="head has no mount"):
+        score_registered(boxing, found, ["ik"])
+    monkeypatch.setattr(validation, "read_stations", lambda reader: ({"head": lost}, ()))
+    with pytest.raises(NotComparable, match="has a pose"):
+        validate_capture(boxing, truth)
+
+
+def test_what_names_no_reference_is_refused(boxing: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="no synthetic take called 'nothing'"):
+        load_truth(boxing, "nothing")
+    playback = prepare_playback("builtin_boxing", clip=CLIP, noise="default")
+    unnamed = capture(playback, tmp_path / "unnamed.rec", scenario=None)
+    with pytest.raises(BadInput, match="--scenario"):
+        load_truth(unnamed, CLIP)
+    assert load_truth(unnamed, CLIP, scenario="builtin_boxing").playback is not None
