@@ -8,6 +8,7 @@ import numpy as np
 from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
 from harness.measure.episode_fit import SeriesEpisodes
 from harness.measure.gauss_markov import NOISE_KEYS
+from harness.measure.mean_drift import drift_speed, mean_drift
 from harness.measure.measured import Measured
 from harness.measure.recording_time import events_for_precision
 from harness.measure.spectrum import measure_spectrum, pool_spectra
@@ -106,8 +107,21 @@ def _figures(found: Characterization, station: str) -> dict[str, Measured]:
     return {
         "spread_m": rest_spread(rest, "position_m"),
         "spread_rad": rest_spread(rest, "rotation_rad"),
+        "slope_m_min": _slope_m_min(found, station),
         **figures,
     }
+
+
+def _slope_m_min(found: Characterization, station: str) -> Measured:
+    """Speed at which the mean of the position moves while the station rests [m/min]."""
+    own = [one for one in found.profile.episodes.found if one.series.station == station]
+    velocity = mean_drift(
+        [one.series for one in own], [one.disturbed for one in own], found.profile.noise, "position_m"
+    )
+    speed = drift_speed(velocity)
+    if not speed.is_measured:
+        return speed
+    return Measured(60.0 * speed.value, 60.0 * speed.low, 60.0 * speed.high, speed.count)
 
 
 def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:

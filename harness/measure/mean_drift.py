@@ -6,10 +6,12 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.measure.gauss_markov import NOISE_KEYS, whiten
-from harness.measure.measured import Measured
+from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.static_series import StaticSeries
 
+_CHI_QUANTILE = 2.795483482915108
+"""95 % quantile of the length of a vector of three standard normal numbers."""
 _ROWS = {"position_m": (0, 1), "rotation_rad": (2, 4)}
 """Rows in `NOISE_KEYS` of the white noise and of the largest drift of a field."""
 
@@ -45,3 +47,16 @@ def mean_drift(
     if information <= 0.0:
         return (Measured.missing("Too few undisturbed readings at rest."),) * 3
     return tuple(Measured.normal(float(one) / information, information**-0.5, readings) for one in pull)
+
+
+def drift_speed(velocity: Sequence[Measured]) -> Measured:
+    """Length of a velocity (3) with equal deviations, in its unit.
+
+    The interval is 95 % for a vector of three errors (chi with three degrees of freedom), so that it contains zero for
+    95 % of the stations without drift.
+    """
+    if not all(one.is_measured for one in velocity):
+        return Measured.missing(next(one.reason for one in velocity if one.reason))
+    length = float(np.sqrt(sum(one.value**2 for one in velocity)))
+    half = _CHI_QUANTILE * max(one.high - one.value for one in velocity) / NORMAL_QUANTILE
+    return Measured(length, max(length - half, 0.0), length + half, velocity[0].count)

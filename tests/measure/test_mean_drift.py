@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.mean_drift import mean_drift
+from harness.measure.mean_drift import drift_speed, mean_drift
 from harness.measure.measured import Measured
 from harness.measure.noise_fit import NoiseFit
 from harness.simulate.noise import Noise
@@ -62,3 +62,14 @@ def test_intervals_contain_no_drift(name: str) -> None:
         series, _ = series_and_masks(noise, 500 + seed, 60.0, ("one",))
         inside += [one.contains(0.0) for one in mean_drift(series, nothing(series), KNOWN, name)]
     assert np.all(inside >= 88), inside
+
+
+def test_the_speed_of_a_station_without_drift_is_compatible_with_zero() -> None:
+    rng = np.random.default_rng(1)
+    compatible = 0
+    for _ in range(500):
+        velocity = [Measured.normal(float(value), 1.0) for value in rng.normal(size=3)]
+        compatible += drift_speed(velocity).low == 0.0
+    assert 0.92 <= compatible / 500 <= 0.98
+    assert drift_speed([Measured.normal(value, 0.1) for value in (3.0, 0.0, 4.0)]).value == pytest.approx(5.0)
+    assert not drift_speed([Measured.missing("why")] * 3).is_measured
