@@ -25,12 +25,12 @@ RATE_HZ, BAUD = 120.0, 460_800
 """Rate of each station, and a line that carries six of them."""
 PART_S = 300.0
 """Length of the parts in which long captures are simulated [s]."""
-TRUST_CLIPS = ("walking_p1_01", "boxing_p1_01")
+TRUST_CLIPS = ("walking_p1_01", "boxing_p1_01", "jumping_p1_01", "golf_p1_01")
 TRUST_PLAN = """\
 kind = "trust plan"
 scenario = "demo"
 methods = ["ik", "local_pca", "dynamic_map", "expert_map"]
-seeds = [1, 2]
+seeds = [1, 2, 3]
 [margins]
 joint_angle_mean_deg = 1.0
 mpjpe_mm = 10.0
