@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from harness.compare.claims import claim_decreasing, claim_lower_error
+from harness.compare.claims import claim_decreasing, claim_lower_error, claim_noninferior
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment, Reading
 from harness.study.papers.leave_one_out import (
@@ -21,8 +21,10 @@ METHODS = (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, LOCAL_PCA, "ik")
 OWN: Mapping[str, Reading] = {DYNAMIC_MAP_LITERAL: "as printed", DYNAMIC_MAP: "ours"}
 """The methods that stand for the paper's own."""
 _WORDING = (
-    "The paper claims both and prints no figure. The directions that are tested are our interpretation: more examples "
-    "reduce the error, and a database of one behaviour gives a smaller error than one of all."
+    "The paper says that its method scales up well to the size and heterogeneity of motion databases, and prints no "
+    "figure. That is tested so: one database of all behaviours costs nothing, within the margin of `harness compare`. "
+    "That more examples reduce the error, and that a database of one behaviour gives a smaller error than one of all, "
+    "are our interpretations and listed as derived."
 )
 
 
@@ -39,7 +41,7 @@ def database_size(study: PaperStudy) -> PaperExperiment:
             series, start = errors[method], f"boxing, {INPUTS[inputs]}: {method} errs less"
             least, whole = next(iter(series)), list(series)[-1]
             text = f"{start} with the whole database than with {least} % of it"
-            claims.append(claim_lower_error(text, series[whole], series[least], reading=reading))
+            claims.append(claim_lower_error(text, series[whole], series[least], kind="derived", reading=reading))
             text = f"{start} with each larger share of the database"
             claims.append(claim_decreasing(text, series, "%", kind="derived", reading=reading))
         shares = list(errors[DYNAMIC_MAP])
@@ -68,7 +70,7 @@ def database_size(study: PaperStudy) -> PaperExperiment:
         claims=tuple(claims),
         tables=tuple(tables),
         figures=tuple(figures),
-        runs=(SIZE_RUN, _whole_run(study)),
+        runs=(SIZE_RUN, whole_run(study)),
     )
 
 
@@ -80,7 +82,7 @@ def one_database(study: PaperStudy) -> PaperExperiment:
     for metric in (METRIC, RMS):
         sides.append({})
         for behaviour in behaviours:
-            for name, run in (("own", _whole_run(study)), ("all", ALL_RUN)):
+            for name, run in (("own", whole_run(study)), ("all", ALL_RUN)):
                 where = {"behaviour": behaviour, "inputs": "pos+ori", "performer": "known"}
                 sides[-1][f"{behaviour_label(behaviour)}, database of {_DATABASES[name]}"] = {
                     method: errors_by_clip(study.rows(run, method=method, **where), metric) for method in METHODS
@@ -89,8 +91,11 @@ def one_database(study: PaperStudy) -> PaperExperiment:
         label = behaviour_label(behaviour)
         own, everything = (sides[0][f"{label}, database of {_DATABASES[name]}"] for name in ("own", "all"))
         for method, reading in OWN.items():
+            sides_of = own[method], everything[method]
+            text = f"{label}: {method} errs no more with one database of all behaviours than with one of the behaviour"
+            claims.append(claim_noninferior(text, *reversed(sides_of), published="scales up well", reading=reading))
             text = f"{label}: {method} errs less with a database of the behaviour than with one of all behaviours"
-            claims.append(claim_lower_error(text, own[method], everything[method], reading=reading))
+            claims.append(claim_lower_error(text, *sides_of, kind="derived", reading=reading))
     caption = "Mean joint-angle error over clips, positions and orientations."
     return PaperExperiment(
         name="one_database",
@@ -103,15 +108,15 @@ def one_database(study: PaperStudy) -> PaperExperiment:
         claims=tuple(claims),
         tables=(mean_table("Joint-angle error [deg]", "behaviour", *sides),),
         figures=(mean_bars("One database or several", "deg", sides[0], caption=caption),),
-        runs=(ALL_RUN, _whole_run(study)),
+        runs=(ALL_RUN, whole_run(study)),
     )
 
 
 _DATABASES = {"own": "the behaviour", "all": "all behaviours"}
 
 
-def _whole_run(study: PaperStudy) -> str:
-    """The run with the whole database of the behaviour, on the same clips."""
+def whole_run(study: PaperStudy) -> str:
+    """Name of the run with the whole database of each behaviour, on the clips of the other runs."""
     return "blocks" if study.motion == "cmu" else "leave_one_out"
 
 
@@ -122,4 +127,4 @@ def _errors_by_share(study: PaperStudy, method: str, inputs: str, metric: str) -
         f"{100.0 * share:g}": errors_by_clip(study.rows(SIZE_RUN, varied={KEY: share}, **where), metric)
         for share in study.runs[SIZE_RUN].vary[KEY]
     }
-    return {**errors, "100": errors_by_clip(study.rows(_whole_run(study), **where), metric)}
+    return {**errors, "100": errors_by_clip(study.rows(whole_run(study), **where), metric)}

@@ -21,6 +21,8 @@ from harness.study.papers.leave_one_out import (
     leave_one_out,
     own_model,
 )
+from harness.study.papers.other_approaches import RUN as OTHER_RUN
+from harness.study.papers.other_approaches import other_approaches
 from harness.study.papers.paper import Paper
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import LIU2011, compare_speed
@@ -141,6 +143,7 @@ PAPER = Paper(
         "boxing_inputs": boxing_inputs,
         "database_size": database_size,
         "one_database": one_database,
+        "other_approaches": other_approaches,
         "eigenmodes": eigenmodes,
         "speed": partial(compare_speed, published=LIU2011),
     },
@@ -151,6 +154,7 @@ PAPER = Paper(
         "boxing_inputs": ("leave_one_out", "blocks", "boxing_inputs"),
         "database_size": ("leave_one_out", "blocks", "database_size"),
         "one_database": ("leave_one_out", "blocks", "one_database"),
+        "other_approaches": ("leave_one_out", "blocks", OTHER_RUN),
         "eigenmodes": (),
         "speed": (),
     },

@@ -28,7 +28,7 @@ SPARSE = {"table_tennis": 31, "walking": 43}
 
 def test_both_motions_have_runs() -> None:
     names = {path.stem.removeprefix("builtin_") for path in BUILT_IN}
-    assert len(names) == 9
+    assert len(names) == 13
     assert {path.stem.removeprefix("cmu_") for path in CMU} == names
 
 
@@ -49,7 +49,9 @@ def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
         )
 
 
-@pytest.mark.parametrize("path", BUILT_IN, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [path for path in BUILT_IN if "one_sparse" not in path.stem], ids=lambda path: path.stem
+)
 def test_built_in_databases_have_the_papers_size_and_know_the_performer(path: Path) -> None:
     """A take has 2,401 frames at 120 Hz; a run of n of them has 1 + (n - 1) // 3 at the tracker's 40."""
     motion = load_scenario(path).motion
@@ -62,6 +64,22 @@ def test_built_in_databases_have_the_papers_size_and_know_the_performer(path: Pa
     subjects = [{name.split("_")[-2] for name in names} for names in (motion.test, motion.examples)]
     assert len(subjects[0]) == 8
     assert subjects[0] == subjects[1]
+
+
+@pytest.mark.parametrize("behaviour", SPARSE)
+def test_one_sparse_database_keeps_the_papers_share_of_each_behaviour(behaviour: str) -> None:
+    """The paper has 31 frames of table tennis and 43 of walking, 74 in all."""
+    motion = load_scenario(data_folder("scenarios") / f"papers/kim2012/builtin_one_sparse_{behaviour}.toml").motion
+    withheld = [ClipPart.parse(text) for text in motion.withheld]
+    frames = dict.fromkeys(SPARSE, 0)
+    for name in motion.examples:
+        runs = allowed_frames(withheld, name, 2401, 120.0)
+        frames[name.rpartition("_p")[0]] += sum(1 + (len(run) - 1) // 3 for run in runs)
+    assert motion.database == "all"
+    assert motion.thin_to == sum(SPARSE.values())
+    kept = {name: motion.thin_to * count / sum(frames.values()) for name, count in frames.items()}
+    assert kept == pytest.approx(SPARSE, abs=0.5)
+    assert not set(motion.test) & set(motion.examples)
 
 
 @pytest.mark.parametrize("path", CMU, ids=lambda path: path.stem)
