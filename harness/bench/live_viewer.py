@@ -24,7 +24,6 @@ PAIRS = 5
 """Pairs of sessions in one run of the benchmark."""
 MAX_RATIO = 1.05
 _SECONDS, _RATE_HZ, _STATIONS = 6.0, 40.0, 4
-_BYTES_AT_A_TIME = 4096
 
 
 def bench_live_viewer(seed: int = 1, *, runs: int = 1) -> list[BenchmarkRow]:
@@ -89,13 +88,12 @@ def _session_p50_ms(port: str, *, with_page: bool) -> float:
 
 def _read_events(address: str) -> None:
     """Read the page and its events until the session ends; `address` is host:port."""
+    last, answer = 0, b""
     try:
         connection = HTTPConnection(address)
-        connection.request("GET", "/")
-        connection.getresponse().read()
-        connection.request("GET", EVENTS_PATH)
-        events = connection.getresponse()
-        while events.read1(_BYTES_AT_A_TIME):
-            pass
+        while True:
+            connection.request("GET", f"{EVENTS_PATH}?after={last}" if answer else "/")
+            answer = connection.getresponse().read()
+            last = json.loads(answer)["last"] if answer.startswith(b"{") else 0
     except (OSError, HTTPException):  # the session has ended
         return

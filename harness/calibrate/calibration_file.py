@@ -46,13 +46,20 @@ class CalibrationFile:
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
     """Quality figures of the calibration: strings, numbers, booleans, and lists and mappings of them."""
 
+    def difference(self, stations: Sequence[str]) -> str:
+        """Both lists, where the worn stations are not the calibrated ones in the same order; else nothing."""
+        if tuple(stations) == self.calibration.stations:
+            return ""
+        return f"the calibration is of {', '.join(self.calibration.stations)}; worn are {', '.join(stations)}"
+
     def select(self, stations: Sequence[str]) -> "CalibrationFile":
         """A copy with these stations only, in this order; BadInput names the first that is missing."""
         calibration = self.calibration
         for name in stations:
             if name not in calibration.stations:
                 raise BadInput(
-                    f"Station {name!r} is not in the calibration, which has {', '.join(calibration.stations)}.",
+                    f"Station {name!r} is not in the calibration, which has {', '.join(calibration.stations)}; "
+                    f"worn are {', '.join(stations)}.",
                     "Wear the calibrated stations, use the names they had then, or calibrate again.",
                 )
         rows = [calibration.stations.index(name) for name in stations]

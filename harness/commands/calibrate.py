@@ -20,6 +20,7 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
+    repeat_flags,
 )
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
@@ -102,14 +103,9 @@ def _draw_sheet(args: argparse.Namespace) -> Outcome:
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
     lines = [f"{number}  {pose.name}: {pose.instruction}" for number, pose in enumerate(POSES, 1)]
-    following = ["calibrate", "--live", "--port", "PORT", "--scenario", "demo", "--out", "me.toml"]
-    return print_result(
-        args,
-        {"poses": poses, "pictures": [str(path) for path in paths]},
-        *lines,
-        f"drawn in {args.sheet}",
-        following=following,
-    )
+    content = {"poses": poses, "pictures": [str(path) for path in paths]}
+    guide = "`harness calibrate --live --port PORT --scenario NAME --out FILE` guides a performer through them"
+    return print_result(args, content, *lines, f"drawn in {args.sheet}; {guide}")
 
 
 def _measure_accuracy(args: argparse.Namespace) -> Outcome:
@@ -138,16 +134,15 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     if args.pictures is not None and args.view != "frames":
         raise BadInput("--pictures without --view frames.", "Give both, or neither.")
     require_writable(args.out, EXPECTED, force=args.force)
-    found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
+    found, use = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
     write_calibration(args.out, found.file, force=args.force)
-    following: list[object] = ["replay", args.recording, "--methods", "ik,expert_map", "--calibration", args.out]
-    if args.live:
-        following = ["live", "--port", args.port, "--scenario", args.scenario, "--calibration", args.out]
+    following = [*use, *repeat_flags(args, "clip", "mocap"), "--calibration", args.out]
     content = {"file": str(args.out), **found.file.diagnostics}
     return print_result(args, content, *found.lines, "", f"{args.out}: written", following=following)
 
 
-def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
+def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
+    """The calibration, and the command that uses it."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.experiment.playback import select_stations
     from harness.experiment.scenario import load_scenario
@@ -178,10 +173,12 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
         print_status(device.setup_note)
         collector = session.collect_poses(device, print_status, displays)
     print_status("solving")
-    return session.solve(collector.holds, f"the tracker at {args.port}")
+    use = ["live", "--port", args.port, *repeat_flags(args, "scenario", "stations", "rate", *LINE_FLAGS)]
+    return session.solve(collector.holds, f"the tracker at {args.port}"), use
 
 
-def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
+def _calibrate_from_recording(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
+    """The calibration, and the command that uses it."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.experiment.score_recording import name_recorded_stations
     from harness.stream.recording.replay import RecordingStream
@@ -205,4 +202,13 @@ def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
             collector.add(frame)
         for passed in collector.rejected[before:]:
             print_status(str(passed))
-    return session.solve(collector.holds, str(args.recording))
+    found = session.solve(collector.holds, str(args.recording))
+    port = note.get("port")
+    if not isinstance(port, str):
+        flags = repeat_flags(args, "scenario", "stations")
+        return found, ["replay", str(args.recording), *flags, "--methods", "ik,expert_map"]
+    # a recording of a performer has no known motion to score: the next thing is a live session on the same line
+    characters = stream.wire.characters.decode()
+    worn = [f"{name}={character}" for name, character in zip(session.stations, characters, strict=True)]
+    stations = session.stations if port.startswith("udp:") else worn
+    return found, ["live", "--port", port, "--scenario", scenario, "--stations", ",".join(stations)]

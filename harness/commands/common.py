@@ -55,14 +55,31 @@ class _AddFolder(argparse.Action):
 
 
 def add_mocap_flag(verb: argparse.ArgumentParser, text: str) -> None:
-    """Add `--mocap DIR`, which may be given more than once (see `mocap_words`)."""
+    """Add `--mocap DIR`, which may be given more than once."""
     verb.add_argument("--mocap", type=Path, action=_AddFolder, metavar="DIR", help=text)
 
 
-def mocap_words(folders: Path | Sequence[Path] | None) -> list[str]:
-    """The words of a command line that name these folders of real motion."""
-    several = () if folders is None else (folders,) if isinstance(folders, Path) else folders
-    return [word for folder in several for word in ("--mocap", str(folder))]
+def repeat_flags(args: argparse.Namespace, *names: str) -> list[str]:
+    """The words that give the flags of these names (`keep_settings`) their present values in another command line."""
+    words = []
+    for name in names:
+        flag, value = f"--{name.replace('_', '-')}", getattr(args, name, None)
+        if value is None or value is False or value == "":
+            continue
+        if value is True:
+            words.append(flag)
+        elif isinstance(value, tuple) and isinstance(value[0], Path):
+            words += [word for folder in value for word in (flag, str(folder))]
+        else:
+            text = _format_value(value)
+            words += [f"{flag}={text}"] if text.startswith("-") else [flag, text]  # argparse takes -1,0,0 for a flag
+    return words
+
+
+def _format_value(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ",".join(map(_format_value, value))
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 def add_line_flags(verb: argparse.ArgumentParser) -> None:

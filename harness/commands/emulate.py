@@ -16,6 +16,7 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
+    repeat_flags,
 )
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
@@ -104,14 +105,18 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         )
         print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {names}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
-        stations = ["--stations", ",".join(samples.stations)] if args.stations else []
-        words = ["harness", "live", "--port", str(args.pty or port.name), "--scenario", args.scenario, *stations]
-        words += ["--view", "browser"]
-        print_status(f"next, in another terminal: {shlex.join(words)}")
+        print_status(f"next, in another terminal: {shlex.join(_following(args, port.name))}")
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
         counts = play_samples(samples, config, port, udp[0] if udp else LOOPBACK)
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
+
+
+def _following(args: argparse.Namespace, port: str) -> list[str]:
+    """The command that uses the emulated device: a calibration for its poses, else a live session."""
+    verb, use = (["calibrate", "--live"], ["--out", "me.toml"]) if args.poses else (["live"], ["--view", "browser"])
+    flags = repeat_flags(args, "stations", "clip", "rate", "items", "mocap", *([] if args.poses else ["seed"]))
+    return ["harness", *verb, "--port", str(args.pty or port), "--scenario", args.scenario, *flags, *use]
 
 
 def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None) -> "EmulatorConfig":

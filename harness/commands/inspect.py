@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, print_result, repeat_flags
 from harness.errors import BadInput, Outcome
 
 CONSTELLATION_SUFFIX = ".mcf"
@@ -46,5 +46,7 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
 
     library = args.mocap or folders_of_environment() or None
     found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
-    following = [] if args.file.suffix.lower() == ".c3d" else ["view", args.file]  # a C3D file has markers only
+    # a C3D file has markers only, and `view` takes no unit of length
+    unseen = args.file.suffix.lower() == ".c3d" or args.unit is not None
+    following = [] if unseen else ["view", args.file, *repeat_flags(args, "rate")]
     return print_result(args, found.as_dict(), *found.lines(), following=following)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.commands.common import mocap_words, print_result, this_command
+from harness.commands.common import print_result, repeat_flags, this_command
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.report.coverage.content import (
     CoverageContent,
@@ -60,7 +60,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
         "stations": [asdict(row) for row in content.stations],
         "page": str(page),
     }
-    following = [] if args.clip else ["inspect", args.file, "--clip", "walking_p1_01", *mocap_words(args.mocap)]
+    following = [] if args.clip else ["inspect", args.file, "--clip", "walking_p1_01", *repeat_flags(args, "mocap")]
     return print_result(args, said, *lines, f"page: {page}", following=following)
 
 

@@ -24,10 +24,3 @@ def read_isolation(args: argparse.Namespace) -> "Isolation":
     from harness.experiment.isolation import DEFAULT_TIME_LIMIT_S, Isolation
 
     return Isolation(args.isolate, args.time_limit or DEFAULT_TIME_LIMIT_S, args.memory_limit)
-
-
-def isolation_words(args: argparse.Namespace) -> list[str]:
-    """The words of a command line that repeat those flags."""
-    limits = {"--time-limit": args.time_limit, "--memory-limit": args.memory_limit}
-    words = [word for flag, value in limits.items() if value is not None for word in (flag, f"{value:g}")]
-    return [*(["--isolate"] if args.isolate else []), *words]

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
     DEVICE_STATIONS_HELP,
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
+    is_whole_number,
     line_options,
     parse_stations,
     positive_float,
     print_result,
     print_status,
+    repeat_flags,
     show_progress,
 )
 from harness.core.interrupts import defer_interrupts
@@ -105,7 +108,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
-        playback = playback.with_calibration(read_calibration(args.calibration))
+        named = args.stations is not None and not is_whole_number(args.stations)
+        playback = playback.with_calibration(read_calibration(args.calibration), named=named, say=print_status)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":
@@ -147,7 +151,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
     outcome = Outcome.PASS if (done.poses or done.stopped) and not done.failed else Outcome.INCOMPLETE
     lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
-    return print_result(args, content, *lines, outcome=outcome, following=["record", args.port, "take.rec"])
+    stations = args.stations if "=" in (args.stations or "") else ",".join(playback.scenario.stations)
+    following = ["record", args.port, "take.rec", "--stations", stations, *repeat_flags(args, "rate", *LINE_FLAGS)]
+    return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, mocap_words, print_result
+from harness.commands.common import Verbs, add_verb, print_result, repeat_flags
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -32,12 +32,10 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .mvnx, .npz and .c3d files."
         )
-    return print_result(
-        args,
-        {"clips": [entry.as_dict() for entry in entries]},
-        *(entry.line() for entry in entries),
-        following=["run", "boxing", *mocap_words(args.mocap)],
-    )
+    shown = next((entry.name for entry in entries if entry.format != "c3d"), None)  # a C3D file has markers only
+    following = [] if shown is None else ["view", shown, *repeat_flags(args, "mocap")]
+    content = {"clips": [entry.as_dict() for entry in entries]}
+    return print_result(args, content, *(entry.line() for entry in entries), following=following)
 
 
 def run_mocap_fetch(args: argparse.Namespace) -> Outcome:

@@ -4,7 +4,7 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, repeat_flags
 from harness.errors import Outcome
 
 _CAPTION_WIDTH = 100
@@ -50,7 +50,11 @@ def run_plot(args: argparse.Namespace) -> Outcome:
         args.run, args.kind, selection, fmt=args.format, width_mm=args.width, out=args.out, force=args.force
     )
     content = {**vars(figure), "path": str(figure.path)}
-    following = ["table", args.run, "--format", "latex"] if figure.kind != "placement" else ()
+    following: list[object] = []
+    if figure.kind != "placement":
+        metrics = ["--metrics", args.metric] if args.metric else []
+        flags = repeat_flags(args, "methods", "condition")
+        following = ["table", args.run, "--format", "latex", *metrics, *flags]
     size = f"{figure.width_mm:.0f} x {figure.height_mm:.0f} mm"
     caption = textwrap.fill(f"caption: {figure.caption}", _CAPTION_WIDTH)
     return print_result(args, content, f"figure: {figure.path} ({size})", caption, following=following)

@@ -7,7 +7,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, parse_names, print_result, print_status, repeat_flags
 from harness.commands.ending import print_data
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -29,6 +29,8 @@ def add_replay(verbs: Verbs) -> None:
     verb.add_argument("--methods", metavar="A,B", help=text)
     text = "scenario that was played, if the recording does not name it"
     verb.add_argument("--scenario", metavar="NAME", help=text)
+    text = "names of the recorded stations, in their order (default: the recording's, or the scenario's first ones)"
+    verb.add_argument("--stations", metavar="A,B", help=text)
     verb.add_argument("--clip", metavar="CLIP", help="clip that was played (default: the scenario's first)")
     verb.add_argument("--noise", metavar="PRESET", help="noise preset that was played (default: the scenario's)")
     text = "frames per second that were played (default: the scenario's)"
@@ -47,8 +49,8 @@ def run_replay(args: argparse.Namespace) -> Outcome:
     stream = RecordingStream(recording, speed)
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
-    scoring = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
-    if any(value is not None for value in scoring):
+    scoring = ("methods", "scenario", "stations", "clip", "noise", "rate", "seed", "calibration")
+    if any(getattr(args, name) is not None for name in scoring):
         return _score_methods(args, stream)
     return _print_frames(args, stream)
 
@@ -89,8 +91,9 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
     if args.frames and not args.json:  # the frames are the data
         print(*lines, sep="\n", file=sys.stderr)
         return Outcome.PASS
-    scenario = [] if "scenario" in recording.note else ["--scenario", "demo"]
-    following = ["replay", args.file, *scenario, "--methods", "ik,expert_map"]
+    following = ["view", args.file]  # what was played is not known, so methods have no body and no mounts
+    if "scenario" in recording.note:
+        following = ["replay", args.file, "--methods", "ik,expert_map", *repeat_flags(args, "mocap")]
     return print_result(args, content, *lines, following=following)
 
 
@@ -111,6 +114,7 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
 
     options = {
         "scenario": args.scenario,
+        "names": None if args.stations is None else parse_names(args.stations),
         "clip": args.clip,
         "rate_hz": args.rate,
         "noise": args.noise,
@@ -118,7 +122,9 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     }
     playback = score_recording.find_playback(stream, **options, folder=args.mocap)
     if args.calibration is not None:
-        playback = playback.with_calibration(read_calibration(args.calibration))
+        kept = read_calibration(args.calibration)
+        named = args.stations is not None or score_recording.has_station_names(stream, playback.scenario)
+        playback = playback.with_calibration(kept, named=named, say=print_status)
     methods = playback.scenario.methods
     if args.methods is not None:
         methods = tuple(

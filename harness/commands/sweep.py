@@ -7,8 +7,8 @@ import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, progress_note
-from harness.commands.isolation_flags import add_isolation_flags, isolation_words, read_isolation
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, repeat_flags
+from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -73,6 +73,5 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:
     """The command that resumes the sweep, also in a folder whose cells were computed elsewhere."""
-    parts = ["harness", "sweep", args.sweep, "--out", str(out), *mocap_words(args.mocap)]
-    parts += isolation_words(args)
-    return shlex.join(parts if args.seed is None else [*parts, "--seed", str(args.seed)])
+    flags = repeat_flags(args, "mocap", "isolate", "time_limit", "memory_limit", "seed")
+    return shlex.join(["harness", "sweep", args.sweep, "--out", str(out), *flags])

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, print_result, repeat_flags
 from harness.errors import Outcome
 
 
@@ -42,4 +42,6 @@ def run_table_verb(args: argparse.Namespace) -> Outcome:
     )
     content = {**asdict(written.table), "file": args.out and str(args.out)}
     line = written.text.removesuffix("\n") if args.out is None else f"table: {args.out}"
-    return print_result(args, content, line, following=["plot", args.run, "--kind", "ranking"])
+    metric = ["--metric", args.metrics.split(",")[0]] if args.metrics else []
+    flags = repeat_flags(args, "methods", "condition")
+    return print_result(args, content, line, following=["plot", args.run, "--kind", "ranking", *metric, *flags])

@@ -137,7 +137,7 @@ def _save_for_page(content: Any, wanted: Mapping[str, Any]) -> Mapping[str, Any]
         number, methods = int(wanted["clip"]), [str(name) for name in wanted["methods"]]
         start_s, end_s = float(wanted["start_s"]), float(wanted["end_s"])
         suffix, errors = f".{wanted['format']}", bool(wanted["errors"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise BadInput("The request names no clip, methods, start, end and format.", "Load the page again.") from error
     if not 0 <= number < len(content.motion.names) or suffix not in MOVIE_SUFFIXES:
         raise BadInput("The request names no clip or format of this page.", "Load the page again.")

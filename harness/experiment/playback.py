@@ -3,7 +3,7 @@
 It plays a clip, or the calibration poses of the performer.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -67,12 +67,21 @@ class Playback:
         """Calibration of trackers and room that methods receive."""
         return self.performer_calibration.calibration
 
-    def with_calibration(self, kept: CalibrationFile) -> "Playback":
-        """A copy of the playback with a stored calibration; BadInput when it lacks one of the stations.
+    def with_calibration(
+        self, kept: CalibrationFile, *, named: bool = False, say: Callable[[str], None] = lambda line: None
+    ) -> "Playback":
+        """A copy of the playback with a stored calibration. If it has no skeleton, the body is the scenario's.
 
-        If it has no skeleton, the body is the scenario's.
+        BadInput when it lacks one of the stations, and when it has others that are not worn, unless the user or the
+        device named the stations (`named`). `say` receives both lists where they differ.
         """
-        chosen = kept.select(tuple(self.scenario.stations))
+        stations = tuple(self.scenario.stations)
+        chosen = kept.select(stations)
+        if difference := kept.difference(stations):
+            if not named and len(stations) < len(kept.calibration.stations):
+                advice = f"Name what is worn, such as --stations {','.join(kept.calibration.stations)}."
+                raise BadInput(f"{difference[0].upper()}{difference[1:]}.", advice)
+            say(difference)
         body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
         calibrated = PerformerCalibration(chosen.calibration, body, {})
         return Playback(self.clip_evaluation.with_calibration(calibrated), posing=self.posing)

@@ -24,7 +24,7 @@ from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_run import lag_and_sigma
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
@@ -76,6 +76,7 @@ def find_playback(
     stream: RecordingStream,
     *,
     scenario: str | None = None,
+    names: Sequence[str] | None = None,
     clip: str | None = None,
     rate_hz: float | None = None,
     noise: str | None = None,
@@ -84,8 +85,8 @@ def find_playback(
 ) -> Playback:
     """The playback that a recording was made of.
 
-    Values given here take precedence over the recording's note, and that over what the driver read. BadInput when
-    nothing names the scenario; UnknownName and BadFile as for a run of it.
+    Values given here take precedence over the recording's note, and that over what the driver read. `names` are those
+    of the recorded stations. BadInput when nothing names the scenario; UnknownName and BadFile as for a run of it.
     """
     note = checked_note(stream) if scenario is None else {}
     played = scenario or note.get("scenario")
@@ -95,17 +96,12 @@ def find_playback(
             "Only motion of a scenario has a truth: name it with --scenario, and --clip where it is not the first.",
         )
     shipped = load_scenario(played)
-    stations: int | Sequence[str] = stream.stations
-    if not set(stream.stations) & set(shipped.worn_stations) and set("".join(stream.stations).encode()) <= set(
-        STATION_CHARACTERS
-    ):
-        stations = len(stream.stations)  # the driver knew no names: the first stations were played
     read_hz = stream.wire.rate_hz
     measured = abs(read_hz / shipped.tracker.rate_hz - 1.0) < RATE_TOLERANCE
     return prepare_playback(
         played,
         clip=clip or note.get("clip"),
-        stations=stations,
+        stations=name_recorded_stations(stream, played, names),
         rate_hz=rate_hz or note.get("rate_hz") or (None if measured else read_hz),
         noise=noise or note.get("noise"),
         seed=seed if seed is not None else note.get("seed"),
@@ -143,10 +139,13 @@ def name_recorded_stations(
                 "Name each of them, in this order.",
             )
         return tuple(select_stations(known, names))
-    unnamed = set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
-    if unnamed and not set(stream.stations) & set(known.worn_stations):
-        return tuple(select_stations(known, count))
-    return tuple(select_stations(known, stream.stations))
+    return tuple(select_stations(known, stream.stations if has_station_names(stream, known) else count))
+
+
+def has_station_names(stream: RecordingStream, scenario: Scenario) -> bool:
+    """Whether a recording names its stations, and not only by the device's characters."""
+    named = not set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
+    return named or bool(set(stream.stations) & set(scenario.worn_stations))
 
 
 @dataclass(frozen=True, eq=False)

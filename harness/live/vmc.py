@@ -8,13 +8,13 @@ import socket
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
+from harness.core.network import resolve_host
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra
 from harness.live.pose import LivePose
@@ -40,9 +40,8 @@ class VmcOutput:
         self.name, self.description = f"--vmc {host}:{port}", f"VMC protocol: to UDP port {port} of {host}"
         self._pose = UnityPose(skeleton)
         self._datagrams = _VmcDatagrams(self._pose.names)
-        self._receiver: Any
         try:
-            family, _, _, _, self._receiver = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            family, self._receiver = resolve_host(host, port, socket.SOCK_DGRAM)[0]
         except (OSError, UnicodeError) as error:
             raise BadInput(f"--vmc {address}: no such host ({error}).", "Give HOST:PORT.") from error
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
@@ -116,7 +115,7 @@ def _bundle(messages: Sequence[bytes]) -> tuple[NDArray[np.uint8], NDArray[np.in
 def parse_address(text: str) -> tuple[str, int]:
     """Host and port of HOST:PORT, or of a port of this computer; BadInput for another text."""
     host, _, port = text.rpartition(":")
-    if not (port.isascii() and port.isdecimal()) or not 0 < int(port) < 65536:
+    if not (port.isascii() and port.isdecimal() and len(port) <= 5) or not 0 < int(port) < 65536:
         raise BadInput(
             f"--vmc {text} is not an address.", "Give HOST:PORT, such as 127.0.0.1:39539, where receivers listen."
         )

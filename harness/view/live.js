@@ -94,15 +94,31 @@
     MotionCamera.control(stage, camera, redraw, () => camera.reset(heading || 0));
     new ResizeObserver(redraw).observe(stage);
     find("record").addEventListener("click", record);
-    const events = new EventSource("/events");
-    events.addEventListener("frame", (event) => {
-      frame = JSON.parse(event.data);
-      if (heading === null) camera.reset(heading = 0);
-      redraw();
-    });
-    events.addEventListener("status", (event) => showStatus(JSON.parse(event.data)));
-    events.addEventListener("error", () => { find("alarm").textContent = "the session has ended"; });
+    follow();
     root.dataset.ready = "yes";
+  }
+
+  // Asks for news again and again. A browser has six connections for all tabs of a host: no tab keeps one, and a hidden tab asks for nothing.
+  async function follow() {
+    for (let last = 0; ; ) {
+      if (document.hidden) await new Promise((resolve) => document.addEventListener("visibilitychange", resolve, { once: true }));
+      try {
+        const answer = await fetch(`/events?after=${last}`);
+        if (!answer.ok) throw new Error(await answer.text());
+        const news = await answer.json();
+        last = news.last;
+        for (const [kind, content] of news.messages) (kind === "frame" ? showFrame : showStatus)(content);
+      } catch {
+        find("alarm").textContent = "the session has ended";
+        await new Promise((resolve) => setTimeout(resolve, 1000));
+      }
+    }
+  }
+
+  function showFrame(newest) {
+    frame = newest;
+    if (heading === null) camera.reset(heading = 0);
+    redraw();
   }
   begin();
 })();

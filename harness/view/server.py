@@ -1,19 +1,21 @@
-"""A small web server on the loopback interface: fixed pages, a stream of events, and commands.
+"""A small web server on the loopback interface: fixed pages, the newest events, and commands.
 
 It answers requests that name itself as their host, so that a page of another site cannot reach it under another name.
 Addresses are looked up among those of its content; it opens no file. Commands need a token that its own page knows.
+Pages ask for events again and again. A browser has six connections for all its tabs, and no tab may keep one.
 """
 
 import json
 import secrets
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
-from urllib.parse import urlsplit
 
+from harness.core.parsing import parse_json
 from harness.errors import HarnessError, shorten
 
 EVENTS_PATH, COMMAND_PATH = "/events", "/command/"
@@ -25,8 +27,10 @@ _CONTENT_SECURITY_POLICY = (
 _MAX_COMMAND_BYTES = 65536
 _REQUEST_TIMEOUT_S = 30.0
 _SHUTDOWN_POLL_S = 0.05
-_HEARTBEAT_S = 2.0
-"""Longest time between two lines of an event stream, so that a closed connection is noticed [s]."""
+_NEWS_WAIT_S = 0.2
+"""Longest wait for a message that a page asks for [s] [choice]; other tabs wait for its connection meanwhile."""
+_MAX_THREADS = 128
+"""Threads of the process with which further connections are closed at once [choice]."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +95,7 @@ class ViewServer:
         self.token = token or secrets.token_urlsafe(24)
         handler = type("ViewHandler", (_RequestHandler,), {"view": self})
         self._lookup, self._commands = lookup, dict(commands or {})
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-        self._server.daemon_threads = True
+        self._server = _HttpServer(("127.0.0.1", 0), handler)
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(_SHUTDOWN_POLL_S,), name="view server", daemon=True
         )
@@ -129,6 +132,20 @@ class ViewServer:
         self._thread.join()
 
 
+class _HttpServer(ThreadingHTTPServer):
+    """A thread for each connection, as long as there are few. Its errors are one line."""
+
+    daemon_threads = True
+    request_queue_size = 64
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        return threading.active_count() < _MAX_THREADS
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        error = sys.exception()
+        print(f"harness: the page's server: {type(error).__name__}: {shorten(str(error))}", file=sys.stderr)
+
+
 class _RequestHandler(BaseHTTPRequestHandler):
     """Answers one connection; `view` is the server that it belongs to."""
 
@@ -138,20 +155,21 @@ class _RequestHandler(BaseHTTPRequestHandler):
     timeout = _REQUEST_TIMEOUT_S
 
     def do_GET(self) -> None:
-        path = urlsplit(self.path).path
+        path, _, query = self.path.partition("?")
+        if self._has_body():  # it is not read
+            self.close_connection = True
         if not self._is_own_host():
             self._refuse(HTTPStatus.FORBIDDEN, "this server answers to its own name only")
         elif path == EVENTS_PATH:
-            self._send_events()
+            self._answer(lambda: self._news(query.removeprefix("after=")))
         else:
             self._answer(lambda: self.view.find(path))
 
     def do_POST(self) -> None:
-        path = urlsplit(self.path).path
+        path = self.path.partition("?")[0]
         command = self.view.command(path.removeprefix(COMMAND_PATH)) if path.startswith(COMMAND_PATH) else None
-        length = self.headers.get("Content-Length", "")
-        size = int(length) if length.isascii() and length.isdecimal() else -1
-        self.close_connection = not 0 <= size <= _MAX_COMMAND_BYTES  # its body is not read
+        size = -1 if "Transfer-Encoding" in self.headers else _parse_size(self.headers.get("Content-Length", ""))
+        self.close_connection |= not 0 <= size <= _MAX_COMMAND_BYTES  # its body is not read
         token = self.headers.get(COMMAND_HEADER, "")
         if not self._is_own_host():
             self._refuse(HTTPStatus.FORBIDDEN, "this server answers to its own name only")
@@ -159,14 +177,14 @@ class _RequestHandler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.FORBIDDEN, "the token is missing or wrong")
         elif command is None:
             self._refuse(HTTPStatus.NOT_FOUND, "there is no such command")
-        elif self.close_connection:
+        elif not 0 <= size <= _MAX_COMMAND_BYTES:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "a command has a body of known length, up to 64 kB")
         else:
             self._answer(lambda: self._run(command, self.rfile.read(size)))
 
     def _run(self, command: Command, body: bytes) -> Resource:
         try:
-            content = json.loads(body)
+            content = parse_json(body.decode())
         except ValueError:
             content = None
         if not isinstance(content, dict):
@@ -217,23 +235,17 @@ class _RequestHandler(BaseHTTPRequestHandler):
         ):
             self.send_header(name, value)
 
-    def _send_events(self) -> None:
-        """Send messages as server-sent events until the page or the server is closed."""
-        self.close_connection = True
-        self.send_response(HTTPStatus.OK)
-        self._send_safety_headers()
-        self.send_header("Content-Type", "text/event-stream")
-        self.send_header("Connection", "close")
-        self.end_headers()
-        seen = 0
-        while (news := self.view.board.wait(seen, _HEARTBEAT_S)) is not None:
-            seen, messages = news
-            lines = [f"event: {kind}\ndata: {text}\n\n" for kind, text in messages] or [":\n\n"]
-            try:
-                self.wfile.write("".join(lines).encode())
-                self.wfile.flush()
-            except OSError:  # the page was closed, or does not read for 30 s
-                return
+    def _news(self, seen: str) -> Resource:
+        """The messages after a number as JSON: a list of kind and content each, and the number to ask for next."""
+        news = self.view.board.wait(max(_parse_size(seen), 0), _NEWS_WAIT_S)
+        if news is None:
+            raise HarnessError("The session has ended.")
+        last, messages = news
+        texts = [f"[{json.dumps(kind)},{text}]" for kind, text in messages]
+        return Resource("application/json", f'{{"last":{last},"messages":[{",".join(texts)}]}}'.encode())
+
+    def _has_body(self) -> bool:
+        return "Transfer-Encoding" in self.headers or self.headers.get("Content-Length", "0") != "0"
 
     def handle_one_request(self) -> None:
         try:
@@ -243,6 +255,11 @@ class _RequestHandler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: stderr is for the user of the program."""
+
+
+def _parse_size(text: str) -> int:
+    """A whole number of at most nine digits; -1 for another text."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else -1
 
 
 class _BadRequest(Exception):

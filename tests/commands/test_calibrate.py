@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 import signal
 import subprocess
 import sys
@@ -181,6 +182,27 @@ def test_a_tpose_of_a_tracker_that_streams(model: Playback, tmp_path: Path) -> N
     turned_rad = rotations.angle_between_rad(kept.calibration.bone_from_station, truth.bone_from_station)
     assert np.rad2deg(turned_rad).max() < 25.0  # hinges missed by 2.5 deg, six or seven of them in a row
     assert np.linalg.norm(kept.calibration.mount_m - truth.mount_m, axis=1).max() < 0.06
+
+
+@pytest.mark.long
+def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`--stations 6` was left out, so that the printed command wore four of the six."""
+    model, out = prepare_playback("demo", clip=CLIP, stations=6, posing=True), tmp_path / "my calibration.toml"
+    with serve_emulator(model.samples, pty=tmp_path / "a port") as device:
+        words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose", "--stations", "6"]
+        assert main(["calibrate", "--live", *words, "--out", str(out)]) == 0
+        (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("next: ")]
+        program, *following = shlex.split(line.removeprefix("next: "))
+        assert program == "harness"
+        assert main([*following, "--method", "ik", "--seconds", "1", "--json"]) == 0
+        said = capsys.readouterr()
+        content = json.loads(said.out)
+        assert content["stations"] == list(model.calibration.stations)
+        words = shlex.split(content["next"])[1:]
+        assert words == ["record", device.name, "take.rec", "--stations", ",".join(content["stations"])]
+        forgotten = [word for word in following if word not in ("--stations", "6")]
+        assert main([*forgotten, "--method", "ik", "--seconds", "1"]) == 2
+        assert f"worn are {', '.join(model.calibration.stations[:4])}." in capsys.readouterr().err
 
 
 def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:

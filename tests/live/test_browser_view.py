@@ -51,15 +51,12 @@ def connect(output: BrowserOutput) -> http.client.HTTPConnection:
 def newest(output: BrowserOutput, kind: str) -> dict[str, Any]:
     """The first event of a kind that the page gets."""
     connection = connect(output)
-    connection.request("GET", "/events")
-    answer, found = connection.getresponse(), ""
     while True:
-        line = answer.fp.readline().decode().strip()
-        if line.startswith("event: "):
-            found = line.removeprefix("event: ")
-        elif line.startswith("data: ") and found == kind:
+        connection.request("GET", "/events")
+        found: dict[str, Any] = dict(json.loads(connection.getresponse().read())["messages"])
+        if kind in found:
             connection.close()
-            content: dict[str, Any] = json.loads(line.removeprefix("data: "))
+            content: dict[str, Any] = found[kind]
             return content
 
 

@@ -1,19 +1,23 @@
 """The VMC output: a receiver reconstructs the pose that was sent."""
 
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
 
 from harness.body import humanoid
+from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
+from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
+from harness.live.pose import LivePose
 from harness.live.unity import HIPS, UNITY_BONES, UnityPose
 from harness.live.vmc import VmcOutput, parse_address
+from harness.mocap.sources import SyntheticSource
 from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose
 
@@ -64,23 +68,75 @@ def rebuilt(messages: list[Message]) -> dict[str, tuple[Floats, Floats]]:
     }
 
 
-def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator) -> None:
-    skeleton = humanoid.build_body().skeleton
-    with receiver() as ours:
-        output = VmcOutput(f"127.0.0.1:{ours.getsockname()[1]}", skeleton)
-        try:
-            for _ in range(20):
-                pose = live_pose(configuration(rng))
-                output.send(pose)
-                found = rebuilt(received(ours, 2))
-                far_end = joint_centres_m(skeleton, pose.estimate.qpos[None])[0, 1:]
-                for name, (bone, _) in UNITY_BONES.items():
-                    parent = skeleton.parents[skeleton.index(bone)]
-                    start_m = pose.root_m if parent < 0 else far_end[parent]
-                    np.testing.assert_allclose(found[name][0], start_m, atol=1e-4)
-                np.testing.assert_allclose(found[HIPS][0], pose.root_m, atol=1e-4)
-        finally:
-            output.close()
+@pytest.fixture(scope="module")
+def real_poses() -> tuple[Body, list[Floats]]:
+    """Poses of clips of the built-in performer, on the performer's own body."""
+    body, poses = None, list[Floats]()
+    for clip in ("walking_p1_01", "boxing_p1_01", "golf_p1_01"):
+        body, motion = retarget_to_own_body(SyntheticSource(1).load(clip))
+        poses += list(motion.qpos[:: len(motion.qpos) // 20])
+    assert body is not None
+    return body, poses
+
+
+def sent(body: Body, poses: Sequence[Floats]) -> Iterator[tuple[LivePose, list[Message]]]:
+    """Each pose and the messages that a receiver gets."""
+    kinematics = Kinematics(body)
+    with receiver() as ours, closing(VmcOutput(f"127.0.0.1:{ours.getsockname()[1]}", body.skeleton)) as output:
+        for qpos in poses:
+            pose = live_pose(qpos, kinematics=kinematics)
+            output.send(pose)
+            yield pose, received(ours, 2)
+
+
+def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator, real_poses: tuple[Body, list[Floats]]) -> None:
+    """A bent neck is shorter than its one bone in Unity; the head lies in its direction, and turns as ours."""
+    body, poses = real_poses
+    skeleton = body.skeleton
+    lower, upper = (skeleton.bone_m[skeleton.index(name)] for name in ("lowerneck", "upperneck"))
+    for pose, messages in sent(body, [*poses, *(configuration(rng) for _ in range(20))]):
+        found = rebuilt(messages)
+        far_end = joint_centres_m(skeleton, pose.estimate.qpos[None])[0, 1:]
+        for name, (bone, _) in UNITY_BONES.items():
+            parent = skeleton.parents[skeleton.index(bone)]
+            start_m = pose.root_m if parent < 0 else far_end[parent]
+            if name == "Head":
+                neck_m = start_m - found["Neck"][0]
+                start_m = found["Neck"][0] + neck_m / np.linalg.norm(neck_m) * np.linalg.norm(lower + upper)
+            np.testing.assert_allclose(found[name][0], start_m, atol=1e-4)
+        np.testing.assert_allclose(found[HIPS][0], pose.root_m, atol=1e-4)
+        turned = rotations.multiply(found["Head"][1], rest_orientation(body, "head"))
+        assert rotations.angle_between_rad(turned, pose.bones[1][skeleton.index("head")]) < 1e-3
+
+
+def rest_orientation(body: Body, bone: str) -> Floats:
+    """`world_from_bone` (4,) in the T-pose."""
+    pose = live_pose(humanoid.tpose(body.skeleton), kinematics=Kinematics(body))
+    out: Floats = pose.bones[1][body.skeleton.index(bone)]
+    return out
+
+
+def test_bones_keep_their_distances(rng: np.random.Generator, real_poses: tuple[Body, list[Floats]]) -> None:
+    """The head's position moved by up to 28 mm, as the upper neck bent, and receivers stretched the neck."""
+    body, poses = real_poses
+    fixed = []
+    for _, messages in sent(body, [*poses, *(configuration(rng) for _ in range(20))]):
+        local = {str(values[0]): values[1:4] for address, values in messages if address == "/VMC/Ext/Bone/Pos"}
+        fixed.append([at_m for name, at_m in local.items() if name != HIPS])
+    assert np.ptp(np.array(fixed, float), axis=0).max() == 0.0
+
+
+def test_the_neck_turns_as_both_of_its_bones() -> None:
+    """A twist of the two bones about the neck by 20 and 40 deg is one of 30 deg below the head, which turned by 40."""
+    body = humanoid.build_body()
+    qpos = np.array(humanoid.tpose(body.skeleton))
+    for bone, angle_deg in (("lowerneck", 20.0), ("upperneck", 20.0)):
+        qpos[int(body.model.joint(f"{bone}.ry").qposadr[0])] = np.deg2rad(angle_deg)
+    unity = UnityPose(body.skeleton)
+    local = dict(zip(unity.names, unity.local(live_pose(qpos, kinematics=Kinematics(body))), strict=True))
+    turn_deg = {name: 2.0 * np.rad2deg(np.arccos(min(abs(local[name][6]), 1.0))) for name in ("Neck", "Head")}
+    assert turn_deg["Neck"] == pytest.approx(30.0, abs=1.0)
+    assert turn_deg["Head"] == pytest.approx(10.0, abs=1.0)
 
 
 def test_the_messages_are_those_of_the_protocol(rng: np.random.Generator) -> None:

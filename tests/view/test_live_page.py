@@ -1,6 +1,7 @@
 """The live page in a browser: it draws frames, lists stations, reports silence, and starts a recording."""
 
 from collections.abc import Mapping
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -79,3 +80,35 @@ def test_the_page_follows_the_session(browser: Any) -> None:
     tab.wait_for_function("() => document.getElementById('alarm').textContent === 'the session has ended'")
     tab.close()
     assert not errors
+
+
+def test_any_number_of_tabs_follow_the_session(browser: Any) -> None:
+    """A browser opens six connections to a host. The seventh tab never loaded, since each kept one."""
+    content = LiveContent("a session", SKELETON, ("head", "torso"), "token")
+    with ViewServer(content.find, token="token") as server, closing(browser.new_context()) as tabs:  # noqa: S106
+        server.publish("frame", frame(1))
+        opened = [tabs.new_page() for _ in range(9)]
+        for tab in opened:
+            tab.goto(server.url)
+            tab.wait_for_selector("#player[data-drawn='1']", timeout=30_000)
+        server.publish("frame", frame(2))
+        server.publish("status", status(0.0))
+        for tab in opened:
+            tab.wait_for_selector("#player[data-drawn='2']", timeout=30_000)
+            tab.wait_for_selector("#player[data-status='3']", timeout=30_000)
+
+
+def test_a_hidden_tab_asks_for_nothing_until_it_is_shown(browser: Any) -> None:
+    content = LiveContent("a session", SKELETON, ("head", "torso"), "token")
+    with ViewServer(content.find, token="token") as server, closing(browser.new_page()) as tab:  # noqa: S106
+        hide = "Object.defineProperty(document, 'hidden', { configurable: true, get: () => window.away })"
+        tab.add_init_script(f"window.away = true; {hide}")
+        asked: list[str] = []
+        tab.on("request", lambda request: asked.append(request.url))
+        server.publish("frame", frame(1))
+        tab.goto(server.url)
+        tab.wait_for_selector("#player[data-ready]")
+        tab.wait_for_timeout(500)
+        assert not [url for url in asked if "/events" in url]
+        tab.evaluate("window.away = false; document.dispatchEvent(new Event('visibilitychange'))")
+        tab.wait_for_selector("#player[data-drawn='1']", timeout=30_000)

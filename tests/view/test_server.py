@@ -1,5 +1,6 @@
 """The viewer's server: its own host alone, its own addresses alone, commands with a token, the newest events."""
 
+import contextlib
 import http.client
 import json
 import socket
@@ -8,6 +9,7 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import pytest
 
 from harness.errors import BadInput
@@ -102,13 +104,23 @@ def test_a_command_needs_the_token(server: ViewServer) -> None:
 
 @pytest.mark.parametrize(
     ("name", "body", "status"),
-    [("treble", "{}", 404), ("double", "{", 400), ("double", "[1]", 400), ("double", "{}", 422), ("", "{}", 404)],
+    [
+        ("treble", "{}", 404),
+        ("double", "{", 400),
+        ("double", "[1]", 400),
+        ("double", "{}", 422),
+        ("", "{}", 404),
+        ("double", "[" * 60_000, 400),
+        ("double", '{"n":' * 10_000 + "1" + "}" * 10_000, 400),
+        ("double", '{"n": ' + "9" * 5000 + "}", 400),
+        ("double", '{"n": "\\ud800"}', 400),
+    ],
 )
 def test_commands_that_make_no_sense_are_refused(server: ViewServer, name: str, body: str, status: int) -> None:
     assert command(server, name, body)[0] == status
 
 
-@pytest.mark.parametrize("length", ["", "-1", "65537", "1e3", "²"])
+@pytest.mark.parametrize("length", ["", "-1", "65537", "1e3", "²", "9" * 4400])
 def test_a_body_of_no_or_too_great_length_is_refused(server: ViewServer, length: str) -> None:
     headers = {COMMAND_HEADER: server.token, "Content-Length": length.encode().decode("latin-1")}
     assert ask(server, "/command/double", "POST", "{}", **headers)[0] == 413
@@ -118,52 +130,51 @@ def test_other_methods_are_refused(server: ViewServer) -> None:
     assert ask(server, "/", "PUT", "x")[0] == 501
 
 
-def read_events(server: ViewServer, count: int) -> list[tuple[str, dict[str, Any]]]:
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
-    connection.request("GET", "/events")
-    answer = connection.getresponse()
-    assert answer.getheader("Content-Type") == "text/event-stream"
-    found: list[tuple[str, dict[str, Any]]] = []
-    kind = ""
-    while len(found) < count:
-        line = answer.fp.readline().decode().strip()
-        if line.startswith("event: "):
-            kind = line.removeprefix("event: ")
-        elif line.startswith("data: "):
-            found.append((kind, json.loads(line.removeprefix("data: "))))
-    connection.close()
-    return found
+def news(server: ViewServer, after: object = 0) -> tuple[int, dict[str, dict[str, Any]]]:
+    status, body, headers = ask(server, f"/events?after={after}")
+    assert (status, headers["Content-Type"]) == (200, "application/json")
+    content = json.loads(body)
+    return content["last"], dict(content["messages"])
 
 
 def test_a_page_gets_the_newest_message_of_each_kind(server: ViewServer) -> None:
     for number in range(5):
         server.publish("frame", {"n": number})
     server.publish("status", {"rate": 40})
-    assert read_events(server, 2) == [("frame", {"n": 4}), ("status", {"rate": 40})]
+    assert news(server) == (6, {"frame": {"n": 4}, "status": {"rate": 40}})
+    assert news(server, 5) == (6, {"status": {"rate": 40}})
+    for nonsense in ("", "x", "-1", "9" * 5000, "1e3", "%00"):
+        assert news(server, nonsense) == news(server)
 
 
 def test_messages_arrive_while_a_page_waits(server: ViewServer) -> None:
-    found: list[tuple[str, dict[str, Any]]] = []
-    reader = threading.Thread(target=lambda: found.extend(read_events(server, 2)))
+    found: list[tuple[int, dict[str, dict[str, Any]]]] = []
     server.publish("frame", {"n": 1})
+    reader = threading.Thread(target=lambda: found.append(news(server, 1)))
     reader.start()
-    time.sleep(0.3)
+    time.sleep(0.05)
     server.publish("frame", {"n": 2})
     reader.join(10)
-    assert found == [("frame", {"n": 1}), ("frame", {"n": 2})]
+    assert found == [(2, {"frame": {"n": 2}})]
+
+
+def test_a_page_without_news_keeps_no_connection_for_long(server: ViewServer) -> None:
+    """Six connections are all that a browser opens: streams of events took them, and a seventh tab never loaded."""
+    server.publish("frame", {"n": 1})
+    began = time.monotonic()
+    assert news(server, 1) == (1, {})
+    assert time.monotonic() - began < 1.0
 
 
 def test_a_page_that_does_not_read_delays_nobody(server: ViewServer) -> None:
-    """It fills its connection with messages of 100 kB and reads none of them."""
+    """It asks for messages of 100 kB and reads none of them."""
     with socket.create_connection(("127.0.0.1", server.port)) as silent:
-        silent.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
-        time.sleep(0.2)
+        silent.sendall(200 * f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
         began = time.monotonic()
         for number in range(200):
             server.publish("frame", {"n": number, "text": "x" * 100_000})
         assert time.monotonic() - began < 2.0
-        ((_, newest),) = read_events(server, 1)
-        assert newest["n"] == 199
+        assert news(server)[1]["frame"]["n"] == 199
 
 
 def test_closing_ends_readers_and_the_port(server: ViewServer) -> None:
@@ -182,3 +193,112 @@ def test_closing_ends_readers_and_the_port(server: ViewServer) -> None:
 
 def test_waiting_without_news_ends_after_the_time() -> None:
     assert EventBoard().wait(0, 0.01) == (0, [])
+
+
+def answers_of(server: ViewServer, data: bytes, *, half_closed: bool) -> bytes:
+    """What the server answers to these bytes until it closes the connection, or for a tenth of a second."""
+    answer = b""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as client, contextlib.suppress(OSError):
+        client.sendall(data)
+        if half_closed:
+            client.shutdown(socket.SHUT_WR)
+        else:
+            client.settimeout(0.02)
+        while more := client.recv(65536):
+            answer += more
+    return answer
+
+
+BAD_REQUESTS = [
+    b"",
+    b"\0",
+    b"\r\n\r\n",
+    b"GET",
+    b"GET /\r\n\r\n",
+    b"GET / HTTP/1.0\r\n\r\n",
+    b"GET / HTTP/1.1\r\n\r\n",
+    b"GET / HTTP/2.0\r\n\r\n",
+    b"GET / HTTP/1." + b"9" * 5000 + b"\r\n\r\n",
+    b"GET / HTTP/\xb2.1\r\n\r\n",
+    b"GET http://[::1 HTTP/1.1\r\nHost: HOST\r\n\r\n",
+    b"GET //[ HTTP/1.1\r\nHost: HOST\r\n\r\n",
+    b"GET /\xff\xfe?\xff HTTP/1.1\r\nHost: HOST\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: HOST\r\nContent-Length: 5\r\n\r\nGET /",
+    b"GET / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: \xff\xfe\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: HOST\r\nHost: evil\r\n\r\n",
+    b"GET / HTTP/1.1\r\n:\r\n \r\n\t x\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: HOST\r\n" + b"a: b\r\n" * 300 + b"\r\n",
+    b"GET / HTTP/1.1\r\nHost: HOST\r\na: " + b"b" * 100_000 + b"\r\n\r\n",
+    b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n",
+    b"__class__ / HTTP/1.1\r\nHost: HOST\r\n\r\n",
+    b"\xff / HTTP/1.1\r\nHost: HOST\r\n\r\n",
+    b"PUT / HTTP/1.1\r\nHost: HOST\r\nExpect: 100-continue\r\n\r\n",
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nContent-Length: " + b"9" * 4400 + b"\r\n\r\n",
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nContent-Length: -5\r\n\r\n",
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nTOKEN\r\nContent-Length: 60000\r\n\r\n[",
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nTOKEN\r\nContent-Length: 4\r\n\r\n\xff\xfe{}",
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nTOKEN\r\nContent-Length: 60000\r\n\r\n" + b"[" * 60_000,
+    b"POST /command/double HTTP/1.1\r\nHost: HOST\r\nTOKEN\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n\r\n",
+    b"POST http://[::1 HTTP/1.1\r\nHost: HOST\r\nTOKEN\r\nContent-Length: 2\r\n\r\n{}",
+]
+
+
+def damaged(data: bytes, rng: np.random.Generator) -> bytes:
+    """The bytes with some changed, removed or doubled."""
+    out = bytearray(data)
+    for _ in range(int(rng.integers(1, 6))):
+        at = int(rng.integers(0, len(out) + 1))
+        match rng.integers(0, 3):
+            case 0:
+                out[at : at + 1] = rng.integers(0, 256, size=1, dtype=np.uint8).tobytes()
+            case 1:
+                del out[at : at + int(rng.integers(1, 30))]
+            case _:
+                out[at:at] = out[at : at + int(rng.integers(1, 30))]
+    return bytes(out)
+
+
+@pytest.mark.long
+def test_no_bytes_of_a_client_end_the_server_or_print(
+    server: ViewServer, rng: np.random.Generator, capfd: pytest.CaptureFixture[str]
+) -> None:
+    named = [
+        data.replace(b"HOST", f"127.0.0.1:{server.port}".encode()).replace(
+            b"TOKEN", f"{COMMAND_HEADER}: {server.token}".encode()
+        )
+        for data in BAD_REQUESTS
+    ]
+    for data in named:
+        answer = answers_of(server, data, half_closed=True)
+        assert answer == b"" or answer.startswith((b"HTTP/1.1 ", b"<!DOCTYPE", b"this server")), (
+            data[:80],
+            answer[:80],
+        )
+    for number in range(2000):
+        answers_of(server, damaged(named[number % len(named)], rng), half_closed=number % 20 > 0)
+    assert ask(server, "/")[:2] == (200, b"<p>hello")
+    assert command(server, "double", '{"n": 21}') == (200, b'{"n": 42}')
+    said = capfd.readouterr()
+    assert (said.out, said.err) == ("", "")
+
+
+def test_many_silent_clients_end_nothing(server: ViewServer, capfd: pytest.CaptureFixture[str]) -> None:
+    with contextlib.ExitStack() as opened:
+        for _ in range(200):
+            client = opened.enter_context(socket.create_connection(("127.0.0.1", server.port), timeout=5))
+            client.sendall(b"GET / HT")
+        time.sleep(0.2)
+        assert threading.active_count() < 150
+    time.sleep(0.2)
+    assert ask(server, "/")[0] == 200
+    assert capfd.readouterr().err == ""
+
+
+def test_a_defect_of_a_page_is_one_line(capfd: pytest.CaptureFixture[str]) -> None:
+    with ViewServer(lambda path: PAGES[path]) as broken:
+        with pytest.raises((http.client.HTTPException, OSError)):
+            ask(broken, "/nothing")
+        assert ask(broken, "/")[0] == 200
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line == "harness: the page's server: KeyError: '/nothing'"

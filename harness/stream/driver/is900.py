@@ -112,8 +112,9 @@ class Is900:
 
     @property
     def station_list(self) -> str:
-        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
-        return ", ".join(f"{c} {name}" for c, name in zip(self._stations.characters, self.stations, strict=True))
+        """Characters of the device's stations, with their names: `1 torso, 3 head`; and the active ones not read."""
+        read = ", ".join(f"{c} {name}" for c, name in zip(self._stations.characters, self.stations, strict=True))
+        return f"{read}; not read: {', '.join(self._stations.others)}" if self._stations.others else read
 
     @property
     def setup_note(self) -> str:

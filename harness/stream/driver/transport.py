@@ -18,6 +18,7 @@ from typing import Protocol
 
 import serial
 
+from harness.core.network import resolve_host
 from harness.errors import HarnessError
 from harness.stream.codec.datagram import DATAGRAM_START
 from harness.stream.driver.transport_errors import (
@@ -235,12 +236,28 @@ class _TcpTransport(SelectTransport):
 
     def __init__(self, name: str, address: tuple[str, int]) -> None:
         try:
-            self._socket = socket.create_connection(address, CONNECT_TIMEOUT_S)
+            self._socket = self._connect(*address)
         except (OSError, UnicodeError) as error:
             raise tcp_connection_error(name, address, error) from error
         super().__init__(name, self._socket.fileno())
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.settimeout(WRITE_TIMEOUT_S)
+
+    @staticmethod
+    def _connect(host: str, port: int) -> socket.socket:
+        """A connection to the first address of the host that answers; OSError of the first one if none does."""
+        errors = []
+        for family, resolved in resolve_host(host, port, socket.SOCK_STREAM):
+            opened = socket.socket(family, socket.SOCK_STREAM)
+            opened.settimeout(CONNECT_TIMEOUT_S)
+            try:
+                opened.connect(resolved)
+            except OSError as error:
+                opened.close()
+                errors.append(error)
+            else:
+                return opened
+        raise errors[0]
 
     def _take(self) -> bytes:
         data = self._socket.recv(READ_BYTES)
@@ -264,7 +281,7 @@ class _UdpTransport(SelectTransport):
 
     def __init__(self, name: str, address: tuple[str, int]) -> None:
         try:
-            (family, _, _, _, resolved), *_ = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)
+            family, resolved = resolve_host(*address, socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
             raise udp_port_error(name, address, error) from error

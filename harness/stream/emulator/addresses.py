@@ -9,7 +9,7 @@ def parse_address(text: str, default_host: str = "") -> tuple[str, int]:
     """Split `HOST:PORT`, or `PORT` where there is a default host. Raises BadInput."""
     host, _, number = text.rpartition(":")
     host = host or default_host
-    if not host or not (number.isascii() and number.isdecimal()) or int(number) > 65535:
+    if not host or not (number.isascii() and number.isdecimal() and len(number) <= 5) or int(number) > 65535:
         raise BadInput(f"{text!r} is no HOST:PORT.", "An example is 127.0.0.1:5005.")
     return host.strip("[]"), int(number)
 

@@ -4,6 +4,7 @@ import socket
 import time
 from collections.abc import Callable
 
+from harness.core.network import resolve_host
 from harness.errors import BadInput
 from harness.stream.emulator.addresses import check_loopback
 from harness.stream.emulator.tcp_client import MAX_UNREAD_BYTES, TcpClient
@@ -89,9 +90,9 @@ class TcpPort:
             return
         host, port = self._address
         try:
-            family = socket.AF_INET6 if ":" in host else socket.AF_INET
-            self._server = socket.create_server(self._address, family=family, backlog=4)
-        except (OSError, OverflowError) as error:
+            family, resolved = resolve_host(host, port, socket.SOCK_STREAM)[0]
+            self._server = socket.create_server(resolved, family=family, backlog=4)
+        except (OSError, OverflowError, UnicodeError) as error:
             raise BadInput(f"tcp://{host}:{port}: {error}.", "Choose another port; 0 takes a free one.") from error
         self._server.setblocking(False)
         self._address = host, self._server.getsockname()[1]

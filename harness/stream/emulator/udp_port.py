@@ -3,6 +3,8 @@
 import ipaddress
 import socket
 
+from harness.core.network import resolve_host
+from harness.errors import BadInput
 from harness.stream.emulator.addresses import check_loopback, parse_address
 
 LOOPBACK = "127.0.0.1"
@@ -19,18 +21,22 @@ class UdpPort:
     """Sends packets to one host or broadcast address. It never blocks."""
 
     def __init__(self, host: str = LOOPBACK) -> None:
-        self.host = host
+        """Open the socket; BadInput for an unknown host."""
+        try:
+            family, (self.host, _, *self._scope) = resolve_host(host, 0, socket.SOCK_DGRAM)[0]
+        except (OSError, UnicodeError) as error:
+            raise BadInput(f"No host is called {host} ({error}).", "Give [HOST:]PORT.") from error
         self.sent = self.unsent = 0
         """Numbers of packets that were sent, and of those that the operating system did not take."""
-        self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        if not _is_loopback(host):
+        if not ipaddress.ip_address(self.host).is_loopback:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
 
     def send(self, packet: bytes, port: int) -> None:
         """Send a packet; a receiver that is absent or slow does not show."""
         try:
-            self._socket.sendto(packet, (self.host, port))
+            self._socket.sendto(packet, (self.host, port, *self._scope))
             self.sent += 1
         except OSError:
             self.unsent += 1
@@ -38,10 +44,3 @@ class UdpPort:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
