@@ -92,7 +92,8 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
-    RecordingWriter(args.file).close()  # refuses a file that cannot be written before a long simulation
+    plan = _plan_note(args)
+    RecordingWriter(args.file, plan).close()  # refuses a file that cannot be written before a long simulation
     stations = args.stations
     if stations is not None:
         stations = int(stations) if is_whole_number(stations) else parse_names(stations)
@@ -117,7 +118,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         "rate_hz": played.tracker.rate_hz,
         "posing": playback.posing,
         "harness": VERSION,
-        **_plan_note(args),
+        **plan,
     }
     seconds = math.inf if args.seconds is None else args.seconds
     if left_out := unapplied_kinds(played.fault):
@@ -132,9 +133,10 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     """The entry of a recording's note that names the plan it was made for; none without a plan."""
     if args.plan is None:
         return {}
+    from harness.stream.recording.recording import PLAN
     from harness.study.trust.plan import plan_digest
 
-    return {"plan": plan_digest(args.plan)}
+    return {PLAN: plan_digest(args.plan)}
 
 
 def _record_port(args: argparse.Namespace) -> Outcome:

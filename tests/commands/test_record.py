@@ -262,6 +262,11 @@ def test_a_plan_is_named_by_its_digest(
     name = port if source == "port" else "sim:demo"
     assert main(["record", name, str(file), "--seconds", "0.5", "--plan", str(plan)]) == 0
     assert read_recording(file).note["plan"] == plan_digest(plan)
+    before = file.read_bytes()
+    plan.write_text(plan.read_text("utf-8").replace("5.0", "50.0"), "utf-8")
+    assert "never renewed" in refused(["record", name, str(file), "--seconds", "0.5", "--plan", str(plan)], capsys)
+    assert "never renewed" in refused(["record", name, str(file), "--seconds", "0.5"], capsys)
+    assert file.read_bytes() == before
     plan.write_text('kind = "trust plan"\n', "utf-8")
     assert "margins" in refused(["record", name, str(tmp_path / "b.rec"), "--plan", str(plan)], capsys)
     assert not (tmp_path / "b.rec").exists()

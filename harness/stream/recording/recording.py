@@ -6,7 +6,8 @@ costs only the blocks it touches, and these are reported. A recording that was c
     recv, sent   bytes from and to the device; an empty recv block: nothing arrived and an overdue frame was closed
     conf         JSON of the `WireFormat` of the bytes that follow; the device's clock starts at zero there
     evnt         JSON of an event on the line, as the driver reported it
-    note         JSON of the origin of what follows: the port, or the scenario, clip, seed, stations and rate
+    note         JSON of the origin of what follows: the port, or the scenario, clip, seed, stations and rate; "plan" is
+                 the digest of the trust plan that the recording is made for, the same in every note of a file
     answ         JSON of a command that a person sent, with the bytes and the decoded values of its answer
     mark         JSON of the stretch of a capture that begins here and lasts to the next mark, such as
                  {"stretch": "static"}; the stretch "" ends one
@@ -21,7 +22,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
@@ -58,6 +59,8 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
+PLAN = "plan"
+"""Name of the plan's digest in a note."""
 _WRITABLE_FILE = "a file to record into"
 _MAX_ANSWER_BYTES = 8192
 """Most bytes of an answer that are repeated next to its decoded values."""
@@ -96,6 +99,13 @@ class Recording:
         """The latest note on the origin of the recording; empty when there is none."""
         notes = [block for block in self.blocks() if block.kind == NOTE]
         return self.parse_json(notes[-1]) if notes else {}
+
+    def noted_values(self, name: str) -> tuple[str, ...]:
+        """The different values that the notes have under a name, in file order.
+
+        "" stands for a note without the name, and for blocks that come before the first note.
+        """
+        return _noted_values(self, self.blocks(), name)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -184,6 +194,17 @@ def read_marks(path: Path) -> list[dict[str, Any]]:
     with open_recording(path) as file:
         blocks = (block for block in _whole_blocks(file) if block.kind == MARK)
         return [{"monotonic_s": block.monotonic_s, **parser.parse_json(block)} for block in blocks]
+
+
+def _noted_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
+    """As `Recording.noted_values`, of these blocks."""
+    values: dict[str, None] = {}
+    for block in blocks:
+        if block.kind == NOTE:
+            values[str(parser.parse_json(block).get(name) or "")] = None
+        elif not values:
+            values[""] = None
+    return tuple(values)
 
 
 def _whole_blocks(file: BinaryIO) -> Iterator[RecordingBlock]:
@@ -372,14 +393,26 @@ class RecordingWriter:
                 raise PermissionError("you may not write to it")
             with open_input_file(self.path, EXPECTED_FILE, MAX_BYTES) as file:
                 _seek_first_block(self.path, file)
-                parser = Recording(self.path, b"")
-                return [parser.format_of(block) for block in _whole_blocks(file) if block.kind == CONFIGURED]
+                parser, blocks = Recording(self.path, b""), _whole_blocks(file)
+                kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
+            self._check_plan(_noted_values(parser, kept, PLAN))
+            return [parser.format_of(block) for block in kept if block.kind == CONFIGURED]
         except FileNotFoundError:
             if not self.path.parent.is_dir():
                 raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None
             return None
         except OSError as error:
             raise _file_error(self.path, error) from error
+
+    def _check_plan(self, existing: tuple[str, ...]) -> None:
+        """Raise BadFile unless the notes of the file name the plan of the new one: a plan comes before its data."""
+        plan = str(self._note.get(PLAN) or "")
+        if not existing or existing == (plan,):
+            return
+        found = " and ".join(f"the plan {digest[:12]}" if digest else "no plan" for digest in existing)
+        expected = f"one for the plan {plan[:12]}" if plan else "one for no plan"
+        advice = "Record into another file: a plan stands in a recording before its first data, and is never renewed."
+        raise BadFile(self.path, f"a recording for {found}", expected, advice)
 
 
 def record_capture(

@@ -16,7 +16,7 @@ import numpy as np
 from harness.compare.significance import holm
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
-from harness.errors import BadInput, HarnessError, Outcome, shorten
+from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
 from harness.experiment.cells import clear_caches
 from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
@@ -32,7 +32,7 @@ from harness.results.trust_findings import (
     TrustCapture,
     TrustFindings,
 )
-from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording import PLAN, read_recording
 from harness.study.papers.paper_study import open_study
 from harness.study.trust.capture_cells import Arm, CaptureResult, CaptureTask, run_capture
 from harness.study.trust.energy_distance import (
@@ -49,16 +49,22 @@ FINDINGS_FILE = "findings.json"
 
 
 class OtherPlan(HarnessError):
-    """A capture that was not made for the plan."""
+    """A capture that was not made for the plan, or not in all of its parts."""
 
     outcome = Outcome.NOT_COMPARABLE
 
-    def __init__(self, capture: str, found: str, plan: str) -> None:
-        super().__init__(capture, found, plan)
+    def __init__(self, capture: str, found: Sequence[str], plan: str) -> None:
+        super().__init__(capture, tuple(found), plan)
         self.capture, self.found, self.plan = self.args
 
     def __str__(self) -> str:
-        carried = f"carries the digest {self.found[:12]} of another plan" if self.found else "names no plan"
+        if not any(self.found):
+            carried = "names no plan"
+        elif len(self.found) == 1:
+            carried = f"carries the digest {self.found[0][:12]} of another plan"
+        else:
+            names = ", then ".join(f"the digest {digest[:12]}" if digest else "no plan" for digest in self.found)
+            carried = f"carries {names}: the plan was written after data, or renewed"
         advice = "Use the plan it was recorded with (`harness record --plan`), or add --exploratory."
         return f"{shorten(self.capture)} {carried}, not {self.plan[:12]}. {advice}"
 
@@ -94,9 +100,9 @@ def run_trust_study(
         raise BadInput(f"{len(clips)} clips for {len(captures)} captures.", "Name one clip for each capture, or none.")
     if len(set(captures)) < len(captures):
         raise BadInput("A capture is named twice.", "Name each once.")
-    carried = [str(read_recording(capture).note.get("plan") or "") for capture in captures]
+    carried = [_carried_plans(capture) for capture in captures]
     for capture, found in zip(captures, carried, strict=True):
-        if found != digest and not exploratory:
+        if found != (digest,) and not exploratory:
             raise OtherPlan(str(capture), found, digest)
     scenario = load_scenario(scenario_file(plan, path))
     unit = unit_file(plan, path)
@@ -131,12 +137,12 @@ def run_trust_study(
             unit=plan.unit or scenario.noise_label,
             unit_digest="" if unit is None else _sha256(unit),
             plan_digest=digest,
-            exploratory=exploratory and any(found != digest for found in carried),
+            exploratory=exploratory and any(found != (digest,) for found in carried),
             level=plan.level,
             ranked_metric=plan.ranked_metric,
             seeds=plan.seeds,
             captures=tuple(
-                TrustCapture(capture.name, result.clip, result.sha256, found, result.frames, result.damage)
+                TrustCapture(capture.name, result.clip, result.sha256, ", ".join(found), result.frames, result.damage)
                 for capture, found, result in zip(captures, carried, results, strict=True)
             ),
             arms=tuple(map(str, task.arms)),
@@ -290,6 +296,15 @@ def _compare_station(results: Sequence[CaptureResult], k: int, station: str, fea
     return ErrorDistance(
         station, feature, unit, found.distance, found.split_half, found.p, None, length / rate_hz, found.blocks
     )
+
+
+def _carried_plans(path: Path) -> tuple[str, ...]:
+    """Digests of the plans that a capture's notes carry; BadFile for notes of different clips."""
+    capture = read_recording(path)
+    if len(clips := capture.noted_values("clip")) > 1:
+        found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
+        raise BadFile(path, found, "one clip", "Record each clip into a file of its own.")
+    return capture.noted_values(PLAN)
 
 
 def _unit_keys(path: Path) -> dict[str, Any]:

@@ -394,3 +394,70 @@ def test_a_closed_recording_holds_no_file(tmp_path: Path) -> None:
     writer.close()
     assert path.is_file()
     assert not is_open()
+
+
+PLAN_NOTES: list[list[dict[str, str] | None]] = [
+    [{"plan": "a" * 64}, None, {"plan": "b" * 64}],
+    [{"plan": "a" * 64}, None, {}],
+    [{}, None, {"plan": "a" * 64}],
+    [None, {"plan": "a" * 64}],
+]
+"""Notes of a recording in file order; None stands for bytes from the device."""
+
+
+def with_notes(path: Path, notes: list[dict[str, str] | None]) -> Path:
+    blocks = [
+        RecordingBlock(RECEIVED, 1.0, 1.0, b"01 ")
+        if note is None
+        else RecordingBlock(NOTE, 1.0, 1.0, json.dumps(note).encode())
+        for note in notes
+    ]
+    path.write_bytes(FILE_HEADER + b"".join(map(encode_block, blocks)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("notes", "values"),
+    [
+        (PLAN_NOTES[0], ("a" * 64, "b" * 64)),
+        (PLAN_NOTES[1], ("a" * 64, "")),
+        (PLAN_NOTES[2], ("", "a" * 64)),
+        (PLAN_NOTES[3], ("", "a" * 64)),
+        ([{"plan": "a" * 64}, None, {"plan": "a" * 64}, None], ("a" * 64,)),
+        ([{}, None], ("",)),
+        ([], ()),
+    ],
+)
+def test_the_values_of_all_notes_and_of_data_before_them(
+    tmp_path: Path, notes: list[dict[str, str] | None], values: tuple[str, ...]
+) -> None:
+    assert read_recording(with_notes(tmp_path / "a.rec", notes)).noted_values("plan") == values
+
+
+@pytest.mark.parametrize("plan", ["", "b" * 64])
+@pytest.mark.parametrize("notes", [[{"plan": "a" * 64}], [{"plan": "a" * 64}, None], *PLAN_NOTES])
+def test_the_plan_of_a_recording_is_not_renewed(tmp_path: Path, notes: list[dict[str, str] | None], plan: str) -> None:
+    path = with_notes(tmp_path / "a.rec", notes)
+    before = path.read_bytes()
+    with pytest.raises(BadFile, match="never renewed"):
+        RecordingWriter(path, {"plan": plan} if plan else {})
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("notes", [[None], [{}, None], [{}]])
+def test_a_plan_comes_before_the_first_data(tmp_path: Path, notes: list[dict[str, str] | None]) -> None:
+    path = with_notes(tmp_path / "a.rec", notes)
+    with pytest.raises(BadFile, match="a recording for no plan; expected one for the plan aaaaaaaaaaaa"):
+        RecordingWriter(path, {"plan": "a" * 64})
+    with RecordingWriter(path) as writer:
+        writer.on_sent(b"c", 2.0, 2.0)
+    assert read_recording(path).noted_values("plan") == ("",)
+
+
+def test_a_recording_of_a_plan_goes_on_under_it(tmp_path: Path) -> None:
+    path = with_notes(tmp_path / "a.rec", [{"plan": "a" * 64}, None])
+    with RecordingWriter(path, {"plan": "a" * 64}) as writer:
+        writer.on_configured(FOUR, 2.0, 2.0)
+    assert read_recording(path).noted_values("plan") == ("a" * 64,)
+    (tmp_path / "empty.rec").touch()
+    RecordingWriter(tmp_path / "empty.rec", {"plan": "a" * 64}).close()

@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.errors import BadInput, Outcome, UnknownName
+from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
+from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
 from harness.study.trust import capture_cells
 from harness.study.trust.capture_cells import Arm, CaptureTask, run_capture
 from harness.study.trust.expected_values import preset_components
+from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import (
     FINDINGS_FILE,
     OtherPlan,
@@ -177,6 +179,24 @@ def test_a_changed_plan_is_not_comparable_unless_exploratory(small_study: SmallS
     found = run_trust_study(changed, small_study.captures[:1], tmp_path / "out", exploratory=True).findings
     assert found.exploratory
     assert (found.outcome, found.equivalences[0].why) == (Outcome.NOT_COMPARABLE, "too few clips: 1, of at least 6")
+
+
+def test_a_renewed_plan_is_not_that_of_the_capture(small_study: SmallStudy, tmp_path: Path) -> None:
+    """A note of the new plan behind the data, as versions before wrote it, does not make the capture one of it."""
+    changed = small_study.another_plan("renewed.toml", "200.0", "198.0")
+    capture = tmp_path / "renewed.rec"
+    renewed = RecordingBlock(NOTE, 9.0, 9.0, json.dumps({"clip": CLIPS[0], "plan": plan_digest(changed)}).encode())
+    capture.write_bytes(small_study.captures[0].read_bytes() + encode_block(renewed))
+    for plan in (changed, small_study.plan):
+        with pytest.raises(OtherPlan, match="written after data, or renewed"):
+            run_trust_study(plan, [capture], tmp_path / "out")
+    note = RecordingBlock(
+        NOTE, 9.0, 9.0, json.dumps({"clip": CLIPS[1], "plan": plan_digest(small_study.plan)}).encode()
+    )
+    capture.write_bytes(small_study.captures[0].read_bytes() + encode_block(note))
+    with pytest.raises(BadFile, match=f"notes of different clips .{CLIPS[0]}, {CLIPS[1]}."):
+        run_trust_study(small_study.plan, [capture], tmp_path / "out", exploratory=True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_plan_of_the_captures_is_not_exploratory(small_study: SmallStudy, tmp_path: Path) -> None:
