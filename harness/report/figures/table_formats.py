@@ -87,7 +87,8 @@ def _markdown_code(text: str) -> str:
 
 
 def _escape_markdown(text: str) -> str:
-    return "".join(f"\\{sign}" if sign in "\\|*_`<>[]&~$" else sign for sign in text)
+    escaped = "".join(f"\\{sign}" if sign in "\\|*_`<>&~$" else sign for sign in text)
+    return escaped.replace("](", "]\\(")  # no link
 
 
 def to_csv(table: ResultsTable) -> str:

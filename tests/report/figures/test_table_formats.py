@@ -77,7 +77,7 @@ def test_a_csv_reads_back_as_what_was_written() -> None:
 def test_no_name_is_a_formula_or_markup() -> None:
     table = ResultsTable(("noise",), (ANGLE,), (ResultsRow(("=a[b](c)$",), "-a`|b", (MetricValue(ANGLE, -1.0),)),), "")
     assert format_table(table, "csv").splitlines()[1] == "'=a[b](c)$,'-a`|b,-1,,,0,"
-    assert "| =a\\[b\\](c)\\$ | ``-a`\\|b`` | 0 | −1.00 |" in format_table(table, "markdown")
+    assert "| =a[b]\\(c)\\$ | ``-a`\\|b`` | 0 | −1.00 |" in format_table(table, "markdown")
     assert "=a[b](c)\\$ & -a`\\textbar{}b & 0 &" in format_table(table, "latex")
 
 
