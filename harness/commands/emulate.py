@@ -91,7 +91,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
     check_range(args.items or (), playback.reach_m)
-    if not (args.unpaced or args.overload):
+    if not (args.unpaced or args.overload or tracker.overload):
         items = args.items or tracker.items
         check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     with ExitStack() as opened:

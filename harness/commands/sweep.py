@@ -65,7 +65,8 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     if args.cell in summary["failures"]:
         print(summary["failures"][args.cell], file=sys.stderr)
     page = write_sweep_page(out)
-    files = (f"table: {out / 'summary.csv'}", f"report: {page}")
+    notes = [summary["line_loss"]] if "line_loss" in summary else []
+    files = (*notes, f"table: {out / 'summary.csv'}", f"report: {page}")
     following = [] if outcome is Outcome.PASS else ["status", out]
     content = {**summary, "out": str(out), "report": str(page)}
     return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome, following=following)

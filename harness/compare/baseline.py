@@ -110,7 +110,9 @@ def _cells_json(results: ResultSet, digests: Mapping[str, str]) -> str:
         rest = {name: definition[name] for name in sorted(definition) if name not in shared}
         part = content_key(rest)[:12]
         parts[part] = rest
-        line = {f.name: getattr(cell, f.name) for f in fields(cell) if f.name not in ("defined_by", "metrics")}
+        line = {
+            f.name: getattr(cell, f.name) for f in fields(cell) if f.name not in ("defined_by", "metrics", "line_loss")
+        }
         lines.append({**line, "part": part, "metrics": [cell.metrics.get(name) for name in metrics]})
     head = {
         "schema": SCHEMA,

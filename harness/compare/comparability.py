@@ -50,9 +50,14 @@ def summarise_differences(differing: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def find_coverage_faults(groups: Iterable[PairGroup], metrics: Sequence[str]) -> list[str]:
-    """Describe groups in which the sides cover different shares of the frames, or less than `COVERAGE_FLOOR`."""
+    """Describe groups in which the sides cover different shares of the frames, or less than `COVERAGE_FLOOR`.
+
+    Likewise groups in which the line dropped too many records.
+    """
     texts = []
     for group in groups:
+        if lost := max(cell.line_loss for pair in group.pairs for cell in pair):
+            texts.append(f"{group.title}: the line dropped up to {lost:.0%} of the records")
         matched, expected = (
             [sum(pair[side].metrics[name] or 0 for pair in group.pairs) for side in (0, 1)]
             for name in ("frames_matched", "frames_expected")

@@ -162,7 +162,7 @@ def _outcome(
     if failed:
         return Outcome.INCOMPLETE, f"planned cells are missing: {join_first(failed)}"
     if not gated:
-        return Outcome.NOT_COMPARABLE, "no gated metric was measured on both sides"
+        return Outcome.NOT_COMPARABLE, join_first(faults) or "no gated metric was measured on both sides"
     if faults:
         return Outcome.NOT_COMPARABLE, join_first(faults)
     if by_verdict["cannot tell"]:

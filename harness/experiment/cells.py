@@ -20,6 +20,7 @@ import numpy as np
 from harness.body.mounts import locate_mount
 from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
+from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart, ExampleLeak
 from harness.errors import BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
@@ -32,9 +33,10 @@ from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct.contract import Method
 from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row, varied_text
-from harness.score.score import score_estimate
+from harness.score.score import COVERAGE_FLOOR, score_estimate
 from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.room import check_emitters
+from harness.stream.codec.items import record_size
 from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
 
@@ -186,15 +188,20 @@ def evaluate_cell(
     """Fit a method, run it over the simulated stream, and score its estimates at the frames that they answer.
 
     A method with a lag leaves the last frames of the take unanswered: the cell has no rows for them. Its lag is one of
-    the conditions, because its errors and those of a causal method are not comparable.
+    the conditions, because its errors and those of a causal method are not comparable. Nothing is measured where the
+    line drops too many records and the scenario does not allow the overload.
     """
     scenario, simulation = evaluation.scenario, evaluation.simulation
     inputs = make_inputs(planned.inputs, simulation.stations)
     calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
     shown = [inputs.mask(replace(frame)) for frame in calibration.map_stream(simulation).frames]
     answers, lag = run_over_frames(fitted, replace(calibration.calibration), shown).by_frame()
-    answered = slice(0, len(answers.qpos))
-    frames, frame_index = simulation.frames[answered], simulation.frame_index[answered]
+    rows = np.flatnonzero(simulation.frame_index[: len(answers.qpos)] >= 0)
+    answers, frame_index = answers.at(rows), simulation.frame_index[rows]
+    frames, health = [simulation.frames[row] for row in rows], simulation.health
+    too_slow = excess_loss(health, allowed=scenario.tracker.overload) > 0.0
+    if too_slow:
+        health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
     position_valid = np.array([f.position_valid for f in frames])
     orientation_valid = np.array([f.orientation_valid for f in frames])
     scores = score_estimate(
@@ -210,6 +217,7 @@ def evaluate_cell(
         cpu_ms=(answers.step_cpu_ms, answers.reference_cpu_ms),
         angle_sigma_rad=answers.angle_sigma_rad,
         estimate_skeleton=calibration.body.skeleton,
+        floor=np.inf if too_slow else COVERAGE_FLOOR,
     )
     return storage.Cell(
         key=key,
@@ -230,7 +238,7 @@ def evaluate_cell(
         scenario=scenario.name,
         defined_by=evaluation.conditions_of(method, planned.inputs) | ({"lag": lag} if lag else {}),
         scores=scores,
-        health=simulation.health,
+        health=health,
         calibration_errors=calibration.errors,
         bone_m=evaluation.body.skeleton.bone_m,
         estimate_bone_m=calibration.body.skeleton.bone_m,

@@ -320,7 +320,7 @@ class Observation:
         with_prior = scenario.calibration in ("poses", "liu2011")
         return {
             **content,
-            "tracker": asdict(tracker_of(scenario)),
+            "tracker": tracker_of(scenario).as_dict(),
             "components": components,
             "disturbance": scenario.disturbance.as_dict(),
             "clip": str(subject.part),

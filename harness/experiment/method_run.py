@@ -53,6 +53,10 @@ class MethodAnswers(NamedTuple):
         answers = {name: getattr(self, name)[lag:] for name in ("qpos", "status", "origin", "lag")}
         return MethodAnswers(**answers, **times, angle_sigma_rad=sigma_rad), lag
 
+    def at(self, rows: Ints) -> "MethodAnswers":
+        """The answers in these rows."""
+        return MethodAnswers(*(None if column is None else column[rows] for column in self))
+
 
 def run_method(reconstructor: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> MethodAnswers:
     """Run a reconstructor over frames. It never sees the truth, and each answer is copied before the next step.

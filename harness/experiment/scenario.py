@@ -180,7 +180,7 @@ class Scenario:
 
         The values of the unit are in the tables.
         """
-        content = asdict(self)
+        content = {**asdict(self), "tracker": self.tracker.as_dict()}
         del content["fitted"]
         if self.physics is None:
             del content["physics"]  # as before the key existed

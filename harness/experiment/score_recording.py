@@ -56,6 +56,10 @@ class RecordingScore:
     """Number of frames with an estimate and a truth, after the warm-up."""
     frames_expected: int
     """Number of true frames between the first and last recorded frame of each loop, after the warm-up."""
+    records_arrived: int
+    """Number of records in the frames that have a truth."""
+    records_expected: int
+    """Number of records of all stations between the first and last recorded frame of each loop."""
     metrics: dict[str, float | None]
     """Metrics by the names of `Scores.metrics`, over all loops together; None is "not measured"."""
     lag: int = 0
@@ -200,7 +204,8 @@ def score_methods(
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
     loops = _split_into_loops(frames, zero_s, playback.samples)
-    return [_score_method(name, made[name], loops, playback) for name in methods]
+    arrived = np.array([np.isfinite(frame.measured_s).sum() for frame in frames], dtype=np.int64)
+    return [_score_method(name, made[name], loops, arrived, playback) for name in methods]
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,7 +319,10 @@ def _row_medians(values: Floats) -> Floats:
     return out
 
 
-def _score_method(name: str, output: _MethodOutput, loops: Sequence[LoopFrames], playback: Playback) -> RecordingScore:
+def _score_method(
+    name: str, output: _MethodOutput, loops: Sequence[LoopFrames], arrived: Ints, playback: Playback
+) -> RecordingScore:
+    """The score of a method, where enough frames and enough of the (F,) records that `arrived` in each are there."""
     rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
     skeleton, scores, expected, sigma = playback.body.skeleton, [], 0, list[SigmaSums]()
     for number, loop in enumerate(loops):
@@ -339,10 +347,13 @@ def _score_method(name: str, output: _MethodOutput, loops: Sequence[LoopFrames],
             sigma.append(score_sigma(truth_qpos[index], output.qpos[rows], output.sigma_rad[rows]))
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(score.scored.sum()) for score in scores)
-    enough = expected > 0 and matched >= COVERAGE_FLOOR * expected
+    records = sum(int(arrived[loop.rows].sum()) for loop in loops)
+    sent = len(playback.samples.stations) * sum(int(loop.index[-1] - loop.index[0]) + 1 for loop in loops)
+    complete = records >= COVERAGE_FLOOR * sent or playback.tracker.overload
+    enough = expected > 0 and matched >= COVERAGE_FLOOR * expected and complete
     metrics = _pool_metrics(scores, output.step_ms[1:]) if enough else _not_measured()
     sigma_scores = sum(sigma[1:], start=sigma[0]).scores() if enough and sigma else {}
-    return RecordingScore(name, matched, expected, metrics, output.lag, sigma_scores)
+    return RecordingScore(name, matched, expected, records, sent, metrics, output.lag, sigma_scores)
 
 
 def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
@@ -362,10 +373,23 @@ def _not_measured() -> dict[str, float | None]:
 
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
-    """A row for each method, and a table of the standard deviations if a method states them."""
+    """A row for each method, a table of the standard deviations if a method states them, and how few records came."""
     rows = []
     for one in judged:
         figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
         rows.append([one.title, f"{one.frames_matched}/{one.frames_expected}", *figures])
     table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
-    return "\n".join([*table.lines(), *sigma_lines(["method"], [([one.title], one.sigma_scores) for one in judged])])
+    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in judged])
+    return "\n".join([*table.lines(), *sigmas, *_missing_records(judged)])
+
+
+def _missing_records(judged: Sequence[RecordingScore]) -> list[str]:
+    """A line if fewer records arrived than let anything be measured."""
+    for one in judged:
+        if one.records_arrived < COVERAGE_FLOOR * one.records_expected:
+            return [
+                f"{one.records_arrived:,} of {one.records_expected:,} records arrived: the line is too slow for the "
+                "stations, or some were off. Record at a lower rate, a higher baud rate or with fewer stations. If the "
+                "slow line is what the scenario studies, set tracker.overload = true in it."
+            ]
+    return []

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from harness.core.csv_text import csv_line
 from harness.core.skeleton import Skeleton
 from harness.live.incremental_file import IncrementalFile
 from harness.live.pose import LivePose
@@ -20,7 +21,7 @@ class PoseTableOutput:
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
         hinges = [f"{skeleton.dof_names[d]}_rad" for d in hinges_in_qpos_order(skeleton)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]
-        head = ",".join(["frame", "status", "origin", *times, *root, *hinges]) + "\n"
+        head = csv_line(["frame", "status", "origin", *times, *root, *hinges])
         self._file = IncrementalFile(path, head.encode(), force=force)
 
     def send(self, pose: LivePose) -> None:

@@ -6,7 +6,6 @@ on the shipped list, has the listed SHA-256. So every file in place is complete 
 to crawl its site: name the subjects that are needed.
 """
 
-import csv
 import hashlib
 import re
 import tempfile
@@ -18,6 +17,7 @@ from urllib.error import HTTPError, URLError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
+from harness.core.csv_text import csv_line
 from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
@@ -179,6 +179,4 @@ def _write_index(top: Path, names: list[str]) -> None:
             rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
     columns = list(dict.fromkeys(column for row in rows.values() for column in row))
     with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, columns)
-        table.writeheader()
-        table.writerows(rows.values())
+        file.writelines(map(csv_line, [columns, *([row.get(name) for name in columns] for row in rows.values())]))

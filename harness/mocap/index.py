@@ -7,6 +7,7 @@ import csv
 import io
 from pathlib import Path
 
+from harness.core.csv_text import unescape_formula
 from harness.core.input_file import read_input_file
 from harness.errors import BadFile, BadInput
 from harness.mocap.read.file_checks import check_size
@@ -25,7 +26,7 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
         raise BadFile(path, "binary data", "a table of comma-separated values", "Repair or remove it.")
     try:
         reader = csv.DictReader(io.StringIO(data.decode("utf-8"), newline=""), strict=True)
-        rows = [(reader.line_num, row) for row in reader]
+        rows = [(reader.line_num, _unescaped(row)) for row in reader]
     except (csv.Error, UnicodeDecodeError) as error:
         raise BadFile(path, str(error), "a table of comma-separated values", "Repair or remove it.") from error
     for line, row in rows:
@@ -34,6 +35,10 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
         for column, kind in (("frames", int), ("fps", float)):
             _check_number(path, row.get(column) or "", column, kind, line)
     return {row["path"]: row for _, row in rows}
+
+
+def _unescaped(row: dict[str, str]) -> dict[str, str]:
+    return {name: unescape_formula(text) if isinstance(text, str) else text for name, text in row.items()}
 
 
 def rate_from_index(path: Path, folders: tuple[Path, ...] = ()) -> float | None:

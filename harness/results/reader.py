@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from harness.core.line_loss import excess_loss
 from harness.core.names import check_words
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, read_result_json
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_folder, check_row
-from harness.results.manifest import Manifest
+from harness.results.manifest import Manifest, flatten
 from harness.results.plausibility import find_impossible_metric
 from harness.score.metrics import DEFINITIONS
 
@@ -50,6 +51,9 @@ class CellResult:
     """Everything that two results must agree on to be comparable."""
     metrics: Mapping[str, float | None]
     """By name; None is "not measured"."""
+    line_loss: float = 0.0
+    """Share of the records that the line dropped beyond what the scenario allows (see `core.line_loss.excess_loss`);
+    0 in a baseline."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,10 @@ def _cell_from_row(folder: Path, row: Mapping[str, Any]) -> CellResult:
     path = cell_folder(folder, row["key"]) / "cell.json"
     content = read_content(path.parent)
     check_row(folder / INDEX_FILE, row, row_of_content(path.parent, content))
-    metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
-    return _check_cell(path, {**row, "defined_by": content.get("defined_by"), "metrics": metrics})
+    metrics, defined_by = {name: row.get(name) for name in DEFINITIONS if name in row}, content.get("defined_by")
+    cell = _check_cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
+    allowed = bool(flatten(cell.defined_by).get("tracker.overload", False))
+    return replace(cell, line_loss=excess_loss(row["health"], allowed=allowed))
 
 
 def _load_baseline(folder: Path) -> ResultSet:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import TEMPORARY, content_key, digest
+from harness.core.line_loss import BAUD, describe_line_loss
 from harness.core.names import check_words
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
@@ -134,14 +135,18 @@ def write_summary(
 ) -> dict[str, Any]:
     """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
-    summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason) and groups
-    (see `table.compute_group_statistics`). With `orders`, as a run has them, it also has statistics over frames, for
+    summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason), line_loss
+    (see `core.line_loss`; absent where every line let its cell be measured) and groups (see
+    `table.compute_group_statistics`). The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell
+    was measured. With `orders`, as a run has them, it also has statistics over frames, for
     which every cell is read: methods and behaviours (see `SummaryStatistics.rows`), recovery (see
     `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
     and cells (the rows). The index then gets the digests of the files and its own.
     """
     counts = index.counts()
-    measured = any(value is not None for (value,) in index.columns("joint_angle_mean_deg"))
+    unmeasured = [key for key, value in index.columns("key", "joint_angle_mean_deg") if value is None]
+    slow = describe_line_loss(row for row in index.rows_of(unmeasured) if BAUD in row["health"])
+    measured = len(unmeasured) < counts.finished and not slow
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
     content = {
         **facts,
@@ -149,6 +154,7 @@ def write_summary(
         "cells_finished": counts.finished,
         "cells_planned": counts.planned,
         "failures": index.failures(),
+        **({"line_loss": slow} if slow else {}),
         "groups": compute_group_statistics(index),
     }
     if orders is not None:

@@ -1,6 +1,5 @@
 """The finished cells of a folder as a table with one row per cell, and statistics of groups of cells over clips."""
 
-import csv
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
+from harness.core.csv_text import csv_line
 from harness.core.files import write_parts
 from harness.results.cell import EXTRA_IDENTITY, IDENTITY, OPTIONAL_COLUMNS, varied_text
 from harness.results.index import CellIndex
@@ -65,12 +65,10 @@ def _csv_lines(index: CellIndex) -> Iterator[str]:
         text: (varied_text(values), [_format_value(values[key]) if key in values else "" for key in keys])
         for text, values in varied.items()
     }
-    lines, identities, metrics = _LastLineWriter(), len(IDENTITY), len(METRIC_COLUMNS)
+    identities, metrics = len(IDENTITY), len(METRIC_COLUMNS)
     stations, rate = IDENTITY.index("stations"), IDENTITY.index("rate_hz")
     last = LAST_COLUMNS if any(values != OPTIONAL_COLUMNS for values in index.optional()) else ()
-    table = csv.writer(lines, lineterminator="\n")
-    table.writerow([*COLUMNS, *(f"vary.{key}" for key in keys), *last])
-    yield lines.last
+    yield csv_line([*COLUMNS, *(f"vary.{key}" for key in keys), *last])
     for row, of_cell in zip(index.columns(*COLUMNS), index.optional(), strict=True):
         identity, figures, (scenario, performer, varied_json, key, seconds) = (
             list(row[:identities]),
@@ -80,21 +78,10 @@ def _csv_lines(index: CellIndex) -> Iterator[str]:
         identity[stations] = " ".join(json.loads(identity[stations] or "[]"))
         identity[rate] = _format_numbers((identity[rate],))
         text, values = fields[varied_json]
-        table.writerow(identity)
-        first = lines.last[:-1]
         figures_last = [of_cell["lag"], *(of_cell["sigma_scores"].get(name) for name in SIGMA_DEFINITIONS)]
         further = [_format_numbers((value,)) for value in figures_last[: len(last)]]
-        table.writerow([scenario, performer, text, key, _format_numbers((seconds,)), *values, *further])
-        yield f"{first},{_format_numbers(figures)},{lines.last}"
-
-
-class _LastLineWriter:
-    """File of a csv writer that keeps the last line."""
-
-    last = ""
-
-    def write(self, line: str) -> None:
-        self.last = line
+        rest = csv_line([scenario, performer, text, key, _format_numbers((seconds,)), *values, *further])
+        yield f"{csv_line(identity)[:-1]},{_format_numbers(figures)},{rest}"
 
 
 def _format_value(value: Any) -> str:

@@ -1,8 +1,8 @@
 """Timing of the tracker and its serial line: when stations are sampled and when records arrive."""
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -30,11 +30,21 @@ class TrackerConfig:
     """Length of the send queue; when it is full the oldest record is dropped (docs/is900.md 14) [choice]."""
     origin_m: Annotated[tuple[float, float, float], Range(-100.0, 100.0)] = (0.0, 0.0, 2.5)
     """Origin of the tracker's frame in the world [m]; the default is under the ceiling."""
+    overload: bool = False
+    """The line may drop any share of the records, because a slow line is what the scenario studies. Without it nothing
+    is measured where less than `core.line_loss.LEAST_ARRIVED` of them arrive."""
 
     def __post_init__(self) -> None:
         check_fields(self)
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields, without an overload that is not allowed, as before the key existed."""
+        content = asdict(self)
+        if not self.overload:
+            del content["overload"]
+        return content
 
     @property
     def record_s(self) -> float:

@@ -43,7 +43,8 @@ class Simulation:
     frames: tuple[TrackerFrame, ...]
     """(F,) decoded from `wire`."""
     frame_index: Ints
-    """(F,) index of each decoded frame among the E sampled frames."""
+    """(F,) index of each decoded frame among the E sampled frames; -1 for a frame without a time and for the later
+    parts of one that an overloaded line split."""
     truth_s: Floats
     """(E,) reference time of each sampled frame: the mean of its stations' true sampling times [s]."""
     truth_qpos: Floats
@@ -223,13 +224,15 @@ def transmit_readings(
 
 
 def _match_frames(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
-    """(F,) index of each decoded frame among the sampled ones, by the device's time stamps (E, S)."""
+    """(F,) index of each decoded frame among the sampled ones, by the device's time stamps (E, S); see `Simulation`."""
     first_s, period_s = device_s[0], np.diff(device_s[:2, 0])
     stamps_s = np.array([frame.measured_s for frame in frames]).reshape(-1, device_s.shape[1])
     if len(period_s) == 0:
         return np.zeros(len(frames), dtype=np.int64)
-    frame_number: Floats = np.nanmean((stamps_s - first_s) / period_s, axis=1)
-    return np.round(frame_number).astype(np.int64)
+    stamped, out = np.isfinite(stamps_s).any(axis=1), np.full(len(frames), -1, dtype=np.int64)
+    out[stamped] = np.round(np.nanmean((stamps_s[stamped] - first_s) / period_s, axis=1))
+    before = np.maximum.accumulate(np.append(-1, out))[:-1]
+    return np.where(out > before, out, -1)
 
 
 def _health(

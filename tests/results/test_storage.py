@@ -197,6 +197,19 @@ def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: Mak
     assert [c.key for c in storage.read_cells(run_folder)] == [c.key for c in cells]
 
 
+def test_no_name_in_the_table_is_a_formula(run_folder: Path, make_cell: MakeCell) -> None:
+    """A spreadsheet runs what begins with such a sign; numbers below 0 stay numbers."""
+    storage.open_run(run_folder, manifest())
+    names = {"clip": "=1+1", "method": "-2+3", "behaviour": "@SUM(A1)", "scenario": "+cmd"}
+    cell = make_cell(0.01, **names, varied={"-k": -0.5, "name": "=x"})
+    storage.write_cell(run_folder, cell)
+    finish_run(run_folder, keys=[cell.key], planned=1)
+    (row,) = csv.DictReader((run_folder / "summary.csv").read_text().splitlines())
+    assert {name: row[name] for name in names} == {name: f"'{text}" for name, text in names.items()}
+    assert (row["vary.-k"], row["vary.name"], row["varied"]) == ("-0.5", "'=x", "'-k=-0.5 name==x")
+    assert not [text for text in row.values() if text[:1] in "=+@" and text]
+
+
 def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: Path, make_cell: MakeCell) -> None:
     cells = [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")]
     for cell in cells:

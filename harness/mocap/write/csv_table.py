@@ -1,10 +1,8 @@
 """Writer of CSV tables: one row per frame, units in the column names; estimates also have status and errors."""
 
-import csv
-import io
-
 import numpy as np
 
+from harness.core.csv_text import csv_line
 from harness.mocap.write.posed_motion import PosedMotion
 
 
@@ -22,9 +20,7 @@ def csv_files(motion: PosedMotion) -> dict[str, str]:
             *motion.extra.values(),
         ]
     )
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*columns, *motion.extra])
+    lines = [csv_line([*columns, *motion.extra])]
     for frame, row in zip(motion.frame_index, table, strict=True):
-        writer.writerow([int(frame), *("" if np.isnan(value) else f"{value:.9g}" for value in row)])
-    return {".csv": out.getvalue()}
+        lines.append(csv_line([int(frame), *("" if np.isnan(value) else f"{value:.9g}" for value in row)]))
+    return {".csv": "".join(lines)}

@@ -1,9 +1,9 @@
 """Formats of the table of a run: LaTeX with booktabs, Markdown, and CSV with all digits."""
 
-import csv
-import io
+import re
 from collections.abc import Callable, Sequence
 
+from harness.core.csv_text import csv_line
 from harness.errors import UnknownName
 from harness.report.figures.table import MetricValue, ResultsTable
 from harness.report.kit.metric_labels import metric_label
@@ -65,13 +65,13 @@ def to_markdown(table: ResultsTable) -> str:
     titles = _titles(table)
     texts = len(table.condition_names) + 1
     rules = ["---" if n < texts else "--:" for n in range(len(titles))]
-    names = ["`" + row.method.replace("|", "\\|") + "`" for row in table.rows]  # a bar would end the cell even here
+    names = [_markdown_code(row.method) for row in table.rows]
     rows = [
         [*map(_escape_markdown, row.condition), name, str(row.clips), *map(_markdown_value, row.values)]
         for name, row in zip(names, table.rows, strict=True)
     ]
     lines = [f"| {' | '.join(cells)} |" for cells in (map(_escape_markdown, titles), rules, *rows)]
-    return "\n".join([*lines, "", table.note]) + "\n"
+    return "\n".join([*lines, "", _escape_markdown(table.note)]) + "\n"
 
 
 def _markdown_value(value: MetricValue) -> str:
@@ -79,8 +79,16 @@ def _markdown_value(value: MetricValue) -> str:
     return f"{f'**{mean}**' if value.bold else mean} {interval}".strip()
 
 
+def _markdown_code(text: str) -> str:
+    """A name as code: the fence is longer than any of its own backticks, and a bar would end the cell even here."""
+    fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
+    pad = " " if text.startswith("`") or text.endswith("`") else ""
+    return f"{fence}{pad}{text}{pad}{fence}".replace("|", "\\|")
+
+
 def _escape_markdown(text: str) -> str:
-    return "".join(f"\\{sign}" if sign in "\\|*_`<" else sign for sign in text)
+    escaped = "".join(f"\\{sign}" if sign in "\\|*_`<>&~$" else sign for sign in text)
+    return escaped.replace("](", "]\\(")  # no link
 
 
 def to_csv(table: ResultsTable) -> str:
@@ -88,14 +96,11 @@ def to_csv(table: ResultsTable) -> str:
 
     Fields are empty where nothing was measured or ranked. Numbers have nine digits.
     """
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
     parts = ("", ".low", ".high", ".clips", ".standing")
-    writer.writerow([*table.condition_names, "method", *(f"{name}{part}" for name in table.metrics for part in parts)])
-    for row in table.rows:
-        values = [field for value in row.values for field in _csv_fields(value)]
-        writer.writerow([*row.condition, row.method, *values])
-    return file.getvalue()
+    head = csv_line([*table.condition_names, "method", *(f"{name}{part}" for name in table.metrics for part in parts)])
+    fields = ([field for value in row.values for field in _csv_fields(value)] for row in table.rows)
+    rows = (csv_line([*row.condition, row.method, *of]) for row, of in zip(table.rows, fields, strict=True))
+    return "".join([head, *rows])
 
 
 def _csv_fields(value: MetricValue) -> list[str]:

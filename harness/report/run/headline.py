@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_share
 from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
@@ -49,7 +50,7 @@ def build_headline(run: RunData) -> Headline:
         "Learning": _learning(run),
         "Varied": _varied(run),
         "Coverage": _coverage(run),
-        "Link": _link_loss(run),
+        "Link": describe_line_loss(run.cells).removeprefix("THE LINK IS "),
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
@@ -131,14 +132,6 @@ def _coverage(run: RunData) -> str:
     expected = sum(int(row["frames_expected"]) for row in run.cells)
     share = f" ({format_share(matched / expected, 1)})" if expected else ""
     return f"{matched:,} of {expected:,} frames matched{share}; {_progress(run)}"
-
-
-def _link_loss(run: RunData) -> str:
-    """The share of records that the link between tracker and host could not carry."""
-    sent, dropped = (
-        sum(float(row["health"].get(name, 0.0)) for row in run.cells) for name in ("records_sent", "records_dropped")
-    )
-    return f"too slow: {format_share(dropped / (sent + dropped))} of the records were dropped" if dropped else ""
 
 
 def _unmeasured(run: RunData) -> str:

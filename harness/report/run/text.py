@@ -5,6 +5,7 @@ from typing import Any
 
 from harness.core.estimate import name_with_lag
 from harness.core.hearing import poor_hearing
+from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
@@ -19,7 +20,6 @@ MOST_ROWS = 12
 """Rows of the short table of a run: about what a terminal shows without scrolling."""
 _SHORT_COLUMNS = (PRIMARY_METRIC, SECONDARY_METRIC, "jitter_m_s3", "step_p50_ms")
 """Metrics of the short table, which fits into 100 characters."""
-_RECORDS = ("records_sent", "records_dropped")
 
 
 def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
@@ -38,7 +38,7 @@ def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
     return "\n".join(
         [
             _setup_lines(cells),
-            *_link_loss(cells),
+            *filter(None, [describe_line_loss(cells)]),
             *_poor_hearing(cells),
             "",
             *(_pooled_rows(summary) if pooled else _behaviour_rows(summary)),
@@ -118,14 +118,6 @@ def _setup_lines(cells: Sequence[Mapping[str, Any]]) -> str:
         f"{first['rate_hz']:g} Hz, noise {noise}, calibration {calibration}, seed {first['seed']}; "
         "mean over sequences ± standard deviation, nothing aligned"
     )
-
-
-def _link_loss(cells: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A warning if the link between tracker and host dropped records."""
-    sent, dropped = (sum(float(cell["health"].get(name, 0.0)) for cell in cells) for name in _RECORDS)
-    if not dropped:
-        return []
-    return [f"THE LINK IS TOO SLOW: {format_share(dropped / (sent + dropped))} of the records were dropped"]
 
 
 def _poor_hearing(cells: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from harness.core.csv_text import csv_line
 from harness.stream.frame import TrackerFrame
 
 FRAME_COLUMNS = (
@@ -46,16 +47,5 @@ def format_csv_row(row: dict[str, Any]) -> str:
 
     Floats have full precision, so that they read back unchanged. Booleans are 1 and 0.
     """
-    return ",".join(_format_value(row[name]) for name in FRAME_COLUMNS)
-
-
-def _format_value(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return str(int(value))
-    return repr(value) if isinstance(value, float) else _quote(value)
-
-
-def _quote(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\n\r') else text
+    values = (row[name] for name in FRAME_COLUMNS)
+    return csv_line(int(value) if isinstance(value, bool) else value for value in values)[:-1]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.files import content_key, to_json_types
+from harness.core.line_loss import BAUD, describe_line_loss
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.experiment.engine import CellResults, run_cells
@@ -77,6 +78,11 @@ class CellCache:
     """(scenario, variant, method, clip) -> row."""
     _variants: dict[str, set[str]] = field(default_factory=dict)
     """Scenario -> variants that were run."""
+
+    @property
+    def line_loss(self) -> str:
+        """A sentence on cells whose line let nothing be measured; "" if there are none (see `core.line_loss`)."""
+        return describe_line_loss(row for row in self._rows.values() if BAUD in row["health"])
 
     def run_missing(self, requests: Iterable[SetRequest]) -> None:
         """Run all sets that were not run yet, together, so that they share the workers."""

@@ -67,8 +67,8 @@ def run_placement(
 
     `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
     and claims are not part of the identity of a study: they may change while its cells are kept. The outcome is
-    INCOMPLETE when a cell failed, NOT_COMPARABLE when nothing was measured, else PASS: a claim that is not reproduced
-    is a result.
+    INCOMPLETE when a cell failed, NOT_COMPARABLE when nothing was measured, or not every set because of its line, else
+    PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
     plan = plan_placement(path, folder)
@@ -132,7 +132,7 @@ def _run_plan(
         write_placement(cache.out / FINDINGS, findings)
     if findings.failures:
         return findings, Outcome.INCOMPLETE
-    return findings, Outcome.PASS if findings.best else Outcome.NOT_COMPARABLE
+    return findings, Outcome.PASS if findings.best and not cache.line_loss else Outcome.NOT_COMPARABLE
 
 
 class _PlacementRun:
@@ -294,6 +294,8 @@ class _PlacementRun:
                 f"Sets were chosen and tested on the same {clips} clips, which favours the chosen sets. The "
                 "cross-validated error is given beside: on each clip, that of the set that the other clips choose."
             )
+        if slow := self.cache.line_loss:
+            yield slow
         for ranking in (ranking for mode in modes for ranking in mode.rankings):
             if clips < (least := min_clips(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (

@@ -279,7 +279,7 @@ class _CaptureRun:
 
     def _identity(self, seed: int) -> dict[str, Any]:
         """What tells the cells of one seed apart from others."""
-        tracker = asdict(tracker_of(self.fitted))
+        tracker = tracker_of(self.fitted).as_dict()
         return {"seed": seed, "noise": asdict(self._noise), "tracker": tracker, "span_s": self._span_s}
 
     def _simulate(self, seed: int) -> _SideFrames:

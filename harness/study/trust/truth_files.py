@@ -17,6 +17,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.csv_text import unescape_formula
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, Outcome
 from harness.measure.pose_series import TruthPoses
@@ -150,7 +151,7 @@ def read_csv(path: Path) -> dict[str, TruthPoses]:
         if not values[0]:
             continue
         numbers = ["nan" if value == "" else value for value in (values[0], *values[2:])]
-        rows.setdefault(values[1], []).append(_numbers(path, number, numbers, 8))
+        rows.setdefault(unescape_formula(values[1]), []).append(_numbers(path, number, numbers, 8))
     bodies = {}
     for name, values_of in rows.items():
         table = np.array(values_of)

@@ -74,6 +74,13 @@ def test_a_csv_reads_back_as_what_was_written() -> None:
     assert [row[1] for row in rows] == [row.method for row in TABLE.rows]
 
 
+def test_no_name_is_a_formula_or_markup() -> None:
+    table = ResultsTable(("noise",), (ANGLE,), (ResultsRow(("=a[b](c)$",), "-a`|b", (MetricValue(ANGLE, -1.0),)),), "")
+    assert format_table(table, "csv").splitlines()[1] == "'=a[b](c)$,'-a`|b,-1,,,0,"
+    assert "| =a[b]\\(c)\\$ | ``-a`\\|b`` | 0 | −1.00 |" in format_table(table, "markdown")
+    assert "=a[b](c)\\$ & -a`\\textbar{}b & 0 &" in format_table(table, "latex")
+
+
 def test_a_row_of_latex_never_begins_with_a_bracket() -> None:
     """LaTeX would read it as the argument of the row before."""
     table = ResultsTable((), (ANGLE,), (ResultsRow((), "[x]", (MetricValue(ANGLE, 1.0),)),), "")
