@@ -76,7 +76,7 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
     text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
-    text = "use the device as other programs left it: tip offset, alignment, boresight, mounting angles and filters"
+    text = "use the device as other programs left it: tip offset, alignment, boresight and filters"
     verb.add_argument("--keep-settings", action="store_true", default=None, help=text)
     text = "set the heading of every station to zero at its present direction, when the device is set up"
     verb.add_argument("--boresight", action="store_true", default=None, help=text)
