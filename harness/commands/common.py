@@ -93,7 +93,7 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
     text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
-    text = "use the device as other programs left it: tip offset, alignment, boresight, mounting angles and filters"
+    text = "use the device as other programs left it: tip offset, alignment, boresight and filters"
     verb.add_argument("--keep-settings", action="store_true", default=None, help=text)
     text = "set the heading of every station to zero at its present direction, when the device is set up"
     verb.add_argument("--boresight", action="store_true", default=None, help=text)
@@ -109,8 +109,8 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
     if options and args.port.startswith("udp:"):
         name = min(options).replace("_", "-")
         raise BadInput(f"--{name} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
-    if args.stations is not None and "=" in args.stations:
-        options["characters"] = "".join(parse_station_map(args.stations).values())
+    if characters := parse_characters(args.stations):
+        options["characters"] = characters
     return options
 
 
@@ -173,6 +173,11 @@ def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | l
 def parse_device_names(text: str) -> list[str]:
     """Names of stations with or without stations of the device, in the order of the device."""
     return list(parse_station_map(text)) if "=" in text else parse_names(text)
+
+
+def parse_characters(text: str | None) -> str:
+    """Characters of the device's stations that `--stations` names (`head=3,torso=1`), ascending; "" for none."""
+    return "".join(parse_station_map(text).values()) if text is not None and "=" in text else ""
 
 
 def parse_station_map(text: str) -> dict[str, str]:

@@ -10,6 +10,7 @@ from harness.commands.common import (
     DEFAULT_STATION_COUNT,
     Verbs,
     add_verb,
+    parse_characters,
     parse_items,
     parse_stations,
     positive_float,
@@ -41,8 +42,11 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--clip", help="clip to play (default: the scenario's first)")
     text = "play the calibration poses of `harness calibrate`, held one after another, instead of the clip"
     verb.add_argument("--poses", action="store_true", help=text)
-    text = f"number of the scenario's stations, or their names (default: the first {DEFAULT_STATION_COUNT})"
-    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    text = (
+        "number of the scenario's stations, or their names, or names with stations of the device: head=3,torso=1 "
+        f"(default: the first {DEFAULT_STATION_COUNT})"
+    )
+    verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=text)
     text = "records per second of each station (default: the scenario's)"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     verb.add_argument("--noise", metavar="PRESET", help="clean, noise or default (default: the scenario's)")
@@ -63,6 +67,8 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--restart", type=float, metavar="S", help="seconds of silence after a restart (default 0.25)")
     text = "buttons and joystick: cycle moves all of them in turn, still none (default cycle)"
     verb.add_argument("--controls", choices=["cycle", "still"], help=text)
+    text = "length of item 16 (default 1, as in the manuals; InterSense's library and VRPN expect 2)"
+    verb.add_argument("--stylus-bytes", type=int, choices=[1, 2], help=text)
     verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave the scenario's faults out")
 
 
@@ -80,7 +86,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     playback = prepare_playback(
         args.scenario,
         clip=args.clip,
-        stations=parse_stations(args),
+        stations=parse_stations(args, device=True),
         rate_hz=args.rate,
         noise=args.noise,
         seed=args.seed,
@@ -98,7 +104,8 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
             opened.enter_context(closing(port))
-        names = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
+        characters = config.plugged(len(samples.stations))
+        names = ", ".join(f"{c} {name}" for c, name in zip(characters, samples.stations, strict=True))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
         played = (
             f"the poses of {playback.clip_evaluation.part}'s performer" if args.poses else playback.clip_evaluation.part
@@ -123,6 +130,7 @@ def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None
     from harness.stream.emulator.config import EmulatorConfig
 
     options = {"firmware": args.firmware, "restart_s": args.restart, "controls": args.controls, "udp_port": udp_port}
+    options |= {"characters": parse_characters(args.stations), "stylus_bytes": args.stylus_bytes}
     return EmulatorConfig(
         **{name: value for name, value in options.items() if value is not None},
         baud=args.baud or scenario.tracker.baud,

@@ -264,7 +264,7 @@ class InterSenseClient:
             elif reply_type == "Q":
                 station.sensitivity = int(text)
                 self._new_reply_types.add("Q")
-            elif reply_type == "I" and -1 <= int(text) <= 4:
+            elif reply_type == "I" and -1 <= int(text) <= (4 if self.version == "1.01" else 12):
                 station.cube_number = int(text)
                 self._new_reply_types.add("I")
             elif reply_type == "G":

@@ -95,12 +95,12 @@ def test_intersense_reads_and_sets_stations_while_data_flow(tmp_path: Path, vers
 
 
 def test_intersense_reads_a_device_with_more_stations_than_inertia_cubes(tmp_path: Path) -> None:
-    """It gives up at an answer to `MCI` above 4."""
+    """Version 1.01 gives up at an answer to `MCI` above 4, version 2.09 takes the station's number."""
     with run_device(tmp_path, stations=6, rate_hz=30.0) as device:
         client = InterSenseClient(device.port, "2.09")
         assert client.open()
         assert all(client.read_station(number) for number in range(1, 9))
-        assert [station.cube_number for station in client.stations] == [1, 2, 3, 4, -1, -1, -1, -1]
+        assert [station.cube_number for station in client.stations] == [1, 2, 3, 4, 5, 6, -1, -1]
         client.close()
 
 

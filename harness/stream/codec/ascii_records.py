@@ -18,7 +18,7 @@ _BYTE_PATTERN = rb"(?:   \d|  \d\d| [01]\d\d| 2[0-4]\d| 25[0-5])"
 """An integer from 0 to 255 in four columns."""
 
 
-def format_records(items: tuple[int, ...], table: NDArray[Any], stylus_bytes: int = 2) -> bytes:
+def format_records(items: tuple[int, ...], table: NDArray[Any], stylus_bytes: int = 1) -> bytes:
     """Format records (N,) as text.
 
     A number too wide for its column becomes the widest number; NaN becomes `nan`, as in C.
@@ -36,7 +36,7 @@ def format_records(items: tuple[int, ...], table: NDArray[Any], stylus_bytes: in
     return b"".join(template % tuple(value for part in row for value in part) for row in zip(*columns, strict=True))
 
 
-def parse_records(items: tuple[int, ...], raw: NDArray[np.uint8], stylus_bytes: int = 2) -> NDArray[Any]:
+def parse_records(items: tuple[int, ...], raw: NDArray[np.uint8], stylus_bytes: int = 1) -> NDArray[Any]:
     """Parse the bytes (N, size) of N records, which match `item_pattern`, into a table (N,)."""
     table = np.empty(len(raw), record_type(items, stylus_bytes))
     table["head"], table["station"], table["status"] = raw[:, 0], raw[:, 1], raw[:, 2]

@@ -27,7 +27,7 @@ class DeviceCommand:
     danger: str = ""
     """Why a person must allow it; "" where it only reads, or sets what ends when the device is switched off."""
     set_danger: str = ""
-    """Why a person must allow it where values follow; "" as above."""
+    """Why a person must allow it where values follow; "" as above, or for the same reason as without values."""
 
 
 _HARMLESS = (
@@ -82,4 +82,4 @@ def find_danger(command: Command) -> str:
         return UNKNOWN
     argument = text[len(name) :]
     sets = "," in argument or (name in _SETS_WITHOUT_COMMA and argument != "")
-    return DEVICE_COMMANDS[name].set_danger if sets else DEVICE_COMMANDS[name].danger
+    return (sets and DEVICE_COMMANDS[name].set_danger) or DEVICE_COMMANDS[name].danger

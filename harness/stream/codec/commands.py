@@ -68,12 +68,12 @@ def undo_alignment(station: str) -> bytes:
 
 
 def query_geometry(station: str, letter: str) -> bytes:
-    """Command that queries alignment (`A`), mounting angles (`G`), boresight reference (`H`) or tip offset (`N`)."""
+    """Command that queries alignment (`A`), boresight reference angles (`G`) or tip offset (`N`)."""
     return _line(f"{letter}{station}")
 
 
 def set_geometry(station: str, letter: str, values: Sequence[float]) -> bytes:
-    """Command that sets mounting angles or boresight reference (`G`, `H`) [deg], or the tip offset (`N`) [cm]."""
+    """Command that sets the boresight reference angles (`G`) [deg] or the tip offset (`N`) [cm]."""
     return _line(f"{letter}{station}," + ",".join(f"{value:.3f}" for value in values))
 
 

@@ -67,7 +67,7 @@ ITEMS: dict[int, OutputItem] = {
     6: OutputItem("y_cosines", "<f4", 3, 7, 4),
     7: OutputItem("z_cosines", "<f4", 3, 7, 4),
     11: OutputItem("quaternion", "<f4", 4, 7, 4),
-    16: OutputItem("stylus", "u1", 2, 1),
+    16: OutputItem("stylus", "u1", 1, 1),
     18: OutputItem("position_16", "u1", 6, sevens=True),
     19: OutputItem("yaw_pitch_roll_16", "u1", 6, sevens=True),
     20: OutputItem("quaternion_16", "u1", 8, sevens=True),
@@ -96,7 +96,7 @@ UNDOCUMENTED_ITEMS = (68, 69, 70, 71)
 
 
 @lru_cache(maxsize=64)
-def resolve_items(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[OutputItem, ...]:
+def resolve_items(items: tuple[int, ...], stylus_bytes: int = 1) -> tuple[OutputItem, ...]:
     """Return the items of a list. Repeated items are spaces and line ends; they get names of their own.
 
     Raises UnknownName for a code in no source, and BadInput for an item of unknown size or one listed twice.
@@ -120,7 +120,7 @@ def resolve_items(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[Output
 
 
 @lru_cache(maxsize=64)
-def record_type(items: tuple[int, ...], stylus_bytes: int = 2) -> np.dtype[Any]:
+def record_type(items: tuple[int, ...], stylus_bytes: int = 1) -> np.dtype[Any]:
     """Return the packed layout of a binary record: `head`, `station`, `status`, then each item by its name."""
     fields = [
         (item.name, item.kind) if item.count == 1 else (item.name, item.kind, (item.count,))
@@ -130,7 +130,7 @@ def record_type(items: tuple[int, ...], stylus_bytes: int = 2) -> np.dtype[Any]:
 
 
 @lru_cache(maxsize=64)
-def record_size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 2) -> int:
+def record_size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 1) -> int:
     """Return the length of a record on the wire [bytes]."""
     if binary:
         return int(record_type(items, stylus_bytes).itemsize)

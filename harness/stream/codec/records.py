@@ -34,8 +34,8 @@ class RecordFormat:
     """Length of a clock tick [s]: 1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
     binary: bool = True
     """True after `f`; False (ASCII) after `F` or power-on."""
-    stylus_bytes: int = 2
-    """Length of item 16: 1 or 2, depending on the source (docs/is900.md 14)."""
+    stylus_bytes: int = 1
+    """Length of item 16: 1 in both manuals, 2 in two programs (docs/is900.md 14)."""
 
     def __post_init__(self) -> None:
         if not (self.metres_per_unit > 0.0 and self.seconds_per_tick > 0.0 and self.stylus_bytes in (1, 2)):

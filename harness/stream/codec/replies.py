@@ -132,8 +132,8 @@ class StationStates:
 class GeometryReply:
     """The reply to a query of a station's geometry. Widths are those of docs/is900.md 14.
 
-    The letter is `A` alignment [cm], `G` mounting angles [deg], `H` boresight reference [deg], `N` tip offset [cm] or
-    `V` envelope [m]. The decimals of `N` and `V` are a guess, so nothing should rely on them.
+    The letter is `A` alignment [cm], `G` boresight reference angles [deg], `H` hemisphere vector, `N` tip offset [cm]
+    or `V` envelope [m]. The decimals of `N` and `V` are a guess, so nothing should rely on them.
     """
 
     station: str

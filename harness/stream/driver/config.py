@@ -43,11 +43,13 @@ class DriverConfig:
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
     keep_settings: bool = False
-    """Whether the device keeps what other programs have set: tip offsets, alignments, mounting angles, filters and
-    boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
+    """Whether the device keeps what other programs have set: tip offsets, alignments, boresight reference angles, filters
+    and boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
     """
     reach_m: float | None = None
     """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
+    stylus_bytes: int = 1
+    """Length of item 16, for a list that has it: 1 in both manuals, 2 in two programs (docs/is900.md 14)."""
     quality: Literal["record", "mp"] = "record"
     """Where lost stations show: "record" in items 40 and 76, "mp" in the replies to `MP`, polled once a second."""
 
@@ -81,7 +83,7 @@ class DriverConfig:
     @property
     def settings(self) -> RecordFormat:
         """Number format that the device will be configured for."""
-        return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6)
+        return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6, stylus_bytes=self.stylus_bytes)
 
     def alignment_of(self, station: str) -> Alignment | None:
         """Return the reporting frame of the station with this name, or None."""

@@ -122,8 +122,7 @@ ALIGNMENT = StationSetting(
 STATION_SETTINGS = (
     ALIGNMENT,
     _geometry_setting("N", "tip offset", "cm"),
-    _geometry_setting("G", "mounting angles", "deg"),
-    _geometry_setting("H", "boresight reference", "deg"),
+    _geometry_setting("G", "boresight reference angles", "deg"),
     _integer_setting("prediction Mp", "ms", 0, commands.query_prediction, _prediction_ms, commands.prediction),
     _integer_setting("sensitivity MQ", "", 3, commands.query_sensitivity, _sensitivity, commands.sensitivity),
     _integer_setting("enhancement MF", "", 0, commands.query_station, _enhancement, commands.enhancement),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from harness.errors import BadInput
+from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.emulator.controls import check_control_pattern
 from harness.stream.emulator.faults import Fault, check_firmware
 
@@ -34,6 +35,11 @@ class EmulatorConfig:
     """Silence after a restart [s]; clients wait 10 to 20 s for a real device (docs/is900.md 4.1)."""
     check_baud: bool = False
     """On a pty: corrupt both directions while the client has set another baud rate than the device."""
+    characters: str = ""
+    """Characters of the stations that are plugged in, ascending, such as "135"; "" for the first ones. Wired devices
+    share receivers, so that numbers may be missing (docs/is900.md 14)."""
+    stylus_bytes: int = 1
+    """Length of item 16: 1 in both manuals; two programs expect 2 (docs/is900.md 14)."""
     controls: str = "cycle"
     """Pattern of buttons and joystick, one of `CONTROL_PATTERNS`: "cycle" moves all of them, "still" none."""
     udp: bool = False
@@ -58,9 +64,21 @@ class EmulatorConfig:
             )
         if self.baud not in SUPPORTED_BAUD_RATES:
             raise BadInput(f"{self.baud} baud.", f"An IS-900 supports {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
+        if self.stylus_bytes not in (1, 2):
+            raise BadInput(f"stylus_bytes = {self.stylus_bytes} is not possible.", "Item 16 has 1 or 2 bytes.")
         if self.queue_records < 1:
             raise BadInput(f"queue_records = {self.queue_records} is not possible.", "Give at least 1.")
         if not 0 < self.udp_port < 65536:
             raise BadInput(f"udp_port = {self.udp_port} is not possible.", "Give a number from 1 to 65535.")
         if not 0.0 <= self.restart_s <= 3600.0:
             raise BadInput(f"restart_s = {self.restart_s:g} is not possible.", "Give a number from 0 to 3600.")
+
+    def plugged(self, stations: int) -> str:
+        """Return the characters of this many stations. Raises BadInput when they do not fit."""
+        known = STATION_CHARACTERS.decode()
+        characters = self.characters or known[:stations]
+        if len(characters) != stations or "".join(c for c in known if c in characters) != characters:
+            raise BadInput(
+                f"characters = {characters!r} do not fit {stations} stations.", f"Give one of {known} for each, ascending."
+            )
+        return characters

@@ -55,11 +55,11 @@ def _zero_clock(device: DeviceState, argument: CommandArgument, now_s: float) ->
 def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     """Report the state of each station and its ranges."""
     argument.require_empty()
-    quality = {name: device.rounds.quality(now_s, name) for name in device.active}
+    quality = {name: device.rounds.quality(now_s, name, device.settings) for name in device.active}
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
     )
-    ranges = [device.rounds.ranges(now_s, name) if name in quality else (0, 0) for name in STATION_NAMES]
+    ranges = [device.rounds.ranges(now_s, name, device.settings) if name in quality else (0, 0) for name in STATION_NAMES]
     received, rejected = zip(*ranges, strict=True)
     device.reply(now_s, TrackingStatus(states, received, rejected, device.samples.rate_hz))
 

@@ -29,14 +29,14 @@ class DeviceState:
         """Switch the device on at `now_s` [s]."""
         self.samples, self.config = samples, config or EmulatorConfig()
         self.firmware = self.config.firmware
-        self.rounds = RoundEncoder(SamplePlayer(samples, now_s), self.config.controls)
+        self.rounds = RoundEncoder(SamplePlayer(samples, now_s), self.config)
         self.streaming = self.suspended = False
         self.command_count = self.refused_count = 0
         """Numbers of all commands and of the rejected ones."""
         self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while the command log is open."""
-        self._factory = _factory_settings(samples, self.config)
+        self._factory = _factory_settings(samples, self.config, self.rounds.plugged)
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0
@@ -91,7 +91,7 @@ class DeviceState:
     def poll(self, now_s: float) -> None:
         """Send one record of each active station, ascending, with its latest reading."""
         for name in "" if self.suspended else self.active:
-            number = self.rounds.player.latest(now_s, STATION_NAMES.index(name))
+            number = self.rounds.player.latest(now_s, self.rounds.plugged.index(name))
             self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
 
     def suspend(self, now_s: float) -> None:
@@ -128,26 +128,28 @@ class DeviceState:
 
     def _play(self, now_s: float) -> None:
         """Send the readings until now."""
-        player, rows = self.rounds.player, len(self.rounds.plugged)
+        player, plugged = self.rounds.player, self.rounds.plugged
         while self.streaming:
             number, row = self._next
             taken_s = player.time_s(number, row)
             if taken_s > now_s:
                 return
-            self._next = (number, row + 1) if row + 1 < rows else (number + 1, 0)
-            if self.settings.stations[row].active and not self.suspended:
-                data = self.rounds.records(number, self.settings)[STATION_NAMES[row]]
-                self._out.append(Message(taken_s + self.samples.ready_s, data, STATION_NAMES[row]))
+            self._next = (number, row + 1) if row + 1 < len(plugged) else (number + 1, 0)
+            name = plugged[row]
+            if self.settings.station(name).active and not self.suspended:
+                data = self.rounds.records(number, self.settings)[name]
+                self._out.append(Message(taken_s + self.samples.ready_s, data, name))
 
 
-def _factory_settings(samples: DeviceSamples, config: EmulatorConfig) -> DeviceSettings:
-    """Return the settings after power-on: the stations of the samples are on, and a filter brings its settings."""
-    stations = [StationSettings(active=row < len(samples.stations)) for row in range(len(STATION_NAMES))]
+def _factory_settings(samples: DeviceSamples, config: EmulatorConfig, plugged: str) -> DeviceSettings:
+    """Return the settings after power-on: plugged stations are on, and a filter brings its settings."""
+    stations = [StationSettings(active=name in plugged) for name in STATION_NAMES]
     settings = DeviceSettings(tuple(stations), baud=config.baud, udp=config.udp, udp_port=config.udp_port)
     if (filtered := samples.filter) is None:
         return settings
     initial = zip(filtered.prediction_ms.tolist(), filtered.enhancement.tolist(), strict=True)
-    for row, (prediction_ms, enhancement) in enumerate(initial):
+    for name, (prediction_ms, enhancement) in zip(plugged, initial, strict=True):
+        row = STATION_NAMES.index(name)
         stations[row] = replace(stations[row], prediction_ms=prediction_ms, enhancement=enhancement)
     emitters = filtered.emitters
     return replace(settings, stations=tuple(stations), emitters=emitters, draft_emitters=emitters)

@@ -1,7 +1,7 @@
-"""Effect of alignment, boresight, tip offset and mounting angles on a reading (docs/is900.md 4.1).
+"""Effect of alignment, boresight and tip offset on a reading (docs/is900.md 4.1).
 
 The sources give the purpose of each, but neither their sequence nor the side of multiplication. Our interpretation is:
-the tip in the station's axes, then the mounting, then the alignment, then boresight, which affects orientation alone.
+the tip in the station's axes, then the alignment, then boresight, which affects orientation alone.
 """
 
 from dataclasses import replace
@@ -53,7 +53,7 @@ def alignment_cm(station: StationSettings) -> tuple[float, ...]:
 
 
 def boresight(station: StationSettings, quaternion: Floats, full: bool) -> StationSettings:
-    """Return settings with which this raw quaternion (4,) is reported as the reference.
+    """Return settings with which this raw quaternion (4,) is reported as the reference angles (`G`).
 
     Without `full`, only its heading is.
     """
@@ -76,8 +76,6 @@ def clear_boresight(station: StationSettings) -> StationSettings:
 def _apply_alignment(position_m: Floats, quaternion: Floats, station: StationSettings) -> tuple[Floats, Floats]:
     """Convert a reading to what the station reports, except for boresight."""
     position_m = position_m + rotations.rotate(quaternion, np.array(station.tip_m))
-    mounting = from_yaw_pitch_roll_deg(np.array([station.mounting_deg]))[0]
-    position_m, quaternion = rotations.rotate(mounting, position_m), rotations.multiply(mounting, quaternion)
     aligned_from_tracker = rotations.inverse(np.array(station.tracker_from_aligned))
     position_m = rotations.rotate(aligned_from_tracker, position_m - np.array(station.origin_m))
     return position_m, rotations.multiply(aligned_from_tracker, quaternion)

@@ -17,11 +17,11 @@ from harness.stream.codec.replies import (
 )
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import OUT_OF_RANGE, CommandArgument, CommandError
-from harness.stream.emulator.settings import DeviceSettings, StationSettings
+from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
 
 Query = Callable[[DeviceSettings, CommandArgument], Iterable[ParsedReply]]
-_INERTIA_CUBES, NO_INERTIA_CUBE = "1234", -1
-"""Numbers of InertiaCubes, and the answer for a station without one (docs/is900.md 14)."""
+_NO_INERTIA_CUBE = -1
+"""The answer for a station without one (docs/is900.md 14)."""
 _STATE_FLAGS = 32
 """Number of flags in the reply to `l*`."""
 
@@ -47,11 +47,11 @@ def _text_reply(text: str) -> ParsedReply:
 
 
 def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
-    """Reply to `l`. InterSense's library of 1999 names no station when it queries all of them (docs/is900.md 14)."""
-    if argument.text.strip() in ("*", ""):
+    """Reply to `l`; without a station it tells the first four (docs/is900.md 6.3)."""
+    if argument.text.strip() == "*":
         active = [station.active for station in settings.stations]
         return [StationStates(None, (*active, *[False] * (_STATE_FLAGS - len(active))))]
-    name = argument.station()
+    name = argument.station() if argument.text.strip() else "1"
     return [StationStates(name, tuple(settings.station(queried).active for queried in (name, *"234")))]
 
 
@@ -69,8 +69,8 @@ QUERIES: dict[str, Query] = {
     "O": _station_query(lambda name, station: OutputList(name, station.items)),
     "l": _station_states,
     "A": _station_query(lambda name, station: GeometryReply(name, "A", geometry.alignment_cm(station))),
-    "G": _station_query(lambda name, station: GeometryReply(name, "G", station.mounting_deg)),
-    "H": _station_query(lambda name, station: GeometryReply(name, "H", station.reference_deg)),
+    "G": _station_query(lambda name, station: GeometryReply(name, "G", station.reference_deg)),
+    "H": _station_query(lambda name, station: GeometryReply(name, "H", station.hemisphere)),
     "N": _station_query(
         lambda name, station: GeometryReply(name, "N", tuple(100.0 * value for value in station.tip_m))
     ),
@@ -91,7 +91,7 @@ QUERIES: dict[str, Query] = {
     "MCF": _emitter_list,
     "MCI": _station_query(
         lambda name, station: IntegerReply(
-            name, "I", int(name) if station.active and name in _INERTIA_CUBES else NO_INERTIA_CUBE
+            name, "I", 1 + STATION_NAMES.index(name) if station.active else _NO_INERTIA_CUBE
         )
     ),
     "MLogState": _device_query(lambda settings: _text_reply(f"31LS{int(settings.command_log)}")),

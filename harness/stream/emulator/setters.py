@@ -81,7 +81,10 @@ def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 
 
 def _remove_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    number = argument.integer(1, 9999999, start=0)
+    """Remove an emitter; FreeVR names its hardware identity too (docs/is900.md 4.2)."""
+    number = CommandArgument(argument.fields[0]).integer(1, 9999999, start=0)
+    if argument.sets:
+        argument.integer(0, 9999999)
     return replace(
         settings, draft_emitters=tuple(emitter for emitter in settings.draft_emitters if emitter.number != number)
     )
@@ -146,8 +149,8 @@ def _emitter_setter(change: Callable[[DeviceSettings], dict[str, Any]]) -> Sette
 SETTER_COMMANDS: dict[str, Setter] = {
     "O": _set_output_list,
     "A": _set_alignment,
-    "G": _float_setter("mounting_deg", 3),
-    "H": _float_setter("reference_deg", 3),
+    "G": _float_setter("reference_deg", 3),
+    "H": _float_setter("hemisphere", 3),
     "N": _float_setter("tip_m", 3, _CM),
     "V": _float_setter("envelope_m", 6),
     "Mp": _station_setter("prediction_ms", 0, 50),

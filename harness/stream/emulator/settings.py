@@ -35,11 +35,11 @@ class StationSettings:
     full_boresight: Quaternion = IDENTITY_QUATERNION
     """Full boresight: rotates the station's axes."""
     reference_deg: Vector = ZERO_VECTOR
-    """Angles that boresight gives the present orientation [deg]."""
+    """Yaw, pitch and roll that the next boresight gives the present orientation (`G`) [deg]."""
+    hemisphere: Vector = (1.0, 0.0, 0.0)
+    """Hemisphere vector of a Fastrak (`H`); stored without effect."""
     tip_m: Vector = ZERO_VECTOR
     """Tip offset in the station's own axes [m]."""
-    mounting_deg: Vector = ZERO_VECTOR
-    """Yaw, pitch and roll of the transmitter's mounting [deg]."""
     envelope_m: tuple[float, ...] = (10.0, 10.0, 10.0, -10.0, -10.0, -10.0)
     prediction_ms: int = 0
     enhancement: int = 0
@@ -50,7 +50,7 @@ class StationSettings:
     def plain(self) -> bool:
         """Whether readings are reported as they were taken."""
         return (
-            self.origin_m == self.tip_m == self.mounting_deg == ZERO_VECTOR
+            self.origin_m == self.tip_m == ZERO_VECTOR
             and self.tracker_from_aligned == self.heading_boresight == self.full_boresight == IDENTITY_QUATERNION
         )
 

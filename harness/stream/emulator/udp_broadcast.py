@@ -3,7 +3,7 @@
 from harness.stream.codec.datagram import Datagram
 from harness.stream.codec.records import RecordValues, yaw_pitch_roll_deg
 from harness.stream.emulator.device_state import DeviceState
-from harness.stream.emulator.settings import DeviceSettings
+from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
 
 TRACKER_MODEL = 4
 """Number that InterSense's library takes for an IS-900 (docs/is900.md 9)."""
@@ -42,7 +42,7 @@ class UdpBroadcast:
         device, packets = self._device, list[bytes]()
         while self._next is not None and self.next_s <= now_s:
             number, row = self._next
-            if device.settings.stations[row].active:
+            if device.settings.station(device.rounds.plugged[row]).active:
                 packets.append(self._packet(number, row))
             self._next = (number, row + 1) if row + 1 < len(device.rounds.plugged) else (number + 1, 0)
         return packets
@@ -65,7 +65,7 @@ class UdpBroadcast:
         return Datagram(
             sequence=self._sequence,
             model=TRACKER_MODEL,
-            station=1 + row,
+            station=1 + STATION_NAMES.index(self._device.rounds.plugged[row]),
             quality=round(255 * min(max(float(values.quality[row]), 0.0), 1.0)),
             buttons=0 if isinstance(one.buttons, int) else int(one.buttons[0]),
             analogue=(*joystick, *[0] * (_ANALOGUE_CHANNELS - 2)),

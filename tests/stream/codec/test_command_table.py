@@ -22,9 +22,9 @@ AS_BUILT = PAGE.partition("### 4.3")[2].partition("## 5")[0]
 
 EXAMPLES = {
     "P": "P", "C": "C", "c": "c", "F": "F", "f": "f", "U": "U", "u": "u", "S": "S", "W": "W",
-    "O{st},a,b,...": "O1,2,4,1", "O{st}": "O1", "l{st},0|1": "l2,1", "l{st}": "l1", "l*": "l*",
+    "O{st},a,b,...": "O1,2,4,1", "O{st}": "O1", "l{st},0|1": "l2,1", "l{st}": "l1", "l*": "l*", "l": "l",
     "A{st},": "A1,0,0,0,1,0,0,0,1,0", "A{st}": "A1", "R{st}": "R1", "G{st},y,p,r": "G1,0,0,0", "G{st}": "G1",
-    "B{st}": "B1", "b{st}": "b1", "H{st},x,y,z": "H1,0,0,0", "N{st},x,y,z": "N1,0,0,0", "N{st}": "N1",
+    "B{st}": "B1", "b{st}": "b1", "H{st},x,y,z": "H1,0,0,0", "H{st}": "H1", "N{st},x,y,z": "N1,0,0,0", "N{st}": "N1",
     "V{st},": "V1,1,1,1,-1,-1,-1", "V{st}": "V1", "^K": "^K", "^Y": "^Y", "^S": "^S", "^Q": "^Q",
     "o...": "o1152,N,8,0", "T": "T", "x...": "x0.2,0.2,0.8,0.8", "v...": "v0.2,0.2,0.8,0.8", "e...": "e1,0",
     "t": "t", "Y": "Y",
@@ -32,7 +32,7 @@ EXAMPLES = {
     "MQ{st},n": "MQ1,3", "MH{st},0|1|2": "MH1,0", "Mh": "Mh1", "MT": "MT", "Mt": "Mt", "MZ": "MZ", "MBI": "MBI",
     "MBF": "MBF", "MG": "MG", "MG<state>,<rate>": "MG1,60", "MGP": "MGP1", "MGS": "MGS1", "MP": "MP", "MU": "MU20",
     "Mg": "Mg1", "MCF": "MCF", "MCF{n}": "MCF1", "MCF{n},x,y,z,nx,ny,nz,id": "MCF1,0,0,0,0,0,1,5001",
-    "MCf{n}": "MCf1", "MCC": "MCC", "MCe": "MCe", "MCx": "MCx", "MCI{st}[,n]": "MCI1", "MCi": "MCi1", "MCM": "MCM",
+    "MCf{n}[,id]": "MCf1,5001", "MCC": "MCC", "MCe": "MCe", "MCx": "MCx", "MCI{st}[,n]": "MCI1", "MCi": "MCi1", "MCM": "MCM",
     "MCm": "MCm", "MCc": "MCc", "ML0": "ML0", "ML1": "ML1", "MLB{n}": "MLB50", "ME": "ME", "MEC": "MEC",
     "ME0|1": "ME1", "MLogOpen/Close/Clear/State/Send": "MLogSend", "MSchAlg1|2": "MSchAlg1",
     "MConfigLockMode0|1|2": "MConfigLockMode1", "MEthIp": "MEthIp", "MEthUdp": "MEthUdp",
@@ -41,7 +41,7 @@ EXAMPLES = {
 }  # fmt: skip
 """An example of each command, by how the tables of docs/is900.md 4 write it."""
 NEED_PERMISSION = {
-    "W", "^K", "^Y", "o...", "T", "e...", "t", "Y", "MCF{n},x,y,z,nx,ny,nz,id", "MCf{n}", "MCC", "MCe", "MCx", "MCi",
+    "W", "^K", "^Y", "o...", "T", "e...", "t", "Y", "MCF{n},x,y,z,nx,ny,nz,id", "MCf{n}[,id]", "MCC", "MCe", "MCx", "MCi",
     "MCM", "MCm", "MCc", "MEC", "MConfigLockMode0|1|2", "MSystemTest1", "MSystemTest2",
 }  # fmt: skip
 """Those that write the device's memory, restart or reset it, erase, change the line, or are of other products."""
@@ -88,7 +88,8 @@ def test_the_emulator_executes_all_but_the_commands_of_other_products(written: s
     [
         ("MLogClear", "erases"), ("MLogOpen", "erases"), ("MLogState", ""), ("ME", ""), ("ME0", ""),
         ("MEthIp", ""), ("MEthIp10.0.0.7", "network"), ("MEthUdp1", "network"), ("MEthUdpPort5002", "network"),
-        ("MCI1,2", "other product|another product"), ("MConfigLockMode", ""), ("MCF1,2", "constellation"),
+        ("MCI1,2", "other product|another product"), ("MConfigLockMode", ""), ("MCF1,2", "constellation"), ("MCf1", "constellation"),
+        ("MCf1,5001", "constellation"), ("MCC,", "constellation"), ("MEC,", "erases"), ("MLogClear,1", "erases"),
         ("Q", "in no source"), ("MTx", "in no source"), ("*reset", "in no source"), ("Oz", "in no source"),
     ],
 )  # fmt: skip
@@ -136,8 +137,8 @@ def test_the_page_says_who_sends_what() -> None:
     rows = [line for line in AS_BUILT.splitlines() if line.startswith("| ")][1:]
     driver, _, permission, others = ({*re.findall(r"`([A-Za-z0-9]+)", row.split(" | ")[0])} for row in rows)
     names = {re.match(r"[A-Za-z]+", EXAMPLES[written]) for written in SENT_BY_THE_DRIVER - {"^Q"}}
-    # `H` is read; the others are sent where another program changed them (tests/stream/driver/test_shared_device.py).
-    assert driver == {name[0] for name in names if name} | {"H", "MF", "MBI", "MBF"}
+    # These are sent where another program changed them (tests/stream/driver/test_shared_device.py).
+    assert driver == {name[0] for name in names if name} | {"MF", "MBI", "MBF"}
     dangerous = {name for name, command in DEVICE_COMMANDS.items() if command.danger or command.set_danger}
     with_value = {"MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode"}
     assert permission | others | with_value == dangerous - {"^K", "^Y"}

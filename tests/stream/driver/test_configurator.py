@@ -41,7 +41,7 @@ def test_the_commands_are_sent_in_the_right_sequence() -> None:
     assert bytes(bench.sent) == (
         b"\x11\rcSl*\r\n"
         b"O1\r\nO2\r\nMS\r\n"  # what other programs have set
-        b"A1\r\nN1\r\nG1\r\nH1\r\nMp1\r\nMQ1\r\nMs1\r\nA2\r\nN2\r\nG2\r\nH2\r\nMp2\r\nMQ2\r\nMs2\r\n"
+        b"A1\r\nN1\r\nG1\r\nMp1\r\nMQ1\r\nMs1\r\nA2\r\nN2\r\nG2\r\nMp2\r\nMQ2\r\nMs2\r\n"
         b"b1\r\nb2\r\nMP\r\nfuMT\r\n"
         b"O1,40,2,11,21,1\r\nO1\r\nO2,40,2,11,21,1\r\nO2\r\n"  # set, with a query to wait for the device
         b"SMS\r\nO1\r\nO2\r\n"  # checked

@@ -1,6 +1,8 @@
 """A device that another program has used before: its settings do not change this session, and it gets them back."""
 
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -9,6 +11,7 @@ import pytest
 
 from harness.core import rotations
 from harness.errors import BadInput
+from harness.stream.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 from harness.stream.codec.replies import parse_reply
 from harness.stream.driver import DriverConfig
 from harness.stream.driver.device_settings import ALIGNMENT, STATION_SETTINGS
@@ -25,7 +28,7 @@ SHARED = {
     "tip offset": (b"N1,30,0,0\rN2,30,0,0\r", 0.3, 0.0),
     "boresight": (b"B1\rB2\r", 0.0, 161.0),
     "alignment": (b"A1,680,0,0,880,0,0,680,200,0\rA2,680,0,0,880,0,0,680,200,0\r", 6.8, 0.0),
-    "mounting angles": (b"G1,90,0,0\rG2,90,0,0\r", 2.0**0.5, 90.0),
+    "boresight reference angles": (b"G1,90,0,0\rG2,90,0,0\rB1\rB2\r", 0.0, 71.0),
 }
 """What another program sent, and how far the readings are then off [m, deg]."""
 
@@ -98,7 +101,7 @@ def test_kept_settings_change_the_readings_and_are_reported(name: str) -> None:
 
 
 def test_filters_units_and_lists_are_reported_and_put_back() -> None:
-    left = b"uf\rMt\rMBF\rO1,2,11,0\rO2,2,4,22,1\rMp1,40\rMQ2,5\rMF1,2\rMF2,2\rH1,10,20,30\r"
+    left = b"uf\rMt\rMBF\rO1,2,11,0\rO2,2,4,22,1\rMp1,40\rMQ2,5\rMF1,2\rMF2,2\rG1,10,20,30\rH1,0,0,1\r"
     bench = shared_bench(left)
     before = send(bench, QUERIES)
     with bench.driver(DriverConfig(centimetres=False)) as stream:
@@ -110,10 +113,37 @@ def test_filters_units_and_lists_are_reported_and_put_back() -> None:
         "prediction Mp 40 ms (station 1)",
         "sensitivity MQ 5 (station 2)",
         "enhancement MF 2 (station 1, 2)",
-        "boresight reference H 10, 20, 30 deg (station 1)",
+        "boresight reference angles G 10, 20, 30 deg (station 1)",
         "centimetres; microseconds; boresight as on a Fastrak",
     ):
         assert text in bench.events[0].text
+    assert send(bench, QUERIES) == before
+
+
+def test_a_unit_at_its_defaults_is_no_reason_for_a_report() -> None:
+    bench = shared_bench(b"")
+    assert b"21H   1.00   0.00   0.00\r\n" in send(bench, QUERIES), "the default of a Fastrak"
+    with bench.driver() as stream:
+        frames_for(stream, bench, 0.5)
+    assert [event.text for event in bench.events if event.kind == "settings"] == []
+    assert b"H1" not in bench.sent.replace(b"MH1", b""), "the hemisphere vector is neither read nor written"
+    assert not re.search(rb"G\d,", bytes(bench.sent))
+
+
+@pytest.mark.parametrize("keep", [False, True])
+def test_boresight_of_a_session_gives_the_heading_of_the_reference_angles(keep: bool) -> None:
+    """`B` makes the heading that of `G`; pitch and roll stay (docs/is900.md 4.1). A session has `G` at 0, 0, 0."""
+    still = np.broadcast_to(from_yaw_pitch_roll_deg(np.array([[161.0, -20.0, 10.0]])), (500, STATIONS, 4))
+    samples = replace(make_samples(STATIONS), tracker_from_station=still)
+    bench = Bench(EmulatedDevice(samples, None, START_S))
+    send(bench, b"G1,90,5,5\rG2,90,5,5\r")
+    before = send(bench, QUERIES)
+    with bench.driver(DriverConfig(boresight=True, keep_settings=keep)) as stream:
+        frames = frames_for(stream, bench, 0.5)
+    for frame in frames:
+        angles_deg = yaw_pitch_roll_deg(frame.tracker_from_station)
+        np.testing.assert_allclose(angles_deg, [[90.0 if keep else 0.0, -20.0, 10.0]] * STATIONS, atol=1e-3)
+    assert len(frames) > 10
     assert send(bench, QUERIES) == before
 
 
@@ -230,7 +260,7 @@ def test_alignments_are_compared_by_their_effect(values: tuple[float, ...], is_d
 
 def test_every_setting_is_read_and_set_as_the_device_has_it() -> None:
     device = EmulatedDevice(make_samples(1), None, START_S).emulator.device
-    assert len({setting.name for setting in STATION_SETTINGS}) == 7
+    assert len({setting.name for setting in STATION_SETTINGS}) == 6
     for setting in STATION_SETTINGS:
         device.receive(setting.query("1"), START_S)
         (message,) = device.messages(START_S)

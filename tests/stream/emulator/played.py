@@ -13,7 +13,10 @@ from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 
-NAMES = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
+NAMES = (
+    *("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head"),
+    *("left_elbow", "right_elbow", "left_knee", "right_knee", "pelvis", "neck"),
+)
 
 
 def make_samples(

