@@ -8,6 +8,7 @@ from threading import Thread
 from harness.core.interrupts import hold_interrupts, ignore_interrupts
 from harness.core.python_process import leave_working_folder_out
 from harness.core.standard_streams import repair_streams
+from harness.core.working_folder import leave_relative_folders_out
 
 END_S = 60.0
 """Time within which the program ends after its last line, although a thread of a method may hang [s, choice]."""
@@ -17,6 +18,7 @@ def main() -> int:
     """Run the command line. Signals are handled from here on, also while the program starts and while it ends."""
     with hold_interrupts():
         repair_streams()
+        leave_relative_folders_out()
         try:
             code = _run_command_line()
         except SystemExit as ended:  # of argparse

@@ -42,6 +42,7 @@ from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
 from harness.core.python_process import safe_import_path
+from harness.core.working_folder import serve_folder
 from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
@@ -105,7 +106,7 @@ def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
     try:
-        sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
+        serve_folder(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     except OSError as error:
         raise SystemFault("The working directory no longer exists.", "Change to a folder that exists.") from error
     try:

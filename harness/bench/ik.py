@@ -16,7 +16,6 @@ import copy
 import time
 from dataclasses import dataclass
 
-import mink
 import numpy as np
 
 from harness.bench.rows import BenchmarkRow
@@ -28,6 +27,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
+from harness.core.plain_import import plain_import
 from harness.core.seeds import generator
 from harness.experiment.round_robin_timing import MethodTimings, TimedStep, take_turns
 from harness.mocap import synthetic
@@ -36,6 +36,9 @@ from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
+
+with plain_import():
+    import mink
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 RATE_HZ = 40.0

@@ -5,15 +5,18 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from harness.body import anatomy, mounts
 from harness.core import humanoid24
 from harness.core.arrays import Floats, Ints, immutable
 from harness.core.package_data import data_folder
+from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput
+
+with plain_import():
+    import mujoco
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
+from harness.core.plain_import import plain_import
 from harness.core.skeleton import Pose, Skeleton, forward_kinematics
+
+with plain_import():
+    import mujoco
 
 
 class Kinematics:

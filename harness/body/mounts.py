@@ -12,14 +12,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
-import mujoco
 import numpy as np
 
 from harness.body import anatomy
 from harness.core import rotations
 from harness.core.arrays import Floats, immutable
+from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
+
+with plain_import():
+    import mujoco
 
 _GEOM = {"capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID}
 _RAY_START_M = 1.0

@@ -7,12 +7,15 @@ their own only.
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 
 from harness.body.anatomy import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton
+
+with plain_import():
+    import pyvista as pv
 
 _BACKGROUND, _FLOOR, _LINES, _SHADOW = "#f3f5f7", "#e6eaee", "#c9d1d8", "#c3ccd4"
 _GRID_M, _FLOOR_RADIUS_M = 0.5, 5.0

@@ -11,9 +11,13 @@ or not, and the values of constants.
 Compiling everything takes most of the first run. Processes that run at the same time therefore share the work: while
 one compiles a function, others that need it wait for the machine code. LLVM optimises at level 1 of 3: that saves a
 sixth of the time, and the loops here run as fast (within 1 %) with the same results to the bit.
+
+Machine code lies in a private folder of the user (`core.cache_folder`), in a folder for each key of a module.
 """
 
 import hashlib
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -21,19 +25,29 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 from filelock import FileLock, Timeout
-from numba.core import caching, config
-from numba.core.dispatcher import Dispatcher
+
+from harness.core.cache_folder import cache_folder, keep_newest
+from harness.core.plain_import import plain_import
+
+with plain_import():
+    import llvmlite
+    import numba
+    from numba.core import caching, config
+    from numba.core.dispatcher import Dispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
 _FunctionCache: Any = caching.FunctionCache  # numba has no types
+_CacheImpl: Any = caching.CompileResultCacheImpl
 _config: Any = config
+_config._config_fname = os.devnull  # numba reads its settings again before each compilation: none of a folder
 
 _OPTIMISATION_LEVEL = _config._OptLevel(1)
 _LONGEST_COMPILATION_S = 120.0
 """Time after which a process no longer waits for one that compiles the same function [s]."""
+_KEPT_KEYS = 8
+"""Number of keys whose machine code is kept for each module: versions of the harness, of Python and of processors."""
 _source_hashes: dict[str, bytes] = {}
 """SHA-256 of the file of each compiled module, by module name; read while the module is imported, for it may change."""
 
@@ -42,10 +56,12 @@ def compiled(function: F) -> F:
     """A compiled version of a function, with IEEE arithmetic in the written order: results stay the same to the bit.
 
     It releases the interpreter lock, so a thread that reads a tracker does not wait for one that solves. Without a
-    writable folder or a source file, every process compiles anew.
+    private folder or a source file, every process compiles anew. NUMBA_DISABLE_JIT leaves the function as it is.
     """
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    with suppress(RuntimeError, OSError):  # no writable folder; no source file
+    if not isinstance(dispatcher, Dispatcher):
+        return function
+    with suppress(OSError):  # no source file
         module = function.__module__
         if module not in _source_hashes:
             _source_hashes[module] = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).digest()
@@ -60,7 +76,9 @@ def specialise(function: F, *arguments: Any) -> F:
     It skips the inspection of argument types, which takes longer than a small task does. Arguments of any other type
     are misread without an error.
     """
-    return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
+    if not isinstance(function, Dispatcher):
+        return function
+    return cast(F, function.compile(tuple(map(numba.typeof, arguments))))
 
 
 def _compile(dispatcher: Any, signature: Any) -> Any:
@@ -84,45 +102,92 @@ def _optimisation_level() -> Iterator[None]:
         _config.OPT = before
 
 
-class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: numba leaves it untyped
-    """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
+class _CodeFormat(_CacheImpl):  # type: ignore[misc]  # its base is Any: numba leaves it untyped
+    """How numba writes a compiled function, without its search for a folder."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        self._lock = FileLock(f"{self._cache_file._index_path}.lock")
+        self._locator, self._py_file = self, function.__code__.co_filename
+        self._lineno = function.__code__.co_firstlineno
+
+
+class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: numba leaves it untyped
+    """numba's cache on disk, in a folder whose name covers all that the machine code of a module depends on.
+
+    The folder is chosen and the lock is made at the first call: a process that is forked before it has its own.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._name, self._py_func, self._impl = repr(function), function, _CodeFormat(function)
+        self._cache_path: Path | None = None
+        self._cache_file: Any = None
+        self._lock: FileLock | None = None
+        self.enable()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code from disk, or None; numba calls this before it compiles, and so before it saves.
 
         With None this process holds the lock of the function until `release`. It waits while another one compiles.
         """
-        self._cache_file._source_stamp = module_stamp(self._py_func.__globals__)
+        target_context.refresh()
+        if not self._open(target_context.codegen().magic_tuple()):
+            return None
         found = self._load(sig, target_context)
-        if found is None and not self._lock.is_locked:
-            # No writable folder, a file system without locks, a process that was stopped: compile all the same.
+        if found is None and self._lock is None:
+            # A file system without locks, a process that was stopped: compile all the same.
             with suppress(OSError, NotImplementedError, Timeout):
-                self._lock.acquire(timeout=_LONGEST_COMPILATION_S)
+                lock = FileLock(f"{self._cache_file._index_path}.lock", timeout=_LONGEST_COMPILATION_S)
+                lock.acquire()
+                self._lock = lock
                 found = self._load(sig, target_context)
         return found
 
+    def _open(self, target: Any) -> bool:
+        """Choose the folder of the module for a processor, and make it; False where there is none."""
+        root, code = cache_folder(), self._py_func.__code__
+        if root is None:
+            return False
+        module = self._py_func.__module__
+        key = _machine_key(module_stamp(self._py_func.__globals__), target)
+        self._cache_path = root / "machine-code" / module / key
+        with suppress(OSError):
+            if self._cache_path.is_dir():
+                os.utime(self._cache_path)
+            else:
+                self._cache_path.mkdir(parents=True)
+                keep_newest(self._cache_path.parent, _KEPT_KEYS)
+            name = f"{self._py_func.__qualname__}-{code.co_firstlineno}".replace("<", "").replace(">", "")
+            self._cache_file = caching.IndexDataCacheFile(self._cache_path, name, key)
+            return True
+        return False
+
     def _load(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
-        except (AttributeError, ImportError):  # the file names a class that has been renamed or moved
-            self.flush()
+            return self._load_overload(sig, target_context)
+        except Exception:  # a damaged file, one of another version of a library, or a class that has been renamed
+            with suppress(OSError):
+                self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save machine code; a folder that cannot be written costs the next process a compilation, and no more."""
         with suppress(OSError):
-            super().save_overload(sig, data)
+            if self._cache_file is not None and self._impl.check_cachable(data):
+                self._cache_file.save(self._index_key(sig, data.codegen), self._impl.reduce(data))
 
     def release(self) -> None:
         """Let other processes load what was compiled."""
-        if self._lock.is_locked:
-            self._lock.release()
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            lock.release()
             with suppress(OSError):
-                Path(self._lock.lock_file).unlink()
+                Path(lock.lock_file).unlink()
+
+
+def _machine_key(stamp: str, target: Any) -> str:
+    """Name for the machine code of a module: its stamp, versions of Python and compiler, settings, the processor."""
+    settings = sorted((k, v) for k, v in os.environ.items() if k.startswith("NUMBA_") and "CACHE" not in k)
+    versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
+    return hashlib.sha256(repr((stamp, versions, settings, target)).encode()).hexdigest()[:32]
 
 
 def module_stamp(namespace: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ import signal
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Callable, Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -13,6 +13,7 @@ from threading import Thread
 from typing import Any, TypeVar
 
 from harness.core.interrupts import SIGNALS, shield_children
+from harness.core.working_folder import serve_folder, served_folders
 
 R = TypeVar("R")
 
@@ -175,17 +176,19 @@ class _WorkerProcess:
         with shield_children():  # the pool may start the process that tracks its semaphores
             self._temporary = tempfile.TemporaryDirectory(prefix="harness-worker-", ignore_cleanup_errors=True)
             self._worker_end, self._own_end = get_context("spawn").Pipe(duplex=False)
-            given = (self._worker_end, self._temporary.name)
+            given = (self._worker_end, self._temporary.name, served_folders())
             self.pool = ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, given)
 
 
-def _initialise_worker(alive: Connection, temporary: str) -> None:
+def _initialise_worker(alive: Connection, temporary: str, folders: Mapping[str, Iterable[str]]) -> None:
     for number in SIGNALS:  # they are blocked already, but not on Windows
         signal.signal(number, signal.SIG_IGN)
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # a group of its own, which ends with it: processes that the task starts
     tempfile.tempdir = os.environ["TMPDIR"] = temporary  # a process that is stopped at once leaves files behind
     sys.stdout = sys.stderr
+    for folder, names in folders.items():
+        serve_folder(folder, names)
     Thread(target=_exit_with_parent, args=(alive,), daemon=True).start()
 
 

@@ -22,6 +22,7 @@ from typing import Any, Protocol, TypeVar
 
 from harness.core.interrupts import shield_children
 from harness.core.workers import Pool, schedule_tasks
+from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, MissingExtra
 from harness.experiment.cells import ClipTask
 from harness.results.manifest import source_hash
@@ -226,7 +227,6 @@ def _run_on_worker(source: str, folder: str, function: Callable[..., R], *task: 
         advice = "Start both anew with the same one; what was finished is kept."
         raise BadInput("A worker has another version of the harness than the program that it works for.", advice)
     with _worker_lock, redirect_stdout(sys.stderr):
-        if folder not in sys.path:
-            sys.path.append(folder)  # a user's own method may lie in the caller's working directory
+        serve_folder(folder)  # a user's own method may lie in the caller's working directory
         result = function(*task)
         return list(result) if isinstance(result, Iterator) else result  # type: ignore[return-value]  # both are iterable

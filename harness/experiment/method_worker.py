@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.core.estimate import Origin, Status
 from harness.core.messages import MessageError, read_message, write_message
+from harness.core.working_folder import serve_folder
 from harness.errors import HarnessError
 from harness.experiment.file_audit import FileAudit
 from harness.experiment.method_messages import (
@@ -72,6 +73,8 @@ class MethodWorker:
 
     def _describe(self, header: Header, arrays: Arrays) -> Message:
         sys.path[:] = header["path"]
+        for folder, names in header["folders"].items():
+            serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
         method = registry.resolve(header["name"])
         files = source_files(method, tuple(sys.modules.values()))

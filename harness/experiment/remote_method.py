@@ -19,6 +19,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
+from harness.core.working_folder import served_folders
 from harness.errors import HarnessError
 from harness.experiment.isolation import Isolation
 from harness.experiment.method_messages import (
@@ -86,7 +87,13 @@ class RemoteMethod:
 
     def _ask(self) -> _Description:
         path, memory_bytes = [os.path.abspath(entry) for entry in sys.path], self.process.isolation.memory_bytes
-        header = {"operation": "describe", "name": self.name, "path": path, "memory_bytes": memory_bytes}
+        header = {
+            "operation": "describe",
+            "name": self.name,
+            "path": path,
+            "folders": served_folders(),
+            "memory_bytes": memory_bytes,
+        }
         answer, _ = self.process.request(header, {}, _MAX_REPLY_BYTES)
         return self.read(lambda: _Description(**answer))
 

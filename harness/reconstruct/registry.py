@@ -15,6 +15,7 @@ from typing import Any, cast
 
 from harness.core.fields import replace_fields
 from harness.core.options import parse_name, split_outside_brackets
+from harness.core.working_folder import name_module
 from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, weighted_blend
@@ -144,6 +145,7 @@ def _base_method(name: str) -> Method:
     if name in registered:
         return registered[name]()
     module, colon, attribute = name.partition(":")
+    name_module(module)
     if not colon or not attribute or module in registered or not _module_exists(module):
         raise UnknownName("method", name, registered)
     try:

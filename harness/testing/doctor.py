@@ -267,6 +267,7 @@ def run_evo_ape_m(program: str, truth: Path, estimate: Path) -> float:
     done = subprocess.run(
         [program, "tum", str(truth), str(estimate)],
         env={**os.environ, "HOME": str(home), "MPLBACKEND": "agg"},
+        cwd=home,
         capture_output=True,
         text=True,
         timeout=120,

@@ -8,7 +8,6 @@ uses the fixture.
 """
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,6 +34,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     instead; a new baseline is measured on `scenario` (a shipped one or a file).
     """
     from harness.compare.margins import GATED_METRICS
+    from harness.core.working_folder import serve_folder
     from harness.errors import HarnessError
     from harness.testing.regression_gate import RegressionGate
 
@@ -51,8 +51,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
         metrics: tuple[str, ...] = GATED_METRICS,
     ) -> None:
         __tracebackhide__ = True
-        if str(root) not in sys.path:
-            sys.path.append(str(root))  # as on the command line, methods may lie there
+        serve_folder(str(root))  # as on the command line, methods may lie there
         try:
             if options.harness_save:
                 folder = gate.save_baseline(method, baseline, scenario=scenario)

@@ -9,13 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 
 from harness.body.rendering import RenderScene
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import atomic_path
+from harness.core.plain_import import plain_import
 from harness.view.movie import DRAWN_SUFFIX
+
+with plain_import():
+    import pyvista as pv
 
 _TRUTH, _METHODS, _LOST = "#5b87ad", ("#e8850c", "#0f9d76", "#c05f9c"), "#8d98a5"
 _STATIONS = ("#20a4a8", "#e0b000", "#d43c3c")

@@ -45,12 +45,21 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
-def run_package(folder: Path, record: str = "Pair", **environment: str) -> tuple[float, int]:
-    """The result of the outermost function in a new process, and how often its machine code came from disk."""
+def run_package(folder: Path, record: str = "Pair", script: str = _SCRIPT, **environment: str) -> tuple[float, int]:
+    """The result of the outermost function in a new process, and how often its machine code came from disk.
+
+    Byte code is not written: the sources change within a second.
+    """
     path = os.pathsep.join([str(folder.parent), *filter(None, sys.path)])
     result = subprocess.run(
-        [sys.executable, "-c", _SCRIPT.format(record=record)],
-        env={**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **environment},
+        [sys.executable, "-c", script.format(record=record)],
+        env={
+            **os.environ,
+            "PYTHONPATH": path,
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "NUMBA_CACHE_DIR": str(folder.parent / "cache"),
+            **environment,
+        },
         capture_output=True,
         text=True,
         check=True,
@@ -82,9 +91,50 @@ def test_a_renamed_record_does_not_break_the_load(package: Path) -> None:
 
 
 def test_without_a_writable_folder_every_process_compiles(package: Path) -> None:
-    nowhere = {"NUMBA_CACHE_DIR": os.devnull + "/none", "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator"}
-    assert run_package(package, **nowhere) == (14.0, 0)
-    assert not list(package.rglob("*.nbi"))
+    for _ in range(2):
+        assert run_package(package, NUMBA_CACHE_DIR=os.devnull + "/none") == (14.0, 0)
+    assert not list(package.parent.rglob("*.nbi"))
+
+
+def test_machine_code_lies_in_the_cache_folder_alone(package: Path) -> None:
+    run_package(package)
+    folders = {file.parent for file in package.parent.rglob("*.nb[ic]")}
+    root = package.parent / "cache" / "tracker-harness" / "machine-code"
+    assert {folder.parent for folder in folders} == {
+        root / f"bench_package.{name}" for name in ("inner", "middle", "outer")
+    }
+
+
+def test_a_process_forked_after_the_import_compiles(package: Path) -> None:
+    """The lock of a function belongs to the process that compiles: the server of methods forks after the import."""
+    code = "import os\nfrom bench_package.outer import Pair, total\nchild = os.fork()\n"
+    code += "if child == 0:\n    total(Pair(1.0, 10.0))\n    os._exit(0)\nprint(os.waitpid(child, 0)[1], 0)"
+    assert run_package(package, script=code) == (0.0, 0)
+    assert run_package(package) == (14.0, 1)
+
+
+def test_settings_of_the_compiler_and_other_sources_have_machine_code_of_their_own(package: Path) -> None:
+    """Two versions of a package that are used in turn do not replace each other's machine code."""
+    assert run_package(package) == (14.0, 0)
+    assert run_package(package, NUMBA_BOUNDSCHECK="1") == (14.0, 0)
+    edit(package / "numbers_.py", "1.0", "3.0")
+    assert run_package(package) == (18.0, 0)
+    edit(package / "numbers_.py", "3.0", "1.0")
+    assert run_package(package) == (14.0, 1)
+
+
+def test_a_damaged_file_is_compiled_anew(package: Path) -> None:
+    assert run_package(package) == (14.0, 0)
+    for file in (package.parent / "cache").rglob("*.nbc"):
+        file.write_bytes(file.read_bytes()[:100])
+    assert run_package(package) == (14.0, 0)
+    assert run_package(package) == (14.0, 1)
+
+
+def test_without_compilation_the_functions_are_those_of_python(package: Path) -> None:
+    code = "from bench_package.outer import Pair, total\nfrom harness.core.compiled import specialise\n"
+    code += "print(specialise(total, Pair(1.0, 10.0))(Pair(1.0, 10.0)), 0)"
+    assert run_package(package, script=code, NUMBA_DISABLE_JIT="1") == (14.0, 0)
 
 
 def test_two_processes_at_the_same_time_compile_a_function_once(package: Path) -> None:

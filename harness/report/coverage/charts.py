@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.plain_import import plain_import
 from harness.report.coverage.content import CoverageContent, PlanView, format_dilution
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.rows import label_rows
@@ -27,7 +28,8 @@ _ROW_IN, _FRAME_IN = 0.3, 0.95
 
 def heard_chart(content: CoverageContent) -> Chart:
     """Plan views of the number of emitters heard."""
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+    with plain_import():
+        from matplotlib.colors import BoundaryNorm, ListedColormap
 
     norm = BoundaryNorm((*_HEARD_EDGES, 10_000), len(_HEARD_COLOURS))
     labels = [f"{low}" if high == low + 1 else f"{low} to {high - 1}" for low, high in _neighbours(_HEARD_EDGES)]
@@ -38,8 +40,9 @@ def heard_chart(content: CoverageContent) -> Chart:
 
 def dilution_chart(content: CoverageContent) -> Chart:
     """Plan views of the dilution of precision."""
-    from matplotlib import colormaps
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+    with plain_import():
+        from matplotlib import colormaps
+        from matplotlib.colors import BoundaryNorm, ListedColormap
 
     count = len(_DILUTION_EDGES)
     colours = ListedColormap(colormaps["viridis_r"](np.linspace(0.0, 1.0, count)))

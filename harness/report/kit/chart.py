@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.plain_import import plain_import
 from harness.report.kit.hover_chart import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 
@@ -48,7 +49,8 @@ def draw_chart(
     lines under the pointer and switches them off in the legend. `titles` are shown under the pointer too: gid of an
     element -> text.
     """
-    import matplotlib
+    with plain_import():
+        import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from harness.core.plain_import import plain_import
 from harness.errors import BadInput, UnknownName
 from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
 
@@ -50,7 +51,8 @@ def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
         raise UnknownName("format of figures", fmt, FORMATS)
     if width_mm not in WIDTHS_MM:
         raise BadInput(f"A figure {width_mm} mm wide.", f"Choose {' or '.join(map(str, WIDTHS_MM))} mm.")
-    import matplotlib
+    with plain_import():
+        import matplotlib
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(PRINT_SETTINGS):

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 
 from harness.body.anatomy import BodyGeom, body_geoms
 from harness.body.humanoid import tpose
@@ -18,8 +17,12 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import write_npz
 from harness.core.humanoid24 import standard_skeleton, unpack
+from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.report.placement.body_map import interpolate_colours
+
+with plain_import():
+    import pyvista as pv
 
 SIZE = (760, 740)
 """Width and height of one view [px]."""

@@ -1,13 +1,16 @@
 """Line of sight: which straight paths of sound the performer's body and the furniture block."""
 
-import mujoco
 import numpy as np
 
 from harness.body.humanoid import Body, body_spec
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
+from harness.core.plain_import import plain_import
 from harness.simulate.physics.room import PlacedRoom
+
+with plain_import():
+    import mujoco
 
 _YIELD_M = 0.02
 """A surface closer to the end of a path than this does not block it [m] [choice]. Soft tissue or a misplaced mount may
