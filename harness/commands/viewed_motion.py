@@ -76,13 +76,14 @@ def _find_clip(name: str, mocap: LibraryFolders | None) -> Clip:
     built_in = SyntheticSource(_SEED)
     if name in built_in.names():
         return built_in.load(name)
-    if Path(name).suffix or len(Path(name).parts) > 1:
-        raise BadFile(name, "no such file or folder", _KINDS, "Check the path.")
     folders = find_library_folders(mocap) if mocap or folders_of_environment() else None
-    if folders is None:
+    library = None if folders is None else MotionLibrary(folders)
+    if (Path(name).suffix or len(Path(name).parts) > 1) and (library is None or name not in library.names()):
+        raise BadFile(name, "no such file or folder", _KINDS, "Check the path.")
+    if library is None:
         found = f"There is no file, folder or built-in take {name!r}, and no library was named."
         raise BadInput(found, "`harness list` names the takes; --mocap DIR or HARNESS_MOCAP a library.")
-    return MotionLibrary(folders).load(name)
+    return library.load(name)
 
 
 def view_clip(clip: Clip) -> ViewedMotion:

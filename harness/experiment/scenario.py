@@ -287,7 +287,9 @@ def _match_clips(key: str, texts: Sequence[str], names: Collection[str]) -> tupl
             entries.append(text)
             continue
         pattern, at, part = text.partition("@")
-        matches = sorted(name for name in names if fnmatch.fnmatchcase(name, pattern))
+        matches = sorted(
+            name for name in names if any(fnmatch.fnmatchcase(one, pattern) for one in {name, name.rpartition("/")[2]})
+        )
         if not matches:
             raise BadInput(f"motion.{key}: no clip matches {text!r}.", "`harness mocap list` names those of a library.")
         entries += [f"{name}{at}{part}" for name in matches if f"{name}{at}{part}" not in (*texts, *entries)]

@@ -8,6 +8,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadInput, NotComparable
+from harness.measure.conventions import require_orientations, require_same_hand, require_scale
 from harness.measure.correlated_errors import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
 from harness.measure.measured import NORMAL_QUANTILE, Measured
@@ -33,7 +34,8 @@ LEAST_MATCHED = 0.95
 """Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
 LEAST_CORRELATION = 0.5
 """Smallest correlation of angular speeds with which motion counts as the reference's."""
-MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05}
+_OF_IT = "of it"
+MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05, _OF_IT: 0.1}
 """Largest standard deviation by unit; a parameter with a larger one is not observable."""
 
 
@@ -171,9 +173,9 @@ def register(
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps
-    and for another motion. NotComparable for little overlap, few matched records and motion about one axis; it names
-    what is not observable.
+    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps,
+    for another motion, and for other axes or units of the reference. NotComparable for little overlap, few matched
+    records and motion about one axis; it names what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
@@ -190,6 +192,10 @@ def register(
     grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
     start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
     fit = fit_registration(list(grids.values()), list(splines.values()), start)
+    require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
+    factor = 1.0 + fit.state.scale
+    if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
+        require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named))
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
 
@@ -280,6 +286,7 @@ def _start(
     for grid, spline in zip(grids.values(), splines, strict=True):
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
+    require_same_hand([one.position_m for one in paired], [one.body_m for one in paired])
     solved = solve_hand_eye(paired, with_scale=False)
     return RegistrationState(
         middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, 0.0, 0.0,
@@ -292,6 +299,7 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
     checks = [
         ("the room's rotation", "rad", deviation[ROOM_TURN]),
         ("the tracker's origin", "m", deviation[ROOM_ORIGIN]),
+        ("the scale", _OF_IT, deviation[[SCALE]] / max(abs(1.0 + fit.state.scale), 1e-9)),
         ("the heading error", "rad", deviation[[HEADING]]),
         ("the time offset of orientations", "s", deviation[[OFFSET]]),
         ("the time offset of positions", "s", deviation[[AHEAD]]),

@@ -16,6 +16,7 @@ from harness.core.files import read_toml
 from harness.core.output_file import write_output
 from harness.core.toml_text import format_toml_value, toml_table_lines
 from harness.errors import BadFile, HarnessError
+from harness.measure.conventions import require_scale
 from harness.measure.measured import Measured
 
 UNIT_SCHEMA = 1
@@ -69,7 +70,8 @@ def write_unit_file(path: Path, unit: UnitFile, *, force: bool = False) -> None:
 
 
 def read_unit_file(path: Path | str) -> UnitFile:
-    """Read a unit file; BadFile for anything else, unknown tables and numbers that contradict each other.
+    """Read a unit file; BadFile for anything else, unknown tables, numbers that contradict each other, and a session's
+    scale that is no tracker's.
 
     The values of `components` and `tracker` are checked where a scenario takes them over.
     """
@@ -88,6 +90,8 @@ def read_unit_file(path: Path | str) -> UnitFile:
         measured, session = (
             {key: Measured(*numbers) for key, numbers in table.items()} for table in (tables.measured, tables.session)
         )
+        if "scale" in session:
+            require_scale(1.0 + session["scale"].value)
     except (TypeError, ValueError, HarnessError) as error:
         raise BadFile(path, str(error).rstrip("."), UNIT_FILE, _ADVICE) from error
     return UnitFile(

@@ -1,9 +1,13 @@
 """A motion library: motion files in one or several folders, found by clip name and loaded on request.
 
-A clip's name is its subject and trial, such as "13_17". Copies in several formats share the name; the format that
-says most is loaded: AMC (with its ASF), then BVH, MVNX and AMASS npz. C3D files are listed, but hold markers instead of
-the motion of a skeleton. What the files do not say (behaviour, rate) comes from the index of each folder
-(`harness.mocap.index`).
+A clip is one take: files of the same bytes, files of one folder and name in several formats, and files that CMU's
+subject and trial name, in several formats anywhere. The format that says most is loaded: AMC (with its ASF), then BVH,
+MVNX and AMASS npz. C3D files are listed, but hold markers instead of the motion of a skeleton. Files of one name whose
+rows in the index name different subjects or rates are different takes. What the files do not say (behaviour, rate)
+comes from the index of each folder (`harness.mocap.index`).
+
+A clip's name is the stem of its file, such as "13_17". Where several takes have it, each is named by its path in the
+library: "Anna/take_001", "Bert/take_001".
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,7 +78,7 @@ def ignored_paths_note(paths: Sequence[Path | str]) -> list[str]:
 class MotionLibrary:
     """The clips in one or several folders, at any depth.
 
-    A name that two folders hold must stand for identical files; the index of the first folder counts.
+    A short name that two folders hold must stand for one take; the index of the first folder counts.
     """
 
     def __init__(self, folders: LibraryFolders, *, rate_hz: float | None = None) -> None:
@@ -85,34 +89,26 @@ class MotionLibrary:
         """
         self.folders = as_folders(folders)
         self._rate_hz = rate_hz
-        self._entries: dict[str, LibraryEntry] = {}
-        self._folder_of: dict[str, Path] = {}
+        files: dict[str, list[_File]] = {}
         ignored: list[Path] = []
         for folder in self.folders:
-            entries, paths = _scan_entries(folder.resolve())
+            found, paths = _scan_files(folder)
             ignored += paths
-            for entry in entries.values():
-                self._add(entry, folder)
-        self._entries = dict(sorted(self._entries.items()))
+            for file in found:  # folders of a library may contain each other
+                if all(file.path != other.path for other in files.get(clip_name(file.path), ())):
+                    files.setdefault(clip_name(file.path), []).append(file)
+        self._takes: dict[str, list[_File]] = {}
+        self._choices: dict[str, tuple[str, ...]] = {}
+        """Short name -> the names of its takes, where it has several."""
+        for name, same in files.items():
+            named = _name_takes(name, _group_takes(same))
+            self._takes |= named
+            if name not in named:
+                self._choices[name] = tuple(sorted(named))
+        self._takes = dict(sorted(self._takes.items()))
+        self._entries = {name: _make_entry(name, take) for name, take in self._takes.items()}
         self.ignored_paths = tuple(ignored)
         """Symbolic links that lead outside their library folder or to nothing, and folders that cannot be read."""
-
-    def _add(self, entry: LibraryEntry, folder: Path) -> None:
-        other = self._entries.get(entry.name)
-        motions = other is not None and "c3d" not in (entry.format, other.format)
-        if other is not None and motions:
-            check_size(entry.path, "a motion file")
-        if other is not None and motions and not cmp(other.path, entry.path, shallow=False):
-            raise BadInput(
-                f"The clip {entry.name} differs between two folders: {other.path} and {entry.path}.",
-                "Rename or remove one of them, or name only one of the folders.",
-            )
-        if other is None or (other.format == "c3d" and entry.format != "c3d"):
-            best, rest, self._folder_of[entry.name] = entry, other, folder
-        else:
-            best, rest = other, entry
-        copies = () if rest is None else (rest.path, *rest.copies)
-        self._entries[entry.name] = replace(best, copies=(*best.copies, *copies))
 
     def entries(self) -> tuple[LibraryEntry, ...]:
         """Every clip, sorted by name."""
@@ -123,8 +119,13 @@ class MotionLibrary:
         return tuple(entry.name for entry in self.entries() if entry.format != "c3d")
 
     def entry(self, name: str) -> LibraryEntry:
-        """The entry of a clip; UnknownName if the library has no such clip."""
+        """The entry of a clip; UnknownName if the library has no such clip, BadInput if it has several."""
         if name not in self._entries:
+            if name in self._choices:
+                raise BadInput(
+                    f"The clip name {name!r} stands for {len(self._choices[name])} different takes.",
+                    f"Name one of {', '.join(self._choices[name])}.",
+                )
             raise UnknownClip(name, tuple(self._entries), tuple(map(str, self.ignored_paths)))
         return self._entries[name]
 
@@ -133,13 +134,14 @@ class MotionLibrary:
 
         Raises UnknownName, BadFile, and BadInput where the rate is unknown or the file holds markers only.
         """
-        entry, folder = self.entry(name), self._folder_of[name]
+        entry = self.entry(name)
+        folder = self._takes[name][0].folder
         clip = read_library_file(entry.path, folder.resolve(), entry.rate_hz or self._rate_hz)
         return replace(
             clip,
             name=entry.name,
             subject=entry.subject,
-            source="cmu" if CMU_NAME.fullmatch(entry.name) else folder.name,
+            source="cmu" if CMU_NAME.fullmatch(clip_name(entry.path)) else folder.name,
             behaviour=entry.behaviour,
             notes=(entry.note, *clip.notes) if entry.note else clip.notes,
         )
@@ -161,31 +163,110 @@ def as_folders(folders: LibraryFolders) -> tuple[Path, ...]:
     return paths
 
 
-def _scan_entries(top: Path) -> tuple[dict[str, LibraryEntry], tuple[Path, ...]]:
-    """Entries by clip name, and the ignored paths, of a resolved folder."""
+@dataclass(frozen=True)
+class _File:
+    """A motion file of a library."""
+
+    path: Path
+    folder: Path
+    """The library's folder, as it was named."""
+    place: str
+    """Path in the folder, without the ending of the format."""
+    row: Mapping[str, str]
+    """Row of the folder's index; empty without one."""
+
+    @property
+    def format(self) -> str:
+        return self.path.suffix.lower().lstrip(".")
+
+    @property
+    def ending(self) -> str:
+        """What the file's name has beyond that of the clip, such as ".bvh" and "_poses.npz"."""
+        return self.path.name.removeprefix(clip_name(self.path)).lower()
+
+    def contradicts(self, other: "_File") -> bool:
+        """Whether the index names another subject or rate for the other file."""
+        mine, its = self.row, other.row
+        pairs = [(mine.get("subject"), its.get("subject"))]
+        pairs += [(float(a), float(b)) for a, b in [(mine.get("fps"), its.get("fps"))] if a and b]
+        return any(a and b and a != b for a, b in pairs)
+
+    def is_take_of(self, take: Sequence["_File"], same_place: bool) -> bool:
+        """Whether this is a take in another format: by CMU's subject and trial, or at the same place."""
+        known = any(file.place == self.place for file in take) if same_place else CMU_NAME.fullmatch(self.path.stem)
+        return bool(known) and not any(file.ending == self.ending or self.contradicts(file) for file in take)
+
+
+def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
+    """The motion files of a library's folder, and its ignored paths."""
+    top = folder.resolve()
     index = read_index(top / INDEX_NAME)
     rows = {(top / path).resolve(): row for path, row in index.items()}
     scan = scan_folder(top, {f".{kind}" for kind in FORMATS})
-    files: dict[str, list[Path]] = {}
+    files = []
     for path in scan.files:
-        files.setdefault(clip_name(path), []).append(path)
-    entries = {}
-    for name in sorted(files):
-        best, *others = sorted(files[name], key=lambda path: (FORMATS.index(path.suffix.lower().lstrip(".")), path))
-        row = index.get(best.relative_to(top).as_posix()) or rows.get(best.resolve(), {})
-        entries[name] = _make_entry(name, best, tuple(others), row)
-    return entries, scan.ignored_paths
+        inside = path.relative_to(top)
+        row = index.get(inside.as_posix()) or rows.get(path.resolve(), {})
+        files.append(_File(path, folder, inside.with_name(clip_name(path)).as_posix(), row))
+    return files, scan.ignored_paths
 
 
-def _make_entry(name: str, path: Path, copies: tuple[Path, ...], row: Mapping[str, str]) -> LibraryEntry:
+def _group_takes(files: Sequence[_File]) -> list[list[_File]]:
+    """Files of one name by take, the preferred file of each first."""
+    takes: list[list[_File]] = []
+    for file in sorted(files, key=lambda file: FORMATS.index(file.format)):
+        same = [take for take in takes if any(_is_same(file, other) for other in take)]
+        for same_place in (True, False):
+            same = same or [take for take in takes if file.is_take_of(take, same_place)]
+        if len(same) == 1:
+            same[0].append(file)
+        else:
+            takes.append([file])
+    return takes
+
+
+def _is_same(file: _File, other: _File) -> bool:
+    """Whether two files have the same bytes and the same skeleton, rate and subject."""
+    if file.format != other.format or file.contradicts(other):
+        return False
+    return file.path.resolve() == other.path.resolve() or cmp(file.path, other.path, shallow=False)
+
+
+def _name_takes(name: str, takes: list[list[_File]]) -> dict[str, list[_File]]:
+    """The takes by name: `name` for the only one with motion, else each by its path in the library.
+
+    BadInput where takes with motion lie in different folders of the library.
+    """
+    motions = [take for take in takes if take[0].format != "c3d"] or takes
+    first, *others = (take[0] for take in motions)
+    for other in others:
+        if other.folder != first.folder and other.format != "c3d":
+            raise BadInput(
+                f"The clip {name} differs between two folders: {first.path} and {other.path}.",
+                "Rename or remove one of them, or name only one of the folders.",
+            )
+    named = {}
+    for take in takes:
+        place = take[0].place if "/" in take[0].place else f"./{take[0].place}"
+        if take is motions[0] and not others:
+            place = name
+        elif place in named or sum(each[0].place == take[0].place for each in takes) > 1:
+            place = f"{place}{take[0].path.name.removeprefix(name)}"
+        named[place] = take
+    return named
+
+
+def _make_entry(name: str, take: Sequence[_File]) -> LibraryEntry:
+    best, row, short = take[0], take[0].row, clip_name(take[0].path)
+    folder = Path(name).parent.as_posix() if name != short and not CMU_NAME.fullmatch(short) else "."
     return LibraryEntry(
         name=name,
-        format=path.suffix.lower().lstrip("."),
-        path=path,
-        subject=row.get("subject") or name.split("_", 1)[0],
+        format=best.format,
+        path=best.path,
+        subject=row.get("subject") or (short.split("_", 1)[0] if folder == "." else folder),
         behaviour=row.get("behaviour") or "",
         frames=int(row["frames"]) if row.get("frames") else None,
         rate_hz=float(row["fps"]) if row.get("fps") else None,
         note=row.get("note") or "",
-        copies=copies,
+        copies=tuple(file.path for file in take[1:]),
     )

@@ -1,5 +1,6 @@
 """`harness validate` as a user meets it."""
 
+import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,25 @@ def test_the_frames_of_replay_are_a_reference(boxing: Path, tmp_path: Path, caps
     code, out, _ = run(capsys, "validate", boxing, "--truth", path, "--json")
     assert code == 0
     assert abs(json.loads(out)["numbers"]["time_offset_orientation_s"]["value"]) < 1e-6
+
+
+@pytest.mark.parametrize(("sign", "factor", "cause"), [(-1.0, 1.0, "left-handed"), (1.0, 1.0 / 0.3048, "feet")])
+def test_a_mirrored_reference_and_one_in_feet_write_no_file(
+    sign: float, factor: float, cause: str, boxing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, table, _ = run(capsys, "replay", boxing, "--frames")
+    path, unit = tmp_path / "frames.csv", tmp_path / "out" / "unit.toml"
+    unit.parent.mkdir()
+    rows = list(csv.DictReader(table.splitlines()[:-1]))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        for row in rows:
+            signs = {"x_m": factor, "y_m": sign * factor, "z_m": factor, "qx": sign, "qz": sign}
+            writer.writerow(row | {key: by * float(row[key]) for key, by in signs.items() if row[key]})
+    code, out, err = run(capsys, "validate", boxing, "--truth", path, "--out", unit, "--json")
+    assert (code, cause in err, json.loads(out)["outcome"]) == (2, True, "refused")
+    assert list(unit.parent.iterdir()) == []
 
 
 def test_methods_need_a_clip(boxing: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -310,6 +310,15 @@ def test_patterns_in_clip_lists_stand_for_the_clips_that_match(tmp_path: Path) -
     assert expand_clips(load_scenario("demo"), None) == load_scenario("demo")
 
 
+def test_a_pattern_matches_clips_that_are_named_by_their_path(tmp_path: Path) -> None:
+    for name, frames in (("Anna/take_001", 3), ("Bert/take_001", 4), ("Bert/take_002", 3)):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / f"{name}.bvh").write_text(str(frames))
+    text = MINIMAL.replace('"builtin"', '"cmu"').replace("walking_p1_01", "take_*")
+    motion = expand_clips(load_scenario(written(tmp_path, text)), tmp_path).motion
+    assert motion.test == ("Anna/take_001", "Bert/take_001", "take_002")
+
+
 def test_a_pattern_that_matches_nothing_is_refused(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL.replace("walking_p1_01", "walking_p9_*")))
     with pytest.raises(BadInput, match=r"motion\.test: no clip matches 'walking_p9_\*'"):

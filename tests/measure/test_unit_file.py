@@ -18,7 +18,7 @@ UNIT = UnitFile(
     tracker={"rate_hz": 40.0, "items": [40, 2, 11, 21, 1]},
     measured={"components.white.position_m": Measured(0.0007, 0.00069, 0.00071, 1000)},
     not_measured={"components.session.scale": "A reference is needed."},
-    session={"scale": Measured(1.001, 1.0, 1.002, 6)},
+    session={"scale": Measured(0.001, 0.0, 0.002, 6)},
     capture={"file": 'a "quoted" name.is900', "seconds": 60.0},
 )
 
@@ -54,6 +54,8 @@ def test_a_key_that_was_not_measured_has_no_interval(tmp_path: Path) -> None:
         ("[tracker]", "[trackers]", "trackers"),
         ("0.00069, 0.00071, 1000]", "0.00072, 0.00071, 1000]", "interval"),
         ("0.00069, 0.00071, 1000]", "0.00069]", "expected 4 values"),
+        ("scale = [0.001, 0.0, 0.002, 6]", "scale = [-2.0007, -2.0008, -2.0006, 6]", "left-handed"),
+        ("scale = [0.001, 0.0, 0.002, 6]", "scale = [-0.6952, -0.6953, -0.6951, 6]", "feet"),
         ("[components.white]", "[components]\nwhite = 3.0\n[components.other]", "components.white: expected a table"),
     ],
 )

@@ -153,6 +153,100 @@ def test_one_name_for_two_motions_is_refused_with_both_files(
     assert str(other / "91_02.bvh") in str(error.value)
 
 
+def write_takes(top: Path, places: dict[str, int], suffix: str = ".bvh") -> Path:
+    """BVH files of clips of different lengths, by place in a library."""
+    for place, frames in places.items():
+        path = top / f"{place}{suffix}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(bvh_text(clip(frames)))
+    return top
+
+
+@pytest.mark.parametrize("index", ["", "path,subject\nAnna/take_001.bvh,anna\nBert/take_001.bvh,bert\n"])
+def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: str) -> None:
+    write_takes(tmp_path, {"Anna/take_001": 12, "Bert/take_001": 15, "Bert/take_002": 18})
+    if index:
+        (tmp_path / "manifest.csv").write_text(index)
+    library = MotionLibrary(tmp_path)
+    assert library.names() == ("Anna/take_001", "Bert/take_001", "take_002")
+    assert [len(library.load(name)) for name in library.names()] == [12, 15, 18]
+    assert [library.entry(f"{who}/take_001").subject.lower() for who in ("Anna", "Bert")] == ["anna", "bert"]
+    assert [entry.copies for entry in library.entries()] == [(), (), ()]
+    assert library.load("Bert/take_001").name == "Bert/take_001"
+    with pytest.raises(BadInput, match=r"2 different takes\. Name one of Anna/take_001, Bert/take_001"):
+        library.load("take_001")
+
+
+def test_equal_files_at_two_places_are_one_clip_unless_the_index_says_otherwise(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"Anna/take_001": 12, "copy/take_001": 12, "copy/deep/take_001": 15})
+    assert MotionLibrary(tmp_path).names() == ("Anna/take_001", "copy/deep/take_001")
+    (tmp_path / "copy" / "deep" / "take_001.bvh").unlink()
+    (tmp_path / "copy" / "deep" / "take_001.bvh").symlink_to(tmp_path / "Anna" / "take_001.bvh")
+    entry = MotionLibrary(tmp_path).entry("take_001")
+    assert entry.path == tmp_path / "Anna" / "take_001.bvh"
+    assert entry.copies == (tmp_path / "copy" / "deep" / "take_001.bvh", tmp_path / "copy" / "take_001.bvh")
+    for column, values in (("subject", ("anna", "bert")), ("fps", ("60", "120"))):
+        index = f"path,{column}\nAnna/take_001.bvh,{values[0]}\ncopy/take_001.bvh,{values[1]}\n"
+        (tmp_path / "manifest.csv").write_text(index)
+        assert "copy/take_001" in MotionLibrary(tmp_path).names()
+    (tmp_path / "manifest.csv").write_text("path,fps\nAnna/take_001.bvh,60\ncopy/take_001.bvh,60.0\n")
+    assert MotionLibrary(tmp_path).names() == ("take_001",)
+
+
+def test_a_clip_at_two_rates_is_two_clips(tmp_path: Path) -> None:
+    for rate_hz in (60.0, 120.0):
+        path = tmp_path / f"{rate_hz:g}hz" / "91_01.bvh"
+        path.parent.mkdir()
+        path.write_text(bvh_text(clip()).replace("Frame Time: .0083333", f"Frame Time: {1.0 / rate_hz}"))
+    library = MotionLibrary(tmp_path)
+    assert [library.load(name).rate_hz for name in ("60hz/91_01", "120hz/91_01")] == pytest.approx([60.0, 120.0])
+    assert {entry.subject for entry in library.entries()} == {"91"}
+
+
+def test_formats_of_one_place_are_one_take_and_those_of_two_places_only_by_subject_and_trial(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"Anna/take_001": 12, "bvh/91_07": 12})
+    for place in ("Anna/take_001", "Bert/take_001"):
+        (tmp_path / place).parent.mkdir(exist_ok=True)
+        (tmp_path / f"{place}.c3d").write_bytes(place.encode())
+        np.savez(tmp_path / f"{place}.npz", allow_pickle=False, **amass_arrays(clip(12)))
+    (tmp_path / "91_07.c3d").write_bytes(b"markers")
+    for ending in ("_poses", "_stageii"):
+        np.savez(tmp_path / f"91_07{ending}.npz", allow_pickle=False, **amass_arrays(clip(12)))
+    library = MotionLibrary(tmp_path)
+    assert library.names() == ("91_07", "Anna/take_001", "Bert/take_001")
+    copies = [sorted(file.name for file in library.entry(name).copies) for name in library.names()]
+    amass = ["91_07_poses.npz", "91_07_stageii.npz"]
+    assert copies == [["91_07.c3d", *amass], ["take_001.c3d", "take_001.npz"], ["take_001.c3d"]]
+
+
+def test_markers_of_another_place_leave_the_name_of_the_motion(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"Anna/take_001": 12})
+    (tmp_path / "take_001.c3d").write_bytes(b"markers")
+    library = MotionLibrary(tmp_path)
+    assert library.names() == ("take_001",)
+    assert [entry.name for entry in library.entries()] == ["./take_001", "take_001"]
+
+
+def test_files_that_differ_in_the_case_of_letters_are_different_clips(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"take_001": 12, "Take_001": 15})
+    write_takes(tmp_path, {"take_001": 18}, ".BVH")
+    if len(list(tmp_path.iterdir())) < 3:
+        pytest.skip("this file system does not tell capital from small letters")
+    library = MotionLibrary(tmp_path)
+    assert {name: len(library.load(name)) for name in library.names()} == {
+        "./take_001.BVH": 18,
+        "./take_001.bvh": 12,
+        "Take_001": 15,
+    }
+
+
+def test_folders_of_a_library_may_contain_each_other(folder: Path) -> None:
+    entries = MotionLibrary([folder, folder / "deep"]).entries()
+    assert [(entry.name, entry.copies) for entry in entries] == [
+        (entry.name, entry.copies) for entry in MotionLibrary(folder).entries()
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "found"),
     [

@@ -1,0 +1,72 @@
+"""Axes, unit of length and quaternions of a reference: what speaks against those of the package, with the likely cause.
+
+A tracker's scale error is a few thousandths. A larger one, or a mirrored motion, is a mistake in the reference's file.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.errors import BadInput
+
+MOST_SCALE_ERROR = 0.2
+"""Largest relative error of positions that counts as one of a tracker [choice]."""
+MOST_TURN_RAD = math.radians(15.0)
+"""Largest median error of orientations with which a registration is believed [choice]."""
+UNITS_M = {
+    "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
+    "kilometres": 1e3,
+}  # fmt: skip
+_MIRRORED_GAIN = 4.0
+"""Factor by which a mirrored fit must leave less than an unmirrored one to be believed [choice]."""
+_LEFT_HANDED = "The reference's axes are left-handed (Unity exports such), or one axis of its file is negated."
+_TO_RIGHT_HANDED = "Convert positions and quaternions to right-handed axes."
+
+
+def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats]) -> None:
+    """Raise BadInput if positions (N, 3) of stations are those of the reference's bodies (N, 3) in a mirror.
+
+    The best similarity with and without a reflection is that of Umeyama 1991.
+    """
+    first, second = (values - values.mean(axis=0) for values in map(np.concatenate, (reported_m, reference_m)))
+    cross = first.T @ second
+    spread = np.linalg.svd(cross, compute_uv=False)
+    if np.linalg.det(cross) >= 0.0:
+        return
+    total = float(np.sum(first**2) * np.sum(second**2))
+    mirrored, turned = (1.0 - (spread[0] + spread[1] + sign * spread[2]) ** 2 / total for sign in (1.0, -1.0))
+    if _MIRRORED_GAIN * mirrored < turned:
+        raise BadInput(f"Positions of the reference are mirrored. {_LEFT_HANDED}", _TO_RIGHT_HANDED)
+
+
+def require_scale(factor: float) -> None:
+    """Raise BadInput unless reported lengths are those of the reference to a fifth; `factor` is their ratio."""
+    if abs(factor - 1.0) <= MOST_SCALE_ERROR:
+        return
+    if not math.isfinite(factor):
+        raise BadInput("The positions show no scale.", "Move through the room, and give the reference in metres.")
+    if factor <= 0.0:
+        raise BadInput(
+            f"Positions of the capture are {factor:.4g} times those of the reference.",
+            f"Likely cause: positions or quaternions of the reference are of left-handed axes. {_TO_RIGHT_HANDED}",
+        )
+    units = {("reference", unit): metres for unit, metres in UNITS_M.items()}
+    units |= {("capture", unit): 1.0 / metres for unit, metres in UNITS_M.items()}
+    whose, unit = min(units, key=lambda key: abs(math.log(factor / units[key])))
+    raise BadInput(
+        f"Lengths of the capture are {factor:.4g} times those of the reference. Likely cause: the {whose} is in {unit} "
+        f"instead of metres, the nearest unit ({units[whose, unit]:.4g}).",
+        f"Give the {whose} in metres. A scale error above {100.0 * MOST_SCALE_ERROR:g} % is not measured.",
+    )
+
+
+def require_orientations(residual_rad: Sequence[Floats]) -> None:
+    """Raise BadInput if errors of orientations (N, 3), rotation vectors of each station, are too large in the middle."""
+    middle_rad = float(np.median(np.linalg.norm(np.concatenate(residual_rad), axis=1)))
+    if not middle_rad <= MOST_TURN_RAD:
+        raise BadInput(
+            f"Orientations of capture and reference disagree by {math.degrees(middle_rad):.0f} deg in the middle.",
+            "Quaternions of the reference may be of left-handed axes, inverted, or in another order than w, x, y, z.",
+        )
