@@ -20,6 +20,8 @@ _REPEAT = "Give the same command again."
 _CHECK_DISK = "Check that the folder can be written and its disk has space, then give the same command again."
 _NOT_WRITABLE = "Name a place that can be written, then give the command again."
 _SYSTEM_FAULTS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+_DISK_FAULTS = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+_COMPILER = "harness.core.compiled"
 _ADVICE = {
     errno.ENOSPC: _NO_SPACE,
     errno.EDQUOT: _NO_SPACE,
@@ -36,6 +38,24 @@ _ADVICE = {
 def is_system_fault(error: OSError) -> bool:
     """Whether an error is the system's, such as a full disk, and not of the name that was given."""
     return error.errno in _SYSTEM_FAULTS
+
+
+def find_system_fault(error: BaseException) -> SystemFault | None:
+    """The fault of the system behind an error that the code of a method has met; None where that code is to blame.
+
+    Such are a full disk, and whatever keeps compiled functions from being made or loaded.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, SystemFault):
+            return cause
+        compiling = any(f.f_globals.get("__name__") == _COMPILER for f, _ in traceback.walk_tb(cause.__traceback__))
+        if isinstance(cause, OSError | RuntimeError) and compiling and not type(cause).__module__.startswith("numba."):
+            return SystemFault(f"A function cannot be compiled ({cause}).", "Does `harness doctor` pass?")
+        if isinstance(cause, OSError) and cause.errno in _DISK_FAULTS:
+            return SystemFault(*describe_fault(cause))
+        cause = cause.__cause__
+    return None
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from harness.body.mounts import locate_mount
-from harness.core.fault_report import named_folder_fault
+from harness.core.fault_report import find_system_fault, named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart, ExampleLeak
@@ -145,6 +145,8 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
             if was_interrupted(error):
                 raise KeyboardInterrupt from error
+            if fault := find_system_fault(error):
+                raise fault from error
             yield CellOutcome(str(cell), failure=traceback.format_exc())
 
 

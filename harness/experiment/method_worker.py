@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from harness.core.estimate import Origin, Status
+from harness.core.fault_report import find_system_fault
 from harness.core.messages import MessageError, read_message, write_message
 from harness.core.working_folder import serve_folder
 from harness.errors import HarnessError
@@ -54,7 +55,8 @@ class MethodWorker:
             answer = self.operations()[header["operation"]](header, arrays)
             if self._audit.violation is not None:
                 raise self._audit.violation
-        except BaseException as error:
+        except BaseException as raised:
+            error = find_system_fault(raised) or raised
             known = isinstance(error, HarnessError) and error is not self._audit.violation
             fields = [list(f) if isinstance(f, tuple) else f for f in error.args] if known else []
             text = "".join(traceback.format_exception(error))[-MAX_TEXT:]
@@ -123,6 +125,7 @@ def serve(worker: MethodWorker, *descriptors: str) -> None:
     """Answer requests until they end; without the descriptors of both streams, on standard input and output."""
     requests, replies = _open_streams(*map(int, descriptors)) if descriptors else _take_streams()
     inbox = SimpleQueue[tuple[dict[str, Any], Any]]()
+    write_message(replies, {"ready": True})
     Thread(target=_receive, args=(requests, inbox), daemon=True).start()
     while True:
         header, arrays = inbox.get()

@@ -11,17 +11,16 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import BinaryIO, Protocol, cast
+from multiprocessing.connection import wait
+from typing import Any, BinaryIO, Protocol, cast
 
-from harness.core.package_data import PACKAGE_FOLDER
+from harness.core.child_process import PythonProcess
+from harness.errors import SystemFault
 
-_START = (
-    "import sys; sys.path.insert(0, sys.argv[1]); from importlib import import_module; "
-    "import_module(sys.argv[2]).main(*sys.argv[3:])"
-)
 _POLL_INTERVAL_S = 0.01
+_END_S = 5.0
 
 
 class WorkerProcess(Protocol):
@@ -30,45 +29,28 @@ class WorkerProcess(Protocol):
     requests: BinaryIO
     answers: BinaryIO
 
-    def poll(self) -> int | None:
-        """The exit code, negative for a signal; None while the process runs."""
+    def wait(self, timeout_s: float) -> int | None:
+        """The exit code, negative for a signal, of a process that ends within a time, else None."""
         ...
 
     def kill(self) -> None:
-        """Kill the process and those that it started."""
+        """Kill the process and those that it started, and end its streams."""
+        ...
+
+    def close(self) -> None:
+        """Kill the process and those that it started, and release its streams."""
         ...
 
 
 def start_worker(module: str) -> WorkerProcess:
-    """Start a process that calls `main` of a module with the descriptors of its requests and answers."""
+    """Start a process that calls `main` of a module with the descriptors of its requests and answers; SystemFault."""
     if sys.platform != "linux":
         return _SpawnedWorker(module)
     for _ in range(2):
         with suppress(OSError):
             return _fork_server().fork(module)
         close_fork_server()  # somebody has ended it
-    raise OSError("no worker process can be started")
-
-
-def wait_for(process: WorkerProcess, timeout_s: float) -> int | None:
-    """The exit code of a process that ends within a time, else None."""
-    until_s = time.monotonic() + timeout_s
-    while (code := process.poll()) is None and time.monotonic() < until_s:
-        time.sleep(_POLL_INTERVAL_S)
-    return code
-
-
-def close_worker(process: WorkerProcess) -> None:
-    """Kill a process and those that it started, and release its streams."""
-    process.kill()
-    wait_for(process, 5.0)
-    for stream in (process.requests, process.answers):
-        with suppress(OSError):
-            stream.close()
-
-
-def _command(module: str, *arguments: str) -> list[str]:
-    return [sys.executable, "-B", "-P", "-u", "-c", _START, str(PACKAGE_FOLDER.parent), module, *arguments]
+    raise SystemFault("No process can be started for a method.", "Is the machine out of memory or of processes?")
 
 
 class _SpawnedWorker:
@@ -76,39 +58,49 @@ class _SpawnedWorker:
 
     def __init__(self, module: str) -> None:
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(_command(module), stdin=pipe, stdout=pipe, start_new_session=True)
-        self.requests, self.answers = cast(BinaryIO, self._process.stdin), cast(BinaryIO, self._process.stdout)
+        self._process = PythonProcess(module, stdin=pipe, stdout=pipe, stderr=None, watched=False)
+        self.requests, self.answers = (cast(Any, s).buffer for s in (self._process.stdin, self._process.stdout))
 
-    def poll(self) -> int | None:
-        return self._process.poll()
+    def wait(self, timeout_s: float) -> int | None:
+        until_s = time.monotonic() + timeout_s
+        while (code := self._process.poll()) is None and time.monotonic() < until_s:
+            time.sleep(_POLL_INTERVAL_S)
+        return code
 
     def kill(self) -> None:
-        if self._process.poll() is None:
-            self._process.kill()
+        self._process.kill()
+
+    def close(self) -> None:
+        self._process.close()
 
 
 @dataclass(eq=False)
 class _ForkedWorker:
-    """A worker that the server has forked."""
+    """A worker that the server has forked, seen through the socket of its keeper."""
 
-    server: "_ForkServer"
-    pid: int
+    control: socket.socket
+    stream: socket.socket
+    """Carries requests and answers. Its end here can be shut, whoever else holds the other one."""
     requests: BinaryIO
     answers: BinaryIO
     _code: int | None = None
 
-    def poll(self) -> int | None:
-        if self._code is None:
-            try:
-                answer = self.server.ask(f"poll {self.pid}")
-            except OSError:  # the server is gone, and its workers with it
-                answer = str(-signal.SIGKILL)
-            self._code = None if answer == "running" else int(answer)
+    def wait(self, timeout_s: float) -> int | None:
+        if self._code is None and wait([self.control], timeout_s):
+            self._code = int(self.control.recv(16) or -signal.SIGKILL)  # a keeper that was killed sends nothing
         return self._code
 
     def kill(self) -> None:
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.pid, signal.SIGKILL)
+        for end, how in ((self.control, socket.SHUT_WR), (self.stream, socket.SHUT_RDWR)):
+            with suppress(OSError):
+                end.shutdown(how)
+
+    def close(self) -> None:
+        self.kill()
+        self.wait(_END_S)
+        for end in (self.requests, self.answers, self.stream, self.control):
+            with suppress(OSError):  # a request that was not sent
+                end.close()
 
 
 class _ForkServer:
@@ -118,43 +110,27 @@ class _ForkServer:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             number = theirs.fileno()
-            self._process = subprocess.Popen(
-                _command("harness.experiment.fork_server", str(number)),
-                stdin=subprocess.DEVNULL,
-                stdout=2,
-                pass_fds=[number],
-                start_new_session=True,
+            self._process = PythonProcess(
+                "harness.experiment.fork_server", str(number), stdout=2, stderr=None, passed=(number,), watched=False
             )
 
     def fork(self, module: str) -> _ForkedWorker:
         """Fork a worker; OSError when the server is gone."""
-        their_requests, requests = os.pipe()
-        answers, their_answers = os.pipe()
-        worker = _ForkedWorker(self, 0, os.fdopen(requests, "wb"), os.fdopen(answers, "rb"))
-        try:
-            request = os.fsencode(f"fork {module} {os.getcwd()}")
-            socket.send_fds(self._socket, [request], [their_requests, their_answers])
-            worker.pid = int(self._receive())
-        finally:
-            os.close(their_requests)
-            os.close(their_answers)
-        return worker
-
-    def ask(self, text: str) -> str:
-        """The answer of the server; OSError when it is gone."""
-        self._socket.send(text.encode())
-        return self._receive()
-
-    def _receive(self) -> str:
-        answer = self._socket.recv(64)
-        if not answer:
-            raise OSError("the fork server is gone")
-        return answer.decode()
+        with ExitStack() as made:
+            (control, their_control), (stream, their_stream) = socket.socketpair(), socket.socketpair()
+            for end in (control, stream):
+                made.callback(end.close)
+            with their_control, their_stream, their_stream.dup() as second:
+                theirs = [end.fileno() for end in (their_control, their_stream, second)]
+                socket.send_fds(self._socket, [os.fsencode(f"{module} {os.getcwd()}")], theirs)
+                if not self._socket.recv(64):
+                    raise OSError("the fork server is gone")
+            made.pop_all()
+        return _ForkedWorker(control, stream, stream.makefile("wb"), stream.makefile("rb"))
 
     def close(self) -> None:
         self._socket.close()
-        self._process.kill()
-        self._process.wait()
+        self._process.close()
 
 
 _servers: list[_ForkServer] = []
