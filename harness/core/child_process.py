@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import wait
-from threading import Thread
+from threading import Lock, Thread
 from typing import IO, Any
 
 from harness.core.interrupts import SIGNALS, shield_children
@@ -32,6 +32,8 @@ _START = "from harness.core.child_process import run_module; run_module()"
 _START_UNWATCHED = "import sys, importlib; importlib.import_module(sys.argv[1]).main(*sys.argv[2:])"
 _POLL_INTERVAL_S = 0.5
 _TOO_MANY = "The system allows no further process: end some programs, or use fewer --jobs."
+_END_S = 2.0
+"""Time within which a process whose pipe has ended does so too [s]."""
 Stream = int | IO[Any] | None
 
 
@@ -82,8 +84,9 @@ class PythonProcess(subprocess.Popen[str]):
         """
         until_s, ended = time.monotonic() + limit_s, False
         while True:
+            left_s = _POLL_INTERVAL_S if ended else min(_POLL_INTERVAL_S, max(until_s - time.monotonic(), 0.0))
             try:
-                out, err = self.communicate(timeout=_POLL_INTERVAL_S)
+                out, err = self.communicate(timeout=left_s)
                 return out or "", err or ""
             except subprocess.TimeoutExpired as late:
                 if ended:  # a process of another group holds the streams
@@ -137,7 +140,7 @@ class FunctionProcess:
         with shield_children():
             self._temporary = tempfile.TemporaryDirectory(prefix="harness-child-", ignore_cleanup_errors=True)
             self.pipe, other_end = SPAWN.Pipe()
-            self._owner = os.getpid()
+            self._owner, self._closing = os.getpid(), Lock()
             given = self._owner, self._temporary.name, function, other_end, arguments
             self._process = SPAWN.Process(target=_call_function, args=given)
             try:
@@ -161,17 +164,23 @@ class FunctionProcess:
 
     def receive(self, limit_s: float | None = None) -> Any:
         """The next message; EOFError when the process has ended without one, TimeoutError after `limit_s`."""
-        ready = wait([self.pipe, self._ended], limit_s)
-        if not ready:
-            raise TimeoutError
-        if self._ended in ready:
-            kill_group(self.pid)  # what it has started may hold the pipe
         try:
-            if self.pipe.poll():
+            ready = wait([self.pipe, self._ended], limit_s)
+            if self._ended in ready:
+                kill_group(self.pid)  # what it has started may hold the pipe
+            if ready and self.pipe.poll():
                 return self.pipe.recv()
-        except OSError as error:
+        except (EOFError, OSError) as error:  # the pipe was closed
+            with suppress(OSError):
+                wait([self._ended], _END_S)
             raise EOFError from error
-        raise EOFError
+        raise EOFError if ready else TimeoutError
+
+    def kill(self) -> None:
+        """Kill the process and its group, and wait until it has ended."""
+        kill_group(self.pid)
+        self._process.kill()
+        self._process.join()
 
     def leave(self) -> None:
         """End the pipe on both ends, also for a thread that reads it here: closing alone would not."""
@@ -184,17 +193,17 @@ class FunctionProcess:
         """End the pipe, and kill the process and its group unless it ends within a time."""
         if self._owner != os.getpid():  # a copy of this program, which `os.fork` has made
             return
-        atexit.unregister(self.close)
-        if not self.pipe.closed:
-            self.leave()
-        if self.exit_code is None:
-            if not wait([self._ended], patience_s):
-                kill_group(self.pid)
-                self._process.kill()
-            self._process.join()
-        while self._descriptors:
-            os.close(self._descriptors.pop())
-        self._temporary.cleanup()
+        with self._closing:
+            atexit.unregister(self.close)
+            if not self.pipe.closed:
+                self.leave()
+            if self.exit_code is None:
+                if not wait([self._ended], patience_s):
+                    self.kill()
+                self._process.join()
+            while self._descriptors:
+                os.close(self._descriptors.pop())
+            self._temporary.cleanup()
 
 
 def _call_function(parent: int, temporary: str, function: Callable[..., None], pipe: Any, arguments: Any) -> None:

@@ -32,7 +32,6 @@ _WAIT_FUNCTIONS = frozenset(
         ("threading", "start"),
         ("subprocess", "__init__"),
         ("multiprocessing.process", "start"),
-        ("concurrent.futures.process", "submit"),
     }
 )
 

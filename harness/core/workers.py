@@ -1,21 +1,22 @@
 """Worker processes that end with the process that started them, and never see a signal themselves."""
 
-import os
-import signal
-import sys
-import tempfile
+import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from contextlib import suppress
+from pickle import PicklingError
 from threading import Thread
 from typing import Any, TypeVar
 
-from harness.core.interrupts import SIGNALS, shield_children
+from harness.core.child_process import FunctionProcess
 from harness.core.working_folder import serve_folder, served_folders
+from harness.errors import SystemFault
 
 R = TypeVar("R")
+
+_END_S = 5.0
+"""Time that an idle worker has to end [s]; then it is killed."""
 
 
 def run_in_workers(
@@ -72,21 +73,16 @@ class Pool:
                 self._begin()
 
     def close(self) -> None:
-        for process in self._processes:
-            process.pool.shutdown(wait=False)
-        for process in self._processes:
-            if not process.broken:
-                process.pool.shutdown()
-        self._stop()
+        self._stop(_END_S)
 
     def _begin(self) -> None:
         self._processes = [_WorkerProcess() for _ in range(self._workers)]
 
-    def _stop(self) -> None:
+    def _stop(self, patience_s: float = 0.0) -> None:
         for process in self._processes:
             process.leave()
         for process in self._processes:
-            process.end()
+            process.end(patience_s)
 
 
 def schedule_tasks(
@@ -127,73 +123,75 @@ def schedule_tasks(
 
 
 class _WorkerProcess:
-    """A worker process, started when needed and again after it died: a pool of one, so that no other breaks with it."""
+    """A worker process, started when needed and again after it died."""
 
     def __init__(self) -> None:
+        self._process: FunctionProcess | None = None
         self._last: Future[Any] | None = None
         self.group: Hashable = None
         """Group of the last task."""
-        self._renew()
 
     @property
     def idle(self) -> bool:
         return self._last is None or self._last.done()
 
-    @property
-    def broken(self) -> bool:
-        """Whether the last task broke the pool: its process died, or its answer could not be read."""
-        return self._last is not None and self._last.done() and isinstance(self._last.exception(), BrokenExecutor)
-
     def submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
-        try:
-            future = self._submit(function, *task)
-        except BrokenExecutor:  # the worker died in its last task or while idle
+        """Start a task; SystemFault when no process can be started for it, here or in its future."""
+        if self._process is not None and self._process.exit_code is not None:  # it died in its last task or while idle
             self.end()
-            self._last = None
-            self._renew()
-            future = self._submit(function, *task)
-        self._last = future
+        new, self._process = self._process is None, self._process or FunctionProcess(_work, served_folders())
+        self._last = future = Future[R]()
+        Thread(target=_carry_out, args=(future, self._process, new, (function, task)), daemon=True).start()
         return future
 
     def leave(self) -> None:
-        """Let the process end at once: it watches the pipe that is closed here."""
-        self._own_end.close()
+        """Let the process end: it watches the pipe that is closed here."""
+        if self._process is not None:
+            self._process.leave()
 
-    def end(self) -> None:
-        """End the process at once, and wait until it has ended."""
-        self.leave()
-        self.pool.shutdown(cancel_futures=True)
-        self._worker_end.close()
-        self._temporary.cleanup()
-
-    def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
-        if self._last is not None:
-            return self.pool.submit(function, *task)
-        with shield_children():
-            return self.pool.submit(function, *task)
-
-    def _renew(self) -> None:
-        with shield_children():  # the pool may start the process that tracks its semaphores
-            self._temporary = tempfile.TemporaryDirectory(prefix="harness-worker-", ignore_cleanup_errors=True)
-            self._worker_end, self._own_end = get_context("spawn").Pipe(duplex=False)
-            given = (self._worker_end, self._temporary.name, served_folders())
-            self.pool = ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, given)
+    def end(self, patience_s: float = 0.0) -> None:
+        """Wait until the process has ended; it is killed after a time, or at once while a task runs."""
+        if self._process is not None:
+            self._process.close(patience_s if self.idle else 0.0)
+            self._process = None
 
 
-def _initialise_worker(alive: Connection, temporary: str, folders: Mapping[str, Iterable[str]]) -> None:
-    for number in SIGNALS:  # they are blocked already, but not on Windows
-        signal.signal(number, signal.SIG_IGN)
-    if hasattr(os, "setpgid"):
-        os.setpgid(0, 0)  # a group of its own, which ends with it: processes that the task starts
-    tempfile.tempdir = os.environ["TMPDIR"] = temporary  # a process that is stopped at once leaves files behind
-    sys.stdout = sys.stderr
+def _carry_out(future: Future[Any], process: FunctionProcess, new: bool, call: tuple[Any, ...]) -> None:
+    """Send a call to a worker, and put its result or its exception into the future."""
+    began = not new
+    try:
+        began = began or process.receive()
+        process.pipe.send(call)
+        result, error = process.receive()
+    except (EOFError, OSError):
+        process.close()
+        advice = "Its own message is above. Does `harness doctor` pass?"
+        fault = SystemFault("A worker process ended before its first task.", advice)
+        future.set_exception(BrokenExecutor("a worker process died") if began else fault)
+    except Exception as problem:  # the call cannot be pickled, or its answer cannot be read
+        future.set_exception(BrokenExecutor(f"{type(problem).__name__}: {problem}"))
+    else:
+        future.set_exception(error) if error is not None else future.set_result(result)
+
+
+def _work(pipe: Any, folders: Mapping[str, Iterable[str]]) -> None:
+    """Carry out calls until the pipe ends; `folders` are those of the program's user modules."""
     for folder, names in folders.items():
         serve_folder(folder, names)
-    Thread(target=_exit_with_parent, args=(alive,), daemon=True).start()
+    pipe.send(True)
+    with suppress(EOFError, OSError):
+        while True:
+            answer = _call(*pipe.recv())
+            try:
+                pipe.send(answer)
+            except (TypeError, AttributeError, PicklingError) as error:  # it cannot be pickled
+                pipe.send((None, error))
 
 
-def _exit_with_parent(alive: Connection) -> None:
-    alive.poll(None)  # nothing is ever sent; this returns when the other end closes
-    if hasattr(os, "killpg"):
-        os.killpg(0, signal.SIGKILL)
-    os._exit(1)
+def _call(function: Callable[..., R], task: tuple[Any, ...]) -> tuple[R | None, BaseException | None]:
+    """The result of a call, or the exception that it raises, with its traceback as a note."""
+    try:
+        return function(*task), None
+    except BaseException as error:
+        error.add_note(traceback.format_exc())
+        return None, error

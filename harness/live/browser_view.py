@@ -5,12 +5,12 @@ The session writes each frame to shared memory and waits for nobody. A process o
 
 import os
 import time
-from multiprocessing import get_context
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 from harness.core.arrays import Floats
+from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, HarnessError
@@ -19,7 +19,7 @@ from harness.live.pose import LivePose
 from harness.live.pose_ring import PoseRing
 from harness.stream.recording.recording_switch import RecordingSwitch
 
-_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 10.0
+_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 2.0
 
 
 class BrowserOutput:
@@ -46,14 +46,8 @@ class BrowserOutput:
         self._recorder, self._folder = recorder, folder
         config = BrowserConfig(skeleton.bone_m, stations, room, title)
         with shield_children():  # a signal ends the session, and the session ends the viewer
-            context = get_context("spawn")
-            self._ring = PoseRing(context, len(stations))
-            self._pipe, other_end = context.Pipe()
-            self._process = context.Process(
-                target=_run_process, args=(config, self._ring, other_end), name="view", daemon=True
-            )
-            self._process.start()
-            other_end.close()
+            self._ring = PoseRing(SPAWN, len(stations))
+            self._process = FunctionProcess(_run_process, config, self._ring)
         try:
             self.url = self._wait_for_url()
         except BaseException:
@@ -65,10 +59,11 @@ class BrowserOutput:
 
     def _wait_for_url(self) -> str:
         try:
-            message = self._pipe.recv() if self._pipe.poll(_START_TIMEOUT_S) else OSError("it does not answer")
+            message = self._process.receive(_START_TIMEOUT_S)
+        except TimeoutError:
+            message = OSError("it does not answer")
         except EOFError:
-            self._process.join(_END_TIMEOUT_S)
-            message = OSError(f"its process ended with exit code {self._process.exitcode}")
+            message = OSError(f"its process ended with exit code {self._process.exit_code}")
         if isinstance(message, OSError):
             raise BadInput(f"{self.name} cannot be shown: {message}.", "Leave the option out.")
         return str(message)
@@ -83,7 +78,7 @@ class BrowserOutput:
         """Start and stop recordings as the page asks, until the pipe closes."""
         try:
             while True:
-                self._pipe.send({"answer": True, **self._record(self._pipe.recv())})
+                self._process.pipe.send({"answer": True, **self._record(self._process.receive())})
         except (EOFError, OSError):
             return
 
@@ -102,14 +97,10 @@ class BrowserOutput:
     def close(self) -> None:
         """End the page and the recording."""
         self._recorder.close()
-        self._pipe.close()
-        self._process.join(_END_TIMEOUT_S)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+        self._process.close(_END_TIMEOUT_S)
 
 
-def _run_process(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
+def _run_process(pipe: Any, config: BrowserConfig, ring: PoseRing) -> None:
     """Entry point of the viewer's process, which runs at low priority. It reports its errors through the pipe."""
     if hasattr(os, "nice"):
         os.nice(10)

@@ -6,14 +6,14 @@ It prints both when its standard input ends.
 """
 
 import json
-import subprocess
 import sys
 import time
 from queue import SimpleQueue
+from subprocess import DEVNULL, PIPE
 from threading import Thread
 from typing import Any
 
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import PythonProcess
 
 _SLEEP_S = 0.02
 
@@ -51,27 +51,15 @@ class JitterProbe:
     """Runs the measurement until `finish`; a context manager, which starts and ends the process."""
 
     def __enter__(self) -> "JitterProbe":
-        self._process = subprocess.Popen(
-            python_command("-m", "harness.live.scheduling_jitter"),
-            env=python_environment(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            start_new_session=True,  # no signal to this process's group reaches it
-        )
+        self._process = PythonProcess("harness.live.scheduling_jitter", stdin=PIPE, stdout=PIPE, stderr=DEVNULL)
         return self
 
     def __exit__(self, *raised: object) -> None:
-        self._process.kill()
-        self._process.communicate()
+        self._process.close()
 
     def finish(self) -> dict[str, Any]:
         """End the measurement: `timer` and `handover` [ms] and the number of `sleeps`; {} if it failed."""
-        try:
-            text, _ = self._process.communicate(timeout=10.0)
-        except subprocess.TimeoutExpired:
-            return {}
+        text, _ = self._process.finish(10.0) or ("", "")
         return dict(json.loads(text)) if text.strip() else {}
 
 

@@ -7,12 +7,12 @@ is ready for one and skips the others. If OpenGL is missing or crashes, only the
 import os
 import sys
 from importlib.util import find_spec
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.core.arrays import Floats
+from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, MissingExtra
@@ -21,7 +21,7 @@ from harness.live.shared_pose import READY, SharedPose, ViewerConfig, ViewerKind
 
 _PICTURE_PATTERN = "[0-9]" * 8 + ".png"
 """Names that `viewer_process` gives its pictures; other files in the folder are left alone."""
-_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 10.0
+_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 2.0
 _RATE_HZ: dict[ViewerKind, float] = {"window": 30.0, "frames": 4.0}
 """Most pictures per second."""
 
@@ -46,14 +46,8 @@ class ViewerOutput:
             _prepare_folder(out, force)
         config = ViewerConfig(kind, skeleton.bone_m, str(out or ""), _RATE_HZ[kind])
         with shield_children():  # a signal ends the session, and the session ends the viewer
-            context = get_context("spawn")
-            self._shared = SharedPose(context)
-            self._pipe, viewer_pipe = context.Pipe()
-            self._process = context.Process(
-                target=_run_viewer_process, args=(config, self._shared, viewer_pipe), name="view", daemon=True
-            )
-            self._process.start()
-            viewer_pipe.close()
+            self._shared = SharedPose(SPAWN)
+            self._process = FunctionProcess(_run_viewer_process, config, self._shared)
         try:
             message = self._wait_for_start()
         except BaseException:
@@ -67,10 +61,11 @@ class ViewerOutput:
     def _wait_for_start(self) -> str:
         """The viewer's first message, or why there is none."""
         try:
-            return str(self._pipe.recv()) if self._pipe.poll(_START_TIMEOUT_S) else "it does not answer"
+            return str(self._process.receive(_START_TIMEOUT_S))
+        except TimeoutError:
+            return "it does not answer"
         except EOFError:
-            self._process.join(_END_TIMEOUT_S)
-            return f"its process ended with exit code {self._process.exitcode}"
+            return f"its process ended with exit code {self._process.exit_code}"
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""
@@ -92,19 +87,16 @@ class ViewerOutput:
         self._shared.set(guided.number, guided.target, beside, guided.still_share)
 
     def _require_process(self) -> None:
-        if self._pipe.poll():
-            try:
-                message = str(self._pipe.recv())
-            except EOFError:
-                message = "its process ended"
-            raise OSError(message)
+        try:
+            message = str(self._process.receive(0.0))
+        except TimeoutError:
+            return
+        except EOFError:
+            message = "its process ended"
+        raise OSError(message)
 
     def close(self) -> None:
-        self._pipe.close()
-        self._process.join(_END_TIMEOUT_S)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+        self._process.close(_END_TIMEOUT_S)
 
 
 def _prepare_folder(out: Path | None, force: bool) -> None:
@@ -123,7 +115,7 @@ def _prepare_folder(out: Path | None, force: bool) -> None:
         picture.unlink()
 
 
-def _run_viewer_process(config: ViewerConfig, shared: SharedPose, pipe: Any) -> None:
+def _run_viewer_process(pipe: Any, config: ViewerConfig, shared: SharedPose) -> None:
     """Entry point of the viewer's process, which runs at low priority. It reports its errors through the pipe."""
     if hasattr(os, "nice"):
         os.nice(10)

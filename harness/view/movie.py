@@ -1,7 +1,5 @@
 """Movies and animated pictures of a viewed clip, drawn in a process of their own."""
 
-import subprocess
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -16,7 +14,7 @@ from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra, SystemFault, UnknownName
 from harness.report.kit.motion_player import PlayerClip, bone_radii_mm
-from harness.report.kit.render_process import describe_exit, start_renderer
+from harness.report.kit.render_process import finish_renderer, start_renderer
 
 MOVIE_SUFFIXES = (".mp4", ".gif")
 MOST_METHODS = 3
@@ -25,7 +23,6 @@ DRAWN_SUFFIX = ".drawn"
 _FPS = {".mp4": 25.0, ".gif": 12.5}
 _MOST_FRAMES = 15_000
 """Longest movie: ten minutes of mp4."""
-_POLL_PERIOD_S = 0.2
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 120.0, 2.0
 
 
@@ -96,23 +93,10 @@ def write_movie(
     with TemporaryDirectory(prefix="harness-movie-") as folder:
         job = Path(folder) / "movie.npz"
         write_npz(job, **arrays)
-        deadline_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * len(rows)
+        limit_s = _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * len(rows)
         with start_renderer("harness.view.movie_worker", [str(job)]) as renderer:
-            try:
-                stderr = None
-                while stderr is None:
-                    try:
-                        _, stderr = renderer.communicate(timeout=_POLL_PERIOD_S)
-                    except subprocess.TimeoutExpired as error:
-                        if time.monotonic() > deadline_s:
-                            advice = "Save a shorter part."
-                            raise SystemFault("The renderer did not finish in time.", advice) from error
-                        progress(path.name, _drawn_frames(job), len(rows))
-            except BaseException:
-                renderer.kill()
-                raise
-    if renderer.returncode:
-        reason = describe_exit(renderer.returncode, stderr)
+            reason = finish_renderer(renderer, limit_s, lambda: progress(path.name, _drawn_frames(job), len(rows)))
+    if reason:
         raise SystemFault(f"The movie was not made: {reason}.", "Does this machine have OpenGL (EGL)?")
     return len(rows)
 

@@ -15,6 +15,7 @@ import pytest
 
 from harness.core.interrupts import SIGNALS
 from harness.core.workers import Pool, run_in_workers, schedule_tasks
+from tests.processes import is_running, wait_until
 
 
 def test_every_task_is_called_once_in_another_process() -> None:
@@ -102,17 +103,7 @@ def test_a_worker_that_is_stopped_leaves_no_process_and_no_file(tmp_path: Path) 
     assert Path(temporary).exists()
     calls.close()
     assert not Path(temporary).parent.exists()
-    end_s = time.monotonic() + 20.0
-    while _is_running(int(child)) and time.monotonic() < end_s:
-        time.sleep(0.01)
-    assert not _is_running(int(child))
-
-
-def _is_running(pid: int) -> bool:
-    try:
-        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
+    wait_until(lambda: not is_running(int(child)))
 
 
 class Unreadable:

@@ -68,7 +68,6 @@ def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
 def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
     shown = ViewerOutput("frames", OWN, tmp_path, force=False)
     shown._process.kill()
-    shown._process.join()
     with pytest.raises(OSError, match="ended"):
         shown.send(live_pose(humanoid.tpose(OWN)))
     shown.close()

@@ -6,7 +6,6 @@ https://www.c3d.org/HTML/Documents/parameterslist.htm). CMU's files are in milli
 up, which are the world's x and z.
 """
 
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, freeze
+from harness.core.child_process import PythonProcess
 from harness.core.motion import Clip
 from harness.core.npz_file import read_npz
-from harness.core.python_process import python_command, python_environment
 from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, MissingExtra
 from harness.mocap.read import ezc3d_process
@@ -105,20 +104,15 @@ def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
         timeout_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
-        command = python_command(ezc3d_process.__file__, str(path.absolute()), str(out))
-        try:
-            done = subprocess.run(
-                command, env=python_environment(), capture_output=True, text=True, timeout=timeout_s, cwd=folder
-            )
-        except subprocess.TimeoutExpired as error:
-            raise BadFile(
-                path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN
-            ) from error
-        if done.returncode == ezc3d_process.NO_EZC3D:
+        with PythonProcess(ezc3d_process.__name__, str(path.absolute()), str(out), folder=folder) as process:
+            ended = process.finish(timeout_s)
+        if ended is None:
+            raise BadFile(path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN)
+        if process.returncode == ezc3d_process.NO_EZC3D:
             raise MissingExtra("Reading C3D files", "ezc3d", "c3d")
-        if done.returncode != 0:
-            refused = done.returncode == ezc3d_process.UNREADABLE
-            why = done.stderr.strip().splitlines()[-1:] if refused else ["it crashes"]
+        if process.returncode != 0:
+            refused = process.returncode == ezc3d_process.UNREADABLE
+            why = ended[1].strip().splitlines()[-1:] if refused else ["it crashes"]
             raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _FORMAT, _FETCH_AGAIN)
         return read_npz(out, "what ezc3d read", _FETCH_AGAIN, limit_bytes=ezc3d_process.MEMORY_LIMIT_BYTES)
 

@@ -1,10 +1,9 @@
 """Rendering in a separate process, because VTK may crash without a working OpenGL."""
 
+import os
 import signal
-import subprocess
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,15 +13,13 @@ from typing import Self
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.child_process import PythonProcess
 from harness.core.files import TEMPORARY
-from harness.core.interrupts import shield_children
 from harness.core.progress import ProgressCallback
-from harness.core.python_process import python_command, python_environment
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
 """Time allowed for the start, and for each picture [s]."""
-_POLL_INTERVAL_S = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +49,7 @@ class RenderProcess:
     def __init__(self, jobs: Sequence[RenderJob]) -> None:
         self._jobs = jobs
         self._reason = _missing_package(jobs)
-        self._process: subprocess.Popen[str] | None = None
+        self._process: PythonProcess | None = None
 
     def __enter__(self) -> Self:
         self._folder = TemporaryDirectory(prefix="harness-report-")
@@ -72,33 +69,24 @@ class RenderProcess:
         """
         if self._process is not None:
             frames = sum(len(job.truth_qpos) for job in self._jobs)
-            deadline_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames
-            stderr: str | None = None
-            while stderr is None and time.monotonic() < deadline_s:
-                try:
-                    _, stderr = self._process.communicate(timeout=_POLL_INTERVAL_S)
-                except subprocess.TimeoutExpired:
-                    finished = [job.output.name for job in self._jobs if job.output.exists()]
-                    progress(finished[-1] if finished else "", len(finished), len(self._jobs))
-            if stderr is None:
-                self._process.kill()
-                self._process.communicate()
-                self._reason = "the renderer did not finish in time"
-            else:
-                self._reason = "" if self._process.returncode == 0 else describe_exit(self._process.returncode, stderr)
+
+            def look() -> None:
+                finished = [job.output.name for job in self._jobs if job.output.exists()]
+                progress(finished[-1] if finished else "", len(finished), len(self._jobs))
+
+            self._reason = finish_renderer(self._process, _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames, look)
         return self._reason
 
     def _close(self) -> None:
         """Kill a renderer that still runs, and remove unfinished and temporary files."""
-        if self._process is not None and self._process.poll() is None:
-            self._process.kill()
-            self._process.communicate()
+        if self._process is not None:
+            self._process.close()
         for job in self._jobs:
             for temporary in job.output.parent.glob(f"{TEMPORARY}*-{job.output.name}"):
                 temporary.unlink(missing_ok=True)
         self._folder.cleanup()
 
-    def _start(self) -> "subprocess.Popen[str]":
+    def _start(self) -> PythonProcess:
         files = []
         for n, job in enumerate(self._jobs):
             files.append(str(Path(self._folder.name) / f"{n}.npz"))
@@ -116,16 +104,20 @@ class RenderProcess:
         return start_renderer("harness.report.kit.render_worker", files)
 
 
-def start_renderer(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
+def start_renderer(module: str, arguments: Sequence[str]) -> PythonProcess:
     """Start a rendering module with arguments; it works without a screen and writes errors to stderr."""
-    environment = python_environment()
-    if sys.platform == "linux" and not environment.get("DISPLAY"):
-        environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    command, devnull = python_command("-m", module, *arguments), subprocess.DEVNULL
-    with shield_children():  # a signal ends this process, which ends the renderer
-        return subprocess.Popen(
-            command, env=environment, stdin=devnull, stdout=devnull, stderr=subprocess.PIPE, text=True
-        )
+    variable, environment = "VTK_DEFAULT_OPENGL_WINDOW", dict[str, str]()
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        environment[variable] = os.environ.get(variable, "vtkEGLRenderWindow")
+    return PythonProcess(module, *arguments, environment=environment)
+
+
+def finish_renderer(process: PythonProcess, limit_s: float, look: Callable[[], object] = lambda: None) -> str:
+    """Wait for a renderer; returns the reason why it failed, "" if it did not. `look` is called meanwhile."""
+    ended = process.finish(limit_s, look)
+    if ended is None:
+        return "the renderer did not finish in time"
+    return describe_exit(process.returncode, ended[1]) if process.returncode else ""
 
 
 def _missing_package(jobs: Sequence[RenderJob]) -> str:

@@ -4,9 +4,7 @@ Skin takes the colour of places on its own bone only; a bone on which no place w
 rendered in a separate process. Labels, lines and colour bar are drawn around it and follow the reader's screen colours.
 """
 
-import subprocess
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,11 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interrupts import defer_interrupts
 from harness.core.plain_import import plain_import
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
-from harness.report.kit.render_process import describe_exit, start_renderer
+from harness.report.kit.render_process import finish_renderer, start_renderer
 from harness.report.kit.style import FAINT, INK, Chart
 from harness.report.placement.wording import format_signed, plain_name
 from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
@@ -98,24 +95,12 @@ def render_body(
             colour=colormaps[_COLOURS](shares)[:, :3],
             known=np.array([value is not None for value in contributions]),
         )
-        with ExitStack() as after:
-            with defer_interrupts():
-                process = start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)])
-                after.callback(_end, process)
-            try:
-                _, stderr = process.communicate(timeout=_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                return None, "the renderer did not finish in time"
-        if process.returncode != 0 or not output.exists():
-            return None, describe_exit(process.returncode, stderr)
+        with start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)]) as process:
+            reason = finish_renderer(process, _TIMEOUT_S)
+        if reason or not output.exists():
+            return None, reason or "the renderer wrote no picture"
         with np.load(output, allow_pickle=False) as content:
             return {name: content[name] for name in content.files}, ""
-
-
-def _end(process: "subprocess.Popen[str]") -> None:
-    if process.poll() is None:
-        process.kill()
-        process.communicate()
 
 
 def _chart(

@@ -1,7 +1,6 @@
 """C3D: markers are read in world axes, follow the bones of the same take, and damaged files are refused."""
 
 import contextlib
-import subprocess
 import sys
 from pathlib import Path
 
@@ -104,15 +103,19 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
 
 def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    for how, found in ((-11, "it crashes"), (ezc3d_process.UNREADABLE, "ValueError: no")):
-        done = subprocess.CompletedProcess([], how, "", "ValueError: no\n")
-        monkeypatch.setattr(subprocess, "run", lambda *args, done=done, **options: done)
-        with pytest.raises(BadFile, match=found):
-            read_c3d(tmp_path / "x.c3d")
-    missing = subprocess.CompletedProcess([], ezc3d_process.NO_EZC3D, "", "")
-    monkeypatch.setattr(subprocess, "run", lambda *args, **options: missing)
-    with pytest.raises(MissingExtra, match=r"tracker-harness\[c3d\]"):
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(ezc3d_process, "__name__", "ends")  # the program that is started
+
+    def read(end: str) -> None:
+        (tmp_path / "ends.py").write_text(f"import os, sys\n{end}")
         read_c3d(tmp_path / "x.c3d")
+
+    with pytest.raises(BadFile, match="it crashes"):
+        read("os.abort()")
+    with pytest.raises(BadFile, match="ValueError: no"):
+        read(f"print('ValueError: no', file=sys.stderr)\nsys.exit({ezc3d_process.UNREADABLE})")
+    with pytest.raises(MissingExtra, match=r"tracker-harness\[c3d\]"):
+        read(f"sys.exit({ezc3d_process.NO_EZC3D})")
 
 
 def test_a_file_that_keeps_ezc3d_busy_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
