@@ -63,7 +63,7 @@ def require_scale(factor: float) -> None:
 
 
 def require_orientations(residual_rad: Sequence[Floats]) -> None:
-    """Raise BadInput if errors of orientations (N, 3), rotation vectors of each station, are too large in the middle."""
+    """Raise BadInput if errors of orientations (N, 3), rotation vectors, are large in the middle."""
     middle_rad = float(np.median(np.linalg.norm(np.concatenate(residual_rad), axis=1)))
     if not middle_rad <= MOST_TURN_RAD:
         raise BadInput(

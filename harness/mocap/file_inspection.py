@@ -16,7 +16,7 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
-from harness.mocap.clip_file import find_skeleton_file, motion_format, read_library_file
+from harness.mocap.clip_file import CMU_NAME, find_skeleton_file, motion_format, read_library_file
 from harness.mocap.index import INDEX_NAME, rate_from_index, unknown_rate_error
 from harness.mocap.inspection import Inspection
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
@@ -168,13 +168,19 @@ def _inspect_c3d(path: Path, unit_m: float | None, library: LibraryFolders | Non
         up=markers.up_evidence,
         missing_share=float(1.0 - visible.mean()),
         missing_markers=tuple(label for m, label in enumerate(markers.labels) if not visible[:, m].all()),
-        notes=() if library is None else _marker_spread_notes(markers, MotionLibrary(library)),
+        notes=(
+            *markers.notes,
+            *(() if library is None else _marker_spread_notes(path, markers, MotionLibrary(library))),
+        ),
     )
 
 
-def _marker_spread_notes(markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
+def _marker_spread_notes(path: Path, markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
     """How firmly each marker sits on its bone, if the library has the motion of the same take."""
     if markers.name not in library.names():
+        return ()
+    takes = {copy.resolve() for copy in library.entry(markers.name).copies}
+    if not CMU_NAME.fullmatch(markers.name) and path.resolve() not in takes:
         return ()
     from harness.mocap.read.c3d import measure_marker_spreads
 

@@ -20,7 +20,6 @@ from harness.errors import BadInput, UnknownName
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
 from harness.mocap.folder_scan import scan_folder
 from harness.mocap.index import INDEX_NAME, read_index
-from harness.mocap.read.file_checks import check_size
 
 LibraryFolders = Path | str | Sequence[Path | str]
 """One folder, or several."""

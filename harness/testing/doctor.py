@@ -36,7 +36,6 @@ from harness.testing.results_checks import check_results
 
 OPTIONAL_PACKAGES = {
     "imageio_ffmpeg": "movies (extra viz)",
-    "ezc3d": "C3D files (extra c3d)",
     "pythonosc": "live poses by VMC protocol (extra live)",
     "pylsl": "live poses by the Lab Streaming Layer (extra lsl)",
     "mink": "the solver that `harness bench ik` compares with (extra bench)",

@@ -27,7 +27,7 @@ from harness.experiment.status import read_status
 from harness.experiment.sweep_config import expand_sweep, load_sweep
 from harness.mocap.file_inspection import inspect_file
 from harness.mocap.library import MotionLibrary
-from harness.mocap.read.c3d_header import check_header
+from harness.mocap.read.c3d import read_c3d
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 from harness.report.comparison.text import text as comparison_text
@@ -58,6 +58,7 @@ from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
+from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.test_fuzz import _c3d
 from tests.reconstruct.database.test_motion_database import make_take
 from tests.report import fabricate, fabricate_paper, fabricate_placement, fabricate_sweep
@@ -221,18 +222,9 @@ def _read_index(folder: Path) -> object:
 
 
 def _make_markers(folder: Path) -> None:
-    import ezc3d
-
-    content = ezc3d.c3d()
-    content["parameters"]["POINT"]["LABELS"]["value"] = ["X:LFHD", "X:RFHD"]
-    content["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
-    content["parameters"]["POINT"]["RATE"]["value"] = [120.0]
-    content.add_parameter("POINT", "X_SCREEN", ["+X"])
-    content.add_parameter("POINT", "Y_SCREEN", ["+Z"])
-    points = np.full((4, 2, 30), 800.0)
-    points[0] += np.arange(30.0)
-    content["data"]["points"] = points
-    content.write(str(folder / "91_01.c3d"))
+    points = np.full((30, 2, 3), 0.8)
+    points[:, :, 0] += np.arange(30.0)[:, None] / 1000.0
+    (folder / "91_01.c3d").write_bytes(c3d_bytes(points))
 
 
 def _make_baseline(folder: Path) -> None:
@@ -301,7 +293,7 @@ KINDS: dict[str, Kind] = {
             "inspect {}/91_01.mvnx",
         ),
         Kind("amass", _write("91_01.npz", _npz()), ("*",), NPZ, _inspect("91_01.npz"), "inspect {}/91_01.npz"),
-        Kind("c3d header", _write("x.c3d", _c3d()), ("*",), BYTES, lambda folder: check_header(folder / "x.c3d")),
+        Kind("c3d bytes", _write("x.c3d", _c3d()), ("*",), BYTES, lambda folder: read_c3d(folder / "x.c3d")),
         Kind("c3d", _make_markers, ("*",), BYTES, _inspect("91_01.c3d"), "inspect {}/91_01.c3d", share=0.02),
         Kind(
             "constellation",

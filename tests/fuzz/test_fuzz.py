@@ -7,7 +7,6 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
@@ -24,8 +23,6 @@ FEW, MANY = 500, 10_000
 
 
 def _kind_folder(name: str, tmp_path: Path) -> Path:
-    if name == "c3d" and find_spec("ezc3d") is None:
-        pytest.skip("C3D files need the extra c3d")
     folder = tmp_path / "files"
     folder.mkdir()
     return folder

@@ -42,7 +42,11 @@ def changed(truths: dict[str, TruthPoses], place: Floats | float, turn: Floats |
         (MIRROR, 1.0, "left-handed"),
         (-1.0, 1.0, "left-handed"),
         (100.0 * MIRROR, MIRROR_TURN, "left-handed"),
-        (1.0, MIRROR_TURN, "quaternions of the reference are of left-handed|Quaternions of the reference|Not observable"),
+        (
+            1.0,
+            MIRROR_TURN,
+            "quaternions of the reference are of left-handed|Quaternions of the reference|Not observable",
+        ),
         (1.0, INVERSE, "Quaternions of the reference|Not observable"),
         (1.0 / 0.3048, 1.0, "reference is in feet"),
         (1.0 / 0.0254, 1.0, "reference is in inches"),

@@ -13,8 +13,9 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
 from harness.mocap.read import amass, bvh, mvnx
 from harness.mocap.read.acclaim import read_amc, read_asf
-from harness.mocap.read.c3d_header import check_header
+from harness.mocap.read.c3d import read_c3d
 from harness.mocap.read.joint_clip import JointClip
+from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 
 SKELETON = standard_skeleton()
@@ -30,12 +31,8 @@ def _npz() -> bytes:
 
 
 def _c3d() -> bytes:
-    """A header, a group with one text parameter, and one frame of one marker."""
-    header = bytes([2, 0x50, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0x80, 0xBF, 3, 0, 0, 0, 0, 0, 0xF0, 0x42])
-    group = bytes([5, 0xFF]) + b"POINT" + bytes([3, 0, 0])
-    parameter = bytes([5, 1]) + b"UNITS" + bytes([9, 0, 0xFF, 2, 2, 1]) + b"mm" + bytes([0])
-    parameters = bytes([1, 0x50, 1, 84]) + group + parameter + bytes(2)
-    return header.ljust(512, b"\0") + parameters.ljust(512, b"\0") + bytes(16)
+    """Three frames of two markers, with an analog channel."""
+    return c3d_bytes(np.ones((3, 2, 3)), analog=(1, 2), trial=(1, 3))
 
 
 SOUND: dict[str, tuple[bytes, Callable[[Path], object]]] = {
@@ -44,7 +41,7 @@ SOUND: dict[str, tuple[bytes, Callable[[Path], object]]] = {
     "bvh": (bvh_text(clip(2)).encode(), bvh.read_bvh),
     "mvnx": (mvnx_text(clip(2)).encode(), mvnx.read_mvnx),
     "npz": (_npz(), amass.read_amass),
-    "c3d": (_c3d(), check_header),
+    "c3d": (_c3d(), read_c3d),
 }
 PLACE = st.floats(0.0, 1.0, exclude_max=True)
 CHANGE = st.one_of(

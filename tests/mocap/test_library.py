@@ -205,10 +205,10 @@ def test_a_clip_at_two_rates_is_two_clips(tmp_path: Path) -> None:
 
 def test_formats_of_one_place_are_one_take_and_those_of_two_places_only_by_subject_and_trial(tmp_path: Path) -> None:
     write_takes(tmp_path, {"Anna/take_001": 12, "bvh/91_07": 12})
-    for place in ("Anna/take_001", "Bert/take_001"):
+    for place, frames in (("Anna/take_001", 12), ("Bert/take_001", 15)):
         (tmp_path / place).parent.mkdir(exist_ok=True)
         (tmp_path / f"{place}.c3d").write_bytes(place.encode())
-        np.savez(tmp_path / f"{place}.npz", allow_pickle=False, **amass_arrays(clip(12)))
+        np.savez(tmp_path / f"{place}.npz", allow_pickle=False, **amass_arrays(clip(frames)))
     (tmp_path / "91_07.c3d").write_bytes(b"markers")
     for ending in ("_poses", "_stageii"):
         np.savez(tmp_path / f"91_07{ending}.npz", allow_pickle=False, **amass_arrays(clip(12)))

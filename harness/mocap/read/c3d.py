@@ -1,37 +1,28 @@
-"""C3D files: positions of markers, read by ezc3d (extra `c3d`), in world axes and metres.
+"""C3D files: positions of markers, in world axes and metres.
 
-The header is checked first, and ezc3d runs in a process of its own, because it does not check its input. Unit and axes
-come from the file's parameters (POINT:UNITS, POINT:X_SCREEN and Y_SCREEN;
+Unit and axes come from the file's parameters (POINT:UNITS, POINT:X_SCREEN and Y_SCREEN;
 https://www.c3d.org/HTML/Documents/parameterslist.htm). CMU's files are in millimetres, with x across the screen and z
-up, which are the world's x and z.
+up, which are the world's x and z. A marker with a residual below zero was not seen, nor was one at exactly (0, 0, 0)
+with the residual 0, which some programs write for it.
 """
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, freeze
-from harness.core.child_process import PythonProcess
+from harness.core.input_file import read_input_file
 from harness.core.motion import Clip
-from harness.core.npz_file import read_npz
 from harness.core.skeleton import forward_kinematics
-from harness.errors import BadFile, MissingExtra
-from harness.mocap.read import ezc3d_process
-from harness.mocap.read.c3d_header import check_header
-from harness.mocap.read.file_checks import MAX_VALUE, check_size
+from harness.errors import BadFile
+from harness.mocap.read.c3d_header import FETCH_AGAIN, FORMAT, C3dHeader, count_frames, read_header
+from harness.mocap.read.file_checks import LIMIT_BYTES, MAX_VALUE, check_size
 
 UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
-TIMEOUT_S = 20.0
-"""Time limit for ezc3d [s], to which `BYTES_PER_SECOND` adds for large files; it needs 0.1 s for CMU's."""
-BYTES_PER_SECOND = 2e6
-
-_FORMAT = "a C3D marker file"
-_FETCH_AGAIN = "Fetch or export it again."
+_RESIDUALS = 256.0
+"""The low byte of the fourth value of a marker is its residual, the high byte the cameras that saw it."""
 _WORLD_FROM_FILE = {
     ("+X", "+Z"): np.eye(3),
     ("+Y", "+Z"): np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -56,6 +47,8 @@ class MarkerClip:
     """Evidence for the unit."""
     up_evidence: str
     """The file's axis that points up, with the evidence."""
+    notes: tuple[str, ...] = ()
+    """What was read with doubt, a sentence each."""
 
     def __post_init__(self) -> None:
         freeze(self, position_m=("T", len(self.labels), 3))
@@ -67,54 +60,68 @@ class MarkerClip:
 def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
     """Read the markers of a C3D file; `unit_m` is the length of 1 in it, if the file does not say it [m].
 
-    Raises BadFile for a damaged file or one without unit or axes, and MissingExtra without ezc3d.
+    Raises BadFile for a damaged file, and for one without unit or axes.
     """
     path = Path(path)
-    check_size(path, _FORMAT)
-    check_header(path)
-    content = _load_with_ezc3d(path)
-    unit, unit_evidence = _length_unit(path, _stripped_strings(content["UNITS"]), unit_m)
-    screen = tuple((_stripped_strings(content[key]) or [""])[0] for key in ("X_SCREEN", "Y_SCREEN"))
+    check_size(path, FORMAT)
+    data = read_input_file(path, FORMAT, LIMIT_BYTES)
+    header = read_header(path, data)
+    unit, unit_evidence = _length_unit(path, header.texts("POINT:UNITS"), unit_m)
+    screen = tuple((header.texts(f"POINT:{axis}_SCREEN") or ("",))[0] for axis in "XY")
     if screen not in _WORLD_FROM_FILE:
         found = f"POINT:X_SCREEN {screen[0]!r} and Y_SCREEN {screen[1]!r}"
         known = " or ".join(f"{across} and {up}" for across, up in _WORLD_FROM_FILE)
         raise BadFile(path, found, f"{known}, which say where up is", "Set them in the program that wrote it.")
-    points = content["points"]
-    seen = (content["residuals"] >= 0.0) & np.all(np.abs(points) < MAX_VALUE, axis=0)
-    labels = _stripped_strings(content["labels"])
-    rate_hz = float(content["rate_hz"])
-    if points.shape[1] != len(labels) or points.shape[2] == 0 or not 0.0 < rate_hz < 1e5:
-        found = f"{points.shape[1]} markers, {len(labels)} labels, {points.shape[2]} frames, {rate_hz:g} Hz"
-        raise BadFile(path, found, "a label for each marker, frames and a rate", _FETCH_AGAIN)
-    position: Floats = np.moveaxis(np.where(seen, points, np.nan), 0, -1)
+    labels = [label for key in _label_keys(header) for label in header.texts(key)]
+    if header.markers != len(labels) or not 0.0 < header.rate_hz < 1e5:
+        found = f"{header.markers} markers, {len(labels)} labels, {header.rate_hz:g} Hz"
+        raise BadFile(path, found, "a label for each marker, and a rate", FETCH_AGAIN)
+    points = _read_points(header, data)
+    at, residual = points[..., :3], points[..., 3]
+    reported = (residual >= 0.0) & np.all(np.abs(at) < MAX_VALUE, axis=2)
+    empty = reported & np.all(at == 0.0, axis=2) & (np.floor(residual) % _RESIDUALS == 0.0)
+    seen = reported & ~empty
+    notes = (
+        (f"{empty.sum()} positions at exactly (0, 0, 0) count as markers that were not seen.",) if empty.any() else ()
+    )
+    position: Floats = np.where(seen[..., None], at, np.nan)
     return MarkerClip(
         name=path.stem,
         subject=path.stem.split("_", 1)[0],
         labels=tuple(label.split(":")[-1] for label in labels),
-        rate_hz=rate_hz,
-        position_m=np.moveaxis(position, 0, 1) * unit @ _WORLD_FROM_FILE[screen].T,
+        rate_hz=header.rate_hz,
+        position_m=position * unit @ _WORLD_FROM_FILE[screen].T,
         unit_m=unit,
         unit_evidence=unit_evidence,
         up_evidence=f"{screen[1].removeprefix('+').lower()} (POINT:Y_SCREEN is {screen[1]})",
+        notes=notes,
     )
 
 
-def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
-    """Run `ezc3d_process` and read its arrays; BadFile if ezc3d refuses the file, crashes or does not finish."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "content.npz"
-        timeout_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
-        with PythonProcess(ezc3d_process.__name__, str(path.absolute()), str(out), folder=folder) as process:
-            ended = process.finish(timeout_s)
-        if ended is None:
-            raise BadFile(path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN)
-        if process.returncode == ezc3d_process.NO_EZC3D:
-            raise MissingExtra("Reading C3D files", "ezc3d", "c3d")
-        if process.returncode != 0:
-            refused = process.returncode == ezc3d_process.UNREADABLE
-            why = ended[1].strip().splitlines()[-1:] if refused else ["it crashes"]
-            raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _FORMAT, _FETCH_AGAIN)
-        return read_npz(out, "what ezc3d read", _FETCH_AGAIN, limit_bytes=ezc3d_process.MEMORY_LIMIT_BYTES)
+def _read_points(header: C3dHeader, data: bytes) -> Floats:
+    """(T, M, 4) positions in the file's unit, and a number that is below zero where a marker was not seen.
+
+    Of the frames that may be padding, those at the end without any value are left out.
+    """
+    frames = count_frames(header, len(data))
+    block = memoryview(data)[header.data_start : header.data_start + frames[-1] * header.frame_bytes]
+    code = "f4" if header.value_bytes == 4 else "i2"
+    values = header.decode(block, code).reshape(frames[-1], -1)
+    written = np.flatnonzero(values[frames[0] :].any(axis=1))
+    count = frames[0] + (int(written[-1]) + 1 if len(written) else 0)
+    with np.errstate(invalid="ignore"):
+        points: Floats = values[:count, : 4 * header.markers].astype(np.float64).reshape(count, header.markers, 4)
+    if code == "i2":
+        points[..., :3] *= header.scale
+    return points
+
+
+def _label_keys(header: C3dHeader) -> list[str]:
+    """LABELS, LABELS2, LABELS3, ..., which hold 255 labels each."""
+    digits = {key: key.removeprefix("POINT:LABELS") for key in header.parameters if key.startswith("POINT:LABELS")}
+    return sorted(
+        (key for key, tail in digits.items() if not tail or tail.isdecimal()), key=lambda key: int(digits[key] or 1)
+    )
 
 
 @dataclass(frozen=True)
@@ -149,7 +156,7 @@ def measure_marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSprea
     return tuple(spreads)
 
 
-def _length_unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, str]:
+def _length_unit(path: Path, units: tuple[str, ...], given_m: float | None) -> tuple[float, str]:
     """Unit of length [m] and the evidence; BadFile if neither the file nor the caller gives one."""
     if given_m is not None:
         return given_m, "unit as given"
@@ -157,7 +164,3 @@ def _length_unit(path: Path, units: list[str], given_m: float | None) -> tuple[f
         found = f"POINT:UNITS {units[0]!r}" if units else "no POINT:UNITS"
         raise BadFile(path, found, f"one of {', '.join(UNITS_M)}", "Give the unit's length in metres (--unit).")
     return UNITS_M[units[0].lower()], f"{units[0]}, from POINT:UNITS"
-
-
-def _stripped_strings(values: NDArray[Any]) -> list[str]:
-    return [str(value).strip() for value in values]

@@ -59,7 +59,10 @@ def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -
         bodies[station] = TruthPoses(time_s, place, turn)
         notes.append(f"The {len(rows)} markers of {station} fit one rigid body to {1e3 * residual_m:.2g} mm (RMS).")
     return TruthMotion(
-        f"the markers of {path.name}, {time_s[-1]:.1f} s", bodies, common_names(stations, bodies), notes=tuple(notes)
+        f"the markers of {path.name}, {time_s[-1]:.1f} s",
+        bodies,
+        common_names(stations, bodies),
+        notes=(*notes, *markers.notes),
     )
 
 

@@ -1,19 +1,18 @@
 """C3D: markers are read in world axes, follow the bones of the same take, and damaged files are refused."""
 
 import contextlib
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.errors import BadFile, MissingExtra
+from harness.errors import BadFile
 from harness.mocap.library import MotionLibrary
-from harness.mocap.read import c3d, ezc3d_process
-from harness.mocap.read.c3d import measure_marker_spreads, read_c3d
+from harness.mocap.read.c3d import MarkerClip, measure_marker_spreads, read_c3d
+from tests.mocap.c3d_bytes import DEC, INTEL, MIPS, c3d_bytes
 
-ezc3d = pytest.importorskip("ezc3d", reason="C3D files need the extra c3d")
+ezc3d = pytest.importorskip("ezc3d", reason="its files are read for comparison: install the extra test")
 
 LABELS = ["X:LFHD", "X:RFHD", "X:LTOE"]
 
@@ -101,33 +100,114 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
         assert len(read_c3d(tmp_path / "x.c3d").labels) == 3
 
 
-def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(ezc3d_process, "__name__", "ends")  # the program that is started
-
-    def read(end: str) -> None:
-        (tmp_path / "ends.py").write_text(f"import os, sys\n{end}")
-        read_c3d(tmp_path / "x.c3d")
-
-    with pytest.raises(BadFile, match="it crashes"):
-        read("os.abort()")
-    with pytest.raises(BadFile, match="ValueError: no"):
-        read(f"print('ValueError: no', file=sys.stderr)\nsys.exit({ezc3d_process.UNREADABLE})")
-    with pytest.raises(MissingExtra, match=r"tracker-harness\[c3d\]"):
-        read(f"sys.exit({ezc3d_process.NO_EZC3D})")
+def read_bytes(folder: Path, content: bytes) -> MarkerClip:
+    (folder / "x.c3d").write_bytes(content)
+    return read_c3d(folder / "x.c3d")
 
 
-def test_a_file_that_keeps_ezc3d_busy_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    monkeypatch.setattr(c3d, "TIMEOUT_S", 0.0)
-    with pytest.raises(BadFile, match="keeps ezc3d busy"):
-        read_c3d(tmp_path / "x.c3d")
+@pytest.mark.parametrize("processor", [INTEL, DEC, MIPS])
+@pytest.mark.parametrize("scale", [-1.0, -0.1, 0.001])
+@pytest.mark.parametrize("analog", [(0, 0), (3, 4)])
+def test_all_forms_of_numbers_are_read(
+    tmp_path: Path, position_mm: Floats, processor: int, scale: float, analog: tuple[int, int]
+) -> None:
+    position_m = position_mm / 1000.0
+    found = read_bytes(tmp_path, c3d_bytes(position_m, processor=processor, scale=scale, analog=analog))
+    np.testing.assert_allclose(found.position_m, position_m, atol=6e-4 if scale > 0.0 else 1e-6)
+    assert (found.labels, found.rate_hz, found.notes) == (("bar_1", "bar_2", "bar_3"), 100.0, ())
 
 
-def test_the_child_says_when_ezc3d_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ezc3d", None)
-    assert ezc3d_process.main("any", "any") == ezc3d_process.NO_EZC3D
+def count_path(frames: int, markers: int = 2) -> Floats:
+    """(T, M, 3) positions that tell their frame [m]."""
+    path = np.ones((frames, markers, 3))
+    path[:, :, 0] += np.arange(frames)[:, None]
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("frames", "markers"), [(65535, 2), (65536, 1), (70000, 33), (131072, 2)])
+def test_a_long_file_of_ezc3d_is_read_to_its_last_frame(tmp_path: Path, frames: int, markers: int) -> None:
+    content, points = ezc3d.c3d(), np.ones((4, markers, frames))
+    point = content["parameters"]["POINT"]
+    point["LABELS"]["value"], point["UNITS"]["value"] = [f"m{marker}" for marker in range(markers)], ["m"]
+    point["RATE"]["value"] = [100.0]
+    for axis, up in (("X_SCREEN", "+X"), ("Y_SCREEN", "+Z")):
+        content.add_parameter("POINT", axis, [up])
+    points[0] += np.arange(frames)
+    content["data"]["points"] = points
+    content.write(str(tmp_path / "x.c3d"))
+    found = read_c3d(tmp_path / "x.c3d")
+    assert len(found) == frames
+    assert found.position_m[-1, 0, 0] == frames
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        {"last": 70000 % 65536, "frames": 70000 % 65536},
+        {"last": 65535, "frames": 65535},
+        {"last": 65535, "frames": 0},
+        {"last": 65535, "frames": 65535, "long_frames": 70000.0},
+        {"last": 65535, "frames": 65535, "trial": (1, 70000)},
+        {"first": 60000, "last": 65535, "frames": 65535, "trial": (60000, 129999)},
+        {"first": 10, "last": 70009 % 65536, "frames": 70000 % 65536, "long_frames": 70000.0, "trial": (10, 70009)},
+    ],
+)
+@pytest.mark.parametrize("markers", [2, 17])
+def test_the_size_proves_the_number_of_frames_of_a_long_file(
+    tmp_path: Path, counts: dict[str, int], markers: int
+) -> None:
+    found = read_bytes(tmp_path, c3d_bytes(count_path(70000, markers), scale=-1.0, **counts))  # type: ignore[arg-type]  # keywords of several types
+    assert len(found) == 70000
+    assert found.position_m[-1, 0, 0] == 70000.0
+
+
+def test_a_late_cut_of_a_long_take_is_read(tmp_path: Path) -> None:
+    found = read_bytes(tmp_path, c3d_bytes(count_path(10001), first=60000, last=65535, trial=(60000, 70000)))
+    assert len(found) == 10001
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"frames": 99}, "100 by the header, 99 by POINT:FRAMES"),
+        ({"last": 99}, "99 by the header, 100 by POINT:FRAMES"),
+        ({"last": 0}, "0 by the header"),
+        ({"last": 101, "frames": 101, "rest": b""}, "truncated"),
+        ({"last": 50, "frames": 50}, "50 by the header, 50 by POINT:FRAMES; 4"),
+        ({"trial": (1, 99)}, "99 by TRIAL:ACTUAL_START_FIELD and ACTUAL_END_FIELD"),
+        ({"trial": (2, 100 + 65536)}, "65635 by TRIAL"),
+        ({"long_frames": 101.0}, "101 by POINT:LONG_FRAMES"),
+        ({"rest": bytes(513)}, "one number of frames"),
+        ({"rest": b"x" * 1024}, "one number of frames"),
+        ({"numbers": {"USED": 1}}, "POINT:USED 1, but 2 in the header"),
+        ({"numbers": {"RATE": 50.0}}, "POINT:RATE 50, but 100 in the header"),
+        ({"numbers": {"SCALE": 0.1}}, "POINT:SCALE 0.1, but -1 in the header"),
+        ({"numbers": {"DATA_START": 9.0}}, "POINT:DATA_START 9"),
+    ],
+)
+def test_counts_that_disagree_and_bytes_left_over_are_refused(
+    tmp_path: Path, change: dict[str, int], words: str
+) -> None:
+    with pytest.raises(BadFile) as error:
+        read_bytes(tmp_path, c3d_bytes(count_path(100), **change))  # type: ignore[arg-type]  # keywords of several types
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize("rest", [b"", bytes(512), None])
+def test_the_padding_of_the_last_block_is_no_frame(tmp_path: Path, rest: bytes | None) -> None:
+    assert len(read_bytes(tmp_path, c3d_bytes(count_path(100), rest=rest))) == 100
+
+
+@pytest.mark.parametrize("scale", [-1.0, 0.01])
+def test_markers_at_the_origin_with_residual_zero_are_missing(tmp_path: Path, scale: float) -> None:
+    points, residual = count_path(10), np.zeros((10, 2))
+    points[3, 0], points[4, 1], points[5, 1] = 0.0, 0.0, 0.0
+    residual[5, 1], residual[6, 0] = 2.0, -1.0
+    found = read_bytes(tmp_path, c3d_bytes(points, scale=scale, residual=residual))
+    missing = np.isnan(found.position_m[..., 0])
+    assert [(int(t), int(m)) for t, m in np.argwhere(missing)] == [(3, 0), (4, 1), (6, 0)]
+    assert found.notes == ("2 positions at exactly (0, 0, 0) count as markers that were not seen.",)
 
 
 SPREAD_M = {"02_01": (0.012, 0.030), "02_05": (0.020, 0.045), "05_13": (0.040, 0.110)}
