@@ -14,9 +14,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
 
-import numpy as np
-
-from harness.core.estimate import Origin, Status
+from harness.core.estimate import as_estimate
 from harness.core.messages import MessageError, read_message, write_message
 from harness.errors import HarnessError
 from harness.experiment.file_audit import FileAudit
@@ -29,7 +27,7 @@ from harness.experiment.method_messages import (
     decode_training,
     encode_answers,
 )
-from harness.experiment.method_run import lag_and_sigma, run_method
+from harness.experiment.method_run import run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.source_files import source_files, source_hash
@@ -54,7 +52,8 @@ class MethodWorker:
             if self._audit.violation is not None:
                 raise self._audit.violation
         except BaseException as error:
-            known = isinstance(error, HarnessError) and error is not self._audit.violation
+            refusal = header["operation"] in ("describe", "fit")  # a step that raises anything has failed
+            known = refusal and isinstance(error, HarnessError) and error is not self._audit.violation
             fields = [list(f) if isinstance(f, tuple) else f for f in error.args] if known else []
             text = "".join(traceback.format_exception(error))[-MAX_TEXT:]
             return {"error": type(error).__name__, "text": text, "message": str(error), "fields": fields}, {}
@@ -107,13 +106,11 @@ class MethodWorker:
 
     def _step(self, header: Header, arrays: Arrays) -> Message:
         _, (frame,) = decode_take(header, arrays)
-        estimate = self._sessions[header["session"]].step(frame)
-        status, origin = int(Status(estimate.status)), int(Origin(estimate.origin))
-        lag, sigma_rad = lag_and_sigma(estimate)
-        answer = {"qpos": np.asarray(estimate.qpos, dtype=np.float64)}
-        if sigma_rad is not None:
-            answer["angle_sigma_rad"] = sigma_rad
-        return {"status": status, "origin": origin, "lag": lag}, answer
+        estimate = as_estimate(self._sessions[header["session"]].step(frame))
+        answer = {"qpos": estimate.qpos}
+        if estimate.angle_sigma_rad is not None:
+            answer["angle_sigma_rad"] = estimate.angle_sigma_rad
+        return {"status": int(estimate.status), "origin": int(estimate.origin), "lag": estimate.lag}, answer
 
 
 def serve(worker: MethodWorker, *descriptors: str) -> None:

@@ -6,7 +6,6 @@ cells are kept in the folder of the study, so that a stopped study goes on where
 
 import hashlib
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -20,11 +19,10 @@ from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.fault_report import named_folder_fault
 from harness.core.seeds import generator
-from harness.core.split import ExampleLeak
-from harness.errors import BadFile, BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
+from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_process import MethodFailure
+from harness.experiment.method_run import describe_failure
 from harness.experiment.remote_method import hash_method, resolve_method, run_over_frames
 from harness.experiment.scenario import Scenario, change_scenario, variants
 from harness.experiment.score_recording import (
@@ -325,14 +323,8 @@ class _CaptureRun:
         for arm in self.task.arms:
             try:
                 found[str(arm)] = self._cell(arm, side, identity, load)
-            except (SystemFault, ExampleLeak):
-                raise
-            except (MethodFailure, HarnessError) as error:
-                self.failures[f"{arm} on {self.clip}, {side}"] = str(error)
             except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
-                if was_interrupted(error):
-                    raise KeyboardInterrupt from error
-                self.failures[f"{arm} on {self.clip}, {side}"] = traceback.format_exc()
+                self.failures[f"{arm} on {self.clip}, {side}"] = describe_failure(error)
         return found
 
     def _cell(
