@@ -16,7 +16,8 @@ from typing import Any, BinaryIO
 
 from harness.core.estimate import as_estimate
 from harness.core.messages import MessageError, read_message, write_message
-from harness.errors import HarnessError
+from harness.core.object_state import describe_state
+from harness.errors import BadInput, HarnessError, shorten
 from harness.experiment.file_audit import FileAudit
 from harness.experiment.method_messages import (
     MAX_TEXT,
@@ -79,7 +80,7 @@ class MethodWorker:
         return {
             "summary": str(method.summary),
             "needs_examples": bool(method.needs_examples),
-            "options": repr(method),
+            "options": _stable_options(method, header["name"]),
             "source_hash": source_hash(method),
         }, {}
 
@@ -111,6 +112,20 @@ class MethodWorker:
         if estimate.angle_sigma_rad is not None:
             answer["angle_sigma_rad"] = estimate.angle_sigma_rad
         return {"status": int(estimate.status), "origin": int(estimate.origin), "lag": estimate.lag}, answer
+
+
+def _stable_options(method: Method, name: str) -> str:
+    """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
+    made, again = describe_state(method, name), describe_state(registry.resolve(name), name)
+    if made == again:
+        return made
+    differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)
+    at = next(differ, min(len(made), len(again)))
+    found = " and then ".join(shorten(text[max(at - 40, 0) :], 60) for text in (made, again))
+    raise BadInput(
+        f"{name} is in another state each time that it is made: {found}.",
+        "Draw random numbers and read clocks in `fit`, which receives `rng`; else its cells are never found again.",
+    )
 
 
 def serve(worker: MethodWorker, *descriptors: str) -> None:

@@ -23,7 +23,7 @@ from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_run import describe_failure
-from harness.experiment.remote_method import hash_method, resolve_method, run_over_frames
+from harness.experiment.remote_method import method_identity, resolve_method, run_over_frames
 from harness.experiment.scenario import Scenario, change_scenario, variants
 from harness.experiment.score_recording import (
     LoopFrames,
@@ -332,10 +332,9 @@ class _CaptureRun:
     ) -> dict[str, float | None]:
         method = resolve_method(arm.method, DEFAULT_ISOLATION)
         evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
-        described = {"name": arm.method, "options": repr(method), "source": hash_method(method)}
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
-        path = self.task.out / "cells" / f"{cell_key(content, described, source_hash())}.json"
+        path = self.task.out / "cells" / f"{cell_key(content, method_identity(method, arm.method), source_hash())}.json"
         if path.is_file():
             return read_cell_errors(path, self.task.metrics)
         frames, worn = load(), tuple(self.playback.scenario.worn_stations)
