@@ -137,6 +137,7 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     content |= {"lost": stream.recording.damage, "methods": [score.as_dict() for score in scores]}
     measured = any(score.metrics["joint_angle_mean_deg"] is not None for score in scores)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
+    outcome = Outcome.INCOMPLETE if any(score.failure for score in scores) else outcome
     return print_result(
         args, content, f"played from {played}", "", score_recording.format_score_table(scores), outcome=outcome
     )

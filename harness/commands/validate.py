@@ -77,4 +77,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         page = write_validation_page(args.out.with_suffix(".html"), report)
         lines += [f"unit file: {args.out}", f"report: {page}"]
         content |= {"unit_file": str(args.out), "page": str(page)}
-    return print_result(args, content, *lines)
+    failures = {one.method: one.failure for one in scores if one.failure}
+    lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
+    content |= {"failures": failures} if failures else {}
+    return print_result(args, content, *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS)

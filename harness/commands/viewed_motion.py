@@ -153,6 +153,8 @@ def _view_recording(
         return ViewedMotion(path.name, standard_skeleton(), [path.name], lambda _: clip, " ".join([note, *lost]))
     playback = find_playback(stream, **playback_options, folder=mocap)
     done = reconstruct_recording(stream, playback, methods, progress)
+    lost += [f"{name} failed: {text.strip().splitlines()[-1]}." for name, text in done.failures.items()]
+    methods = [name for name in methods if name in done.estimates]
     count = len(done.frames)
     _require_frames(path, count)
     truth = compute_poses(playback.body.skeleton, playback.simulation.truth_qpos[np.maximum(done.truth_row, 0)])

@@ -33,10 +33,23 @@ def freeze(record: Any, dtype: type = np.float64, **shapes: tuple[str | int, ...
 
 
 def immutable(values: Any, dtype: type = np.float64) -> NDArray[Any]:
-    """A copy that nobody can make writable again, because its memory is a `bytes` object; such an array as it is."""
+    """A copy that nobody can make writable again, because its memory is a `bytes` object; such an array as it is.
+
+    TypeError for floats from complex numbers, objects, text or masked values. ValueError for finite numbers that are
+    too large for the type.
+    """
     if type(values) is np.ndarray and values.dtype == dtype and values.flags.c_contiguous:
         memory: object = values.base
         if type(memory) is bytes:
             return values
-    array: NDArray[Any] = np.asarray(values, dtype=dtype, order="C")
+    given = np.asanyarray(values)
+    if np.dtype(dtype).kind == "f" and not np.can_cast(given.dtype, dtype, "same_kind"):
+        raise TypeError(f"values of type {given.dtype}, expected {np.dtype(dtype)}")
+    if np.ma.is_masked(given):
+        raise TypeError("masked values, which are no numbers")
+    with np.errstate(over="ignore"):
+        array: NDArray[Any] = np.asarray(given, dtype=dtype, order="C")
+    narrower = given.dtype.kind == "f" and given.dtype.itemsize > array.itemsize
+    if narrower and not np.array_equal(np.isfinite(given), np.isfinite(array)):
+        raise ValueError(f"a number that is too large for {array.dtype}")
     return np.ndarray(array.shape, array.dtype, array.tobytes())

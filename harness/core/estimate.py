@@ -4,11 +4,22 @@ import operator
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
+from typing import Any, TypeVar
 
 import numpy as np
 
-from harness.core.arrays import Floats, Ints, freeze
+from harness.core.arrays import Bools, Floats, Ints, freeze
+
+QPOS_SIZE = 55
+"""Size of a configuration of the body."""
+MAX_POSE_VALUE, MIN_QUATERNION = 1e6, 1e-6
+"""Values of poses [m, rad] from the first on, and sums of a quaternion's absolute values up to the second, are no
+pose [choice]."""
+MIN_SIGMA_RAD = float(np.finfo(np.float32).tiny)
+"""Smallest standard deviation: single precision, as results store it, holds no smaller one in full [rad]."""
+_ROOT_QUATERNION = slice(3, 7)
+_Choice = TypeVar("_Choice", bound=IntEnum)
 
 
 class Status(IntEnum):
@@ -36,9 +47,13 @@ class Origin(IntEnum):
 class Estimate:
     """One pose of the body, its status and its origin, in the form that is posed, rendered, exported and scored.
 
-    Raises ShapeError for a pose that is no vector and for another number of standard deviations than hinges. Raises
-    ValueError for an unknown status or origin, a standard deviation that is not finite and positive, and a negative
-    lag.
+    Every answer of a method becomes one (`as_estimate`), so that what follows can rely on it. NaN, infinity and a
+    quaternion of zeros mean that there is no pose; the frame is not scored.
+
+    Raises ShapeError for another size than (55,) and for another number of standard deviations than hinges. Raises
+    TypeError for values that are no real numbers. Raises ValueError for a pose of impossible values
+    (`find_impossible_pose`), an unknown status or origin, a standard deviation that is not positive or out of range,
+    and a negative lag.
     """
 
     qpos: Floats
@@ -54,23 +69,72 @@ class Estimate:
     standard deviations are those of the answered frame. See `reconstruct.contract.Session`."""
 
     def __post_init__(self) -> None:
-        freeze(self, qpos=("Q",))
-        object.__setattr__(self, "status", Status(self.status))
-        object.__setattr__(self, "origin", Origin(self.origin))
+        _refuse_other_kinds(self.qpos, "pose")
+        freeze(self, qpos=(QPOS_SIZE,))
+        size = np.abs(self.qpos)
+        if not (size.max() < MAX_POSE_VALUE and size[_ROOT_QUATERNION].sum() > MIN_QUATERNION) and (
+            fault := find_impossible_pose(self.qpos[None])
+        ):
+            raise ValueError(f"the method answered with {fault}")
+        object.__setattr__(self, "status", _member(Status, self.status))
+        object.__setattr__(self, "origin", _member(Origin, self.origin))
         object.__setattr__(self, "lag", operator.index(self.lag))
         if self.lag < 0:
             raise ValueError(f"a lag of {self.lag} frames; an estimate answers a frame that was received")
         if self.angle_sigma_rad is not None:
+            _refuse_other_kinds(self.angle_sigma_rad, "standard deviation")
             freeze(self, angle_sigma_rad=(len(self.qpos) - 7,))
             check_sigma(self.angle_sigma_rad)
 
 
+def as_estimate(answer: Any) -> Estimate:
+    """A copy of what a method answered, which may be an object of its own; see `Estimate` for what is refused.
+
+    AttributeError when it has no `qpos` or no `status`.
+    """
+    optional = {name: getattr(answer, name) for name in ("origin", "angle_sigma_rad", "lag") if hasattr(answer, name)}
+    return Estimate(answer.qpos, answer.status, **optional)
+
+
+def has_pose(qpos: Floats) -> Bools:
+    """(F,) whether configurations (F, 55) are poses: finite, with a quaternion other than zero."""
+    out: Bools = np.isfinite(qpos).all(axis=1) & (qpos[:, _ROOT_QUATERNION] != 0.0).any(axis=1)
+    return out
+
+
+def find_impossible_pose(qpos: Floats) -> str:
+    """What no pose among configurations (F, 55) can have, such as an angle of 1e17 rad; "" if there is nothing.
+
+    Rows without a pose (`has_pose`) count as possible.
+    """
+    poses = qpos[has_pose(qpos)]
+    large = np.argwhere(np.abs(poses) >= MAX_POSE_VALUE)
+    if len(large):
+        row, column = large[0]
+        return f"{poses[row, column]:g} at place {column} of a pose; values [m, rad] must be below {MAX_POSE_VALUE:g}"
+    small = poses[np.abs(poses[:, _ROOT_QUATERNION]).sum(axis=1) <= MIN_QUATERNION]
+    return f"a root quaternion of {small[0, _ROOT_QUATERNION]}, which is none" if len(small) else ""
+
+
+def _member(choices: type[_Choice], value: Any) -> _Choice:
+    """The member with a value; ValueError for another value, and for a member of another enumeration."""
+    if isinstance(value, bool) or (isinstance(value, Enum) and not isinstance(value, choices)):
+        raise ValueError(f"{value!r} is no {choices.__name__}")
+    return choices(value)
+
+
+def _refuse_other_kinds(values: Any, name: str) -> None:
+    """TypeError unless values are integers or floats."""
+    if (kind := np.asanyarray(values).dtype).kind not in "fiu":
+        raise TypeError(f"the method answered with a {name} of type {kind}, expected real numbers")
+
+
 def check_sigma(angle_sigma_rad: Floats) -> None:
-    """ValueError unless standard deviations (..., 48) [rad] are finite and positive; it names the first hinge."""
-    if not (angle_sigma_rad.min(initial=1.0) > 0.0 and angle_sigma_rad.max(initial=0.0) < np.inf):  # NaN fails both
-        wrong = np.argwhere(~(np.isfinite(angle_sigma_rad) & (angle_sigma_rad > 0.0)))
-        value = angle_sigma_rad[tuple(wrong[0])]
-        raise ValueError(f"the standard deviation of hinge {wrong[0][-1]} is {value:g} rad; it must be above 0")
+    """ValueError unless standard deviations (..., 48) [rad] are positive and in range; it names the first hinge."""
+    wrong = np.argwhere(~((angle_sigma_rad >= MIN_SIGMA_RAD) & (angle_sigma_rad < MAX_POSE_VALUE)))  # NaN is neither
+    if len(wrong):
+        found = f"the standard deviation of hinge {wrong[0][-1]} is {angle_sigma_rad[tuple(wrong[0])]:g} rad"
+        raise ValueError(f"{found}; it must be above 0, at least {MIN_SIGMA_RAD:.3g}, and below {MAX_POSE_VALUE:g}")
 
 
 def session_lag(lags: Sequence[int] | Ints) -> int:

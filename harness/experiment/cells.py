@@ -6,7 +6,6 @@ stopped at any moment and resumed.
 """
 
 import time
-import traceback
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -18,14 +17,15 @@ from typing import Any
 import numpy as np
 
 from harness.body.mounts import locate_mount
-from harness.core.fault_report import find_system_fault, named_folder_fault
+from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
-from harness.core.split import ClipPart, ExampleLeak
-from harness.errors import BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
+from harness.core.split import ClipPart
+from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
+from harness.experiment.method_run import describe_failure
 from harness.experiment.remote_method import close_methods, resolve_method, run_over_frames, start_methods
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
 from harness.mocap.library import LibraryFolders
@@ -134,20 +134,9 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             evaluated = evaluate_cell(evaluation, method, cell, key, task.command)
             _write_cell(out, evaluated)
             yield CellOutcome(str(cell), key, row=as_row(evaluated), seconds=time.perf_counter() - start)
-        except SystemFault:
-            raise
-        except MethodFailure as error:
-            yield CellOutcome(str(cell), failure=str(error))
-        except ExampleLeak:
-            raise
-        except HarnessError as error:
-            yield CellOutcome(str(cell), failure=str(error), refused=True)
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
-            if was_interrupted(error):
-                raise KeyboardInterrupt from error
-            if fault := find_system_fault(error):
-                raise fault from error
-            yield CellOutcome(str(cell), failure=traceback.format_exc())
+            refused = isinstance(error, HarnessError) and not isinstance(error, MethodFailure)
+            yield CellOutcome(str(cell), failure=describe_failure(error), refused=refused)
 
 
 def _write_cell(out: Path, cell: storage.Cell) -> None:

@@ -23,7 +23,7 @@ from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_frames, refuse_leak, select_examples
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
-from harness.experiment.remote_method import hash_method
+from harness.experiment.remote_method import method_identity
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
@@ -357,7 +357,7 @@ class ClipEvaluation:
         self.scenario, self.subject, self.observation = scenario, subject, observation
         self.source, self.part, self.behaviour = subject.source, subject.part, subject.behaviour
         self._calibration = calibration
-        self._method_hashes: dict[str, str] = {}
+        self._methods: dict[str, dict[str, str]] = {}
         return self
 
     def with_conditions(self, scenario: Scenario) -> "ClipEvaluation | None":
@@ -444,11 +444,10 @@ class ClipEvaluation:
 
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
         """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
-        if name not in self._method_hashes:
-            self._method_hashes[name] = hash_method(method)
-        described = {"name": name, "options": repr(method), "source": self._method_hashes[name]}
+        if name not in self._methods:
+            self._methods[name] = method_identity(method, name)
         content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
-        return storage.cell_key(content, described, manifest.source_hash())
+        return storage.cell_key(content, self._methods[name], manifest.source_hash())
 
 
 def _replace_keys(scenario: Scenario, other: Scenario, keys: Sequence[str]) -> Scenario:

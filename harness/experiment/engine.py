@@ -34,7 +34,7 @@ from harness.experiment.interruption import graceful_stop
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
 from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
-from harness.experiment.remote_method import close_methods, hash_method, resolve_method
+from harness.experiment.remote_method import close_methods, describe_options, hash_method, resolve_method
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
 from harness.mocap.library import LibraryFolders
@@ -204,7 +204,7 @@ def _describe(
     constants = {}
     for name in content["methods"]:
         with suppress(MethodFailure):  # its cells fail and say why
-            constants[name] = repr(resolve_method(name, isolation))
+            constants[name] = describe_options(resolve_method(name, isolation))
     source = sources if "sweep" in content else sources[0]
     return describe_run(content, motion_source=source, command=command, constants=constants)
 

@@ -11,12 +11,12 @@ from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.core.arrays import immutable
 from harness.core.calibration import Calibration
-from harness.core.estimate import check_sigma, session_lag
+from harness.core.estimate import QPOS_SIZE, check_sigma, find_impossible_pose, session_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
-from harness.experiment.method_run import HINGES, QPOS_SIZE, MethodAnswers
+from harness.experiment.method_run import HINGES, MethodAnswers
 from harness.stream.frame import TrackerFrame
 
 Message = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -101,6 +101,8 @@ def decode_answers(arrays: Arrays, frames: int) -> MethodAnswers:
         raise MessageError("arrays of another type")
     if not (np.isin(arrays["status"], (0, 1, 2)).all() and np.isin(arrays["origin"], (0, 1, 2)).all()):
         raise MessageError("an unknown status or origin")
+    if fault := find_impossible_pose(arrays["qpos"]):
+        raise MessageError(fault)
     try:
         session_lag(arrays["lag"])
         if "angle_sigma_rad" in arrays:

@@ -1,21 +1,22 @@
 """The run of a trained method over the frames of a take, with the time of each step."""
 
-import operator
 import time
+import traceback
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from harness.core.arrays import Floats, Ints, immutable
 from harness.core.calibration import Calibration
-from harness.core.estimate import Origin, Status, check_sigma, session_lag
+from harness.core.estimate import QPOS_SIZE, Estimate, as_estimate, session_lag
+from harness.core.fault_report import find_system_fault
+from harness.core.split import ExampleLeak
+from harness.errors import HarnessError, was_interrupted
 from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
 from harness.reconstruct.contract import Reconstructor
 from harness.stream.frame import TrackerFrame
 
-QPOS_SIZE = 55
-"""Size of a configuration of the body."""
 HINGES = QPOS_SIZE - 7
 """Number of hinge angles in a configuration."""
 
@@ -62,58 +63,59 @@ def run_method(reconstructor: Reconstructor, calibration: Calibration, frames: S
     """Run a reconstructor over frames. It never sees the truth, and each answer is copied before the next step.
 
     Reference work follows every `FRAMES_PER_TIMING` steps, and its time is NaN elsewhere. It evicts the method's data
-    from the processor's caches, so the step after it is not timed (NaN). ValueError for a pose of another size, for a
-    lag that changes after the first frames, and for standard deviations that are impossible or missing in some frames.
+    from the processor's caches, so the step after it is not timed (NaN). For answers that are refused see
+    `core.estimate.Estimate` and `stack_estimates`.
     """
     session, work = reconstructor.begin(calibration), ReferenceWorkload()
-    qpos, status, origin, lags = np.empty((len(frames), QPOS_SIZE)), [], [], []
-    sigma_rad: list[Floats] = []
-    step_ms, cpu_ms, reference_ms = [], [], []
+    estimates, step_ms, cpu_ms, reference_ms = [], [], [], []
     for index, frame in enumerate(frames):
         start_cpu, start = time.process_time(), time.perf_counter()
-        estimate = session.step(frame)
+        answer = session.step(frame)
         step_ms.append(1e3 * (time.perf_counter() - start))
         cpu_ms.append(1e3 * (time.process_time() - start_cpu))
-        pose = np.asarray(estimate.qpos, dtype=np.float64)
-        if pose.shape != (QPOS_SIZE,):
-            raise ValueError(f"the method answered with a pose of shape {pose.shape}, expected ({QPOS_SIZE},)")
-        qpos[index] = pose
-        status.append(int(Status(estimate.status)))
-        origin.append(int(Origin(estimate.origin)))
-        lag, sigma = lag_and_sigma(estimate)
-        lags.append(lag)
-        if sigma is not None:
-            sigma_rad.append(sigma)
+        estimates.append(as_estimate(answer))
         reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
     times_ms = np.array([step_ms, cpu_ms, reference_ms])
     times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
+    return stack_estimates(estimates, *times_ms)
+
+
+def stack_estimates(
+    estimates: Sequence[Estimate],
+    step_ms: Floats | Sequence[float],
+    step_cpu_ms: Floats | None = None,
+    reference_cpu_ms: Floats | None = None,
+) -> MethodAnswers:
+    """The answers of a session from its F estimates and the times (F,) of its steps; NaN for times that are not given.
+
+    ValueError for a lag that changes after the first frames, and for standard deviations in some frames only.
+    """
+    sigma_rad = [estimate.angle_sigma_rad for estimate in estimates if estimate.angle_sigma_rad is not None]
+    if len(sigma_rad) not in (0, len(estimates)):
+        raise ValueError(f"the method gave standard deviations in {len(sigma_rad)} of {len(estimates)} frames")
+    lags = [estimate.lag for estimate in estimates]
     session_lag(lags)
-    if len(sigma_rad) not in (0, len(frames)):
-        raise ValueError(f"the method gave standard deviations in {len(sigma_rad)} of {len(frames)} frames")
-    step, cpu, reference = map(immutable, times_ms)
+    missing = np.full(len(estimates), np.nan)
     return MethodAnswers(
-        immutable(qpos),
-        immutable(status, np.int64),
-        immutable(origin, np.int64),
-        step,
-        cpu,
-        reference,
+        immutable(np.array([estimate.qpos for estimate in estimates]).reshape(-1, QPOS_SIZE)),
+        immutable([estimate.status for estimate in estimates], np.int64),
+        immutable([estimate.origin for estimate in estimates], np.int64),
+        *(immutable(missing if times is None else times) for times in (step_ms, step_cpu_ms, reference_cpu_ms)),
         lag=immutable(lags, np.int64),
         angle_sigma_rad=immutable(sigma_rad) if sigma_rad else None,
     )
 
 
-def lag_and_sigma(estimate: Any) -> tuple[int, Floats | None]:
-    """Lag [frames] and a copy of the standard deviations (48,) [rad] of an estimate, or None.
+def describe_failure(error: BaseException) -> str:
+    """Why a method has no result: the message of an error of the package, or the traceback of any other.
 
-    ValueError for standard deviations of another size, or not finite and positive. A method may answer with an object
-    of its own, which need not have either.
+    For use where the error was caught. An error that is no fault of the method is raised again: examples that contain
+    the test clip, Ctrl-C (KeyboardInterrupt), or a fault of the system that the code of the method has met.
     """
-    given, lag = getattr(estimate, "angle_sigma_rad", None), operator.index(getattr(estimate, "lag", 0))
-    if given is None:
-        return lag, None
-    sigma_rad = np.array(given, dtype=np.float64)
-    if sigma_rad.shape != (HINGES,):
-        raise ValueError(f"the method gave standard deviations of shape {sigma_rad.shape}, expected ({HINGES},)")
-    check_sigma(sigma_rad)
-    return lag, sigma_rad
+    if isinstance(error, ExampleLeak):
+        raise error
+    if was_interrupted(error):
+        raise KeyboardInterrupt from error
+    if fault := find_system_fault(error):
+        raise fault from error
+    return str(error) if isinstance(error, HarnessError) else "".join(traceback.format_exception(error))

@@ -14,13 +14,12 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
 
-import numpy as np
-
-from harness.core.estimate import Origin, Status
+from harness.core.estimate import as_estimate
 from harness.core.fault_report import find_system_fault
 from harness.core.messages import MessageError, read_message, write_message
+from harness.core.object_state import describe_state
 from harness.core.working_folder import serve_folder
-from harness.errors import HarnessError
+from harness.errors import BadInput, HarnessError, SystemFault, shorten
 from harness.experiment.file_audit import FileAudit
 from harness.experiment.method_messages import (
     MAX_TEXT,
@@ -31,7 +30,7 @@ from harness.experiment.method_messages import (
     decode_training,
     encode_answers,
 )
-from harness.experiment.method_run import lag_and_sigma, run_method
+from harness.experiment.method_run import run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.source_files import source_files, source_hash
@@ -57,7 +56,9 @@ class MethodWorker:
                 raise self._audit.violation
         except BaseException as raised:
             error = find_system_fault(raised) or raised
+            refusal = header["operation"] in ("describe", "fit")  # a step that raises anything has failed
             known = isinstance(error, HarnessError) and error is not self._audit.violation
+            known = known and (refusal or isinstance(error, SystemFault))
             fields = [list(f) if isinstance(f, tuple) else f for f in error.args] if known else []
             text = "".join(traceback.format_exception(error))[-MAX_TEXT:]
             return {"error": type(error).__name__, "text": text, "message": str(error), "fields": fields}, {}
@@ -85,7 +86,7 @@ class MethodWorker:
         return {
             "summary": str(method.summary),
             "needs_examples": bool(method.needs_examples),
-            "options": repr(method),
+            "options": _stable_options(method, header["name"]),
             "source_hash": source_hash(method),
         }, {}
 
@@ -112,13 +113,25 @@ class MethodWorker:
 
     def _step(self, header: Header, arrays: Arrays) -> Message:
         _, (frame,) = decode_take(header, arrays)
-        estimate = self._sessions[header["session"]].step(frame)
-        status, origin = int(Status(estimate.status)), int(Origin(estimate.origin))
-        lag, sigma_rad = lag_and_sigma(estimate)
-        answer = {"qpos": np.asarray(estimate.qpos, dtype=np.float64)}
-        if sigma_rad is not None:
-            answer["angle_sigma_rad"] = sigma_rad
-        return {"status": status, "origin": origin, "lag": lag}, answer
+        estimate = as_estimate(self._sessions[header["session"]].step(frame))
+        answer = {"qpos": estimate.qpos}
+        if estimate.angle_sigma_rad is not None:
+            answer["angle_sigma_rad"] = estimate.angle_sigma_rad
+        return {"status": int(estimate.status), "origin": int(estimate.origin), "lag": estimate.lag}, answer
+
+
+def _stable_options(method: Method, name: str) -> str:
+    """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
+    made, again = describe_state(method, name), describe_state(registry.resolve(name), name)
+    if made == again:
+        return made
+    differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)
+    at = next(differ, min(len(made), len(again)))
+    found = " and then ".join(shorten(text[max(at - 40, 0) :], 60) for text in (made, again))
+    raise BadInput(
+        f"{name} is in another state each time that it is made: {found}.",
+        "Draw random numbers and read clocks in `fit`, which receives `rng`; else its cells are never found again.",
+    )
 
 
 def serve(worker: MethodWorker, *descriptors: str) -> None:

@@ -19,6 +19,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
+from harness.core.object_state import describe_state
 from harness.core.working_folder import served_folders
 from harness.errors import HarnessError
 from harness.experiment.isolation import Isolation
@@ -115,11 +116,12 @@ class RemoteMethod:
 
     @property
     def source_hash(self) -> str:
-        """Hash of its code and of its declared data files."""
+        """Hash of its code, of its declared data files and of the environment variables that it declares."""
         return self.describe().source_hash
 
-    def __repr__(self) -> str:
-        """Its name and options, as in the other process."""
+    @property
+    def options(self) -> str:
+        """Text of its attributes in the other process."""
         return self.describe().options
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "RemoteReconstructor":
@@ -228,8 +230,18 @@ def close_methods() -> None:
 
 
 def hash_method(method: Method) -> str:
-    """Hash of the code and the declared data files of a method, as its process has read them if it has one."""
+    """Hash of the code and the declared inputs of a method, as its process has read them if it has one."""
     return method.source_hash if isinstance(method, RemoteMethod) else source_hash(method)
+
+
+def describe_options(method: Method) -> str:
+    """Text of the attributes of a method (`describe_state`), those in its process if it has one."""
+    return method.options if isinstance(method, RemoteMethod) else describe_state(method, method.name)
+
+
+def method_identity(method: Method, name: str) -> dict[str, str]:
+    """What the key of a cell says of its method: another method, other options or another source have another key."""
+    return {"name": name, "options": describe_options(method), "source": hash_method(method)}
 
 
 def run_over_frames(fitted: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> MethodAnswers:

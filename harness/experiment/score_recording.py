@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.estimate import Estimate, name_with_lag, session_lag
+from harness.core.estimate import Estimate, as_estimate, name_with_lag
 from harness.core.fields import check_entries
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressCallback
 from harness.core.text_table import Table
-from harness.errors import BadFile, BadInput, HarnessError
+from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_run import lag_and_sigma
+from harness.experiment.method_run import MethodAnswers, describe_failure, stack_estimates
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import Scenario, load_scenario
@@ -66,6 +66,8 @@ class RecordingScore:
     """Number of later frames that the method uses for each estimate."""
     sigma_scores: Mapping[str, float] = field(default_factory=dict)
     """Scores of the standard deviations (see `score.uncertainty`), over all loops; empty without them."""
+    failure: str = ""
+    """Why the method has no result, as for a failed cell; "" if it has one."""
 
     @property
     def title(self) -> str:
@@ -162,37 +164,8 @@ class LoopFrames:
     """(N,) indices of the true frames, strictly increasing."""
 
 
-@dataclass(frozen=True, eq=False)
-class _MethodOutput:
-    """Answers of one method to the first F frames of the recording; the last `lag` frames have no answer."""
-
-    lag: int
-    qpos: Floats
-    status: Ints
-    step_ms: Floats
-    sigma_rad: Floats | None
-    """(F, 48) standard deviations, if the method states them [rad]."""
-
-    def answered(self, loop: LoopFrames) -> LoopFrames:
-        """The frames of a loop that the method has answered."""
-        kept = loop.rows < len(self.qpos)
-        return LoopFrames(loop.rows[kept], loop.index[kept])
-
-
-def _collect_output(estimates: Sequence[Estimate], step_ms: Sequence[float]) -> _MethodOutput:
-    """The output of a session; ValueError as for `method_run.run_method`."""
-    told = [lag_and_sigma(estimate) for estimate in estimates]
-    lag = session_lag([each for each, _ in told])
-    sigmas = [sigma for _, sigma in told if sigma is not None]
-    if len(sigmas) not in (0, len(told)):
-        raise ValueError(f"the method gave standard deviations in {len(sigmas)} of {len(told)} frames")
-    return _MethodOutput(
-        lag,
-        np.array([estimate.qpos for estimate in estimates])[lag:],
-        np.array([int(estimate.status) for estimate in estimates], dtype=np.int64)[lag:],
-        np.array(step_ms)[: len(estimates) - lag],
-        np.array(sigmas)[lag:] if sigmas else None,
-    )
+_Output = MethodAnswers | str
+"""Answers of one method to the first F frames of the recording, by frame; or why it failed."""
 
 
 def score_methods(
@@ -201,7 +174,10 @@ def score_methods(
     methods: Sequence[str],
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> list[RecordingScore]:
-    """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
+    """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion.
+
+    A method that fails has its `RecordingScore.failure`, and stops no other.
+    """
     frames, zero_s, made = _run_methods(stream, _begin_sessions(playback, methods, progress))
     loops = _split_into_loops(frames, zero_s, playback.samples)
     arrived = np.array([np.isfinite(frame.measured_s).sum() for frame in frames], dtype=np.int64)
@@ -231,6 +207,8 @@ class ReconstructedRecording:
     """(F,) row of the true pose in `Playback.simulation.truth_qpos`; -1 where there is none."""
     estimates: Mapping[str, tuple[Floats, Ints]]
     """Method -> configurations (N, 55) and status (N,) of the first N frames; N < F for a method with a lag."""
+    failures: Mapping[str, str]
+    """Method -> why it has no estimates."""
 
 
 def reconstruct_recording(
@@ -244,38 +222,56 @@ def reconstruct_recording(
     truth_row = np.full(len(frames), -1)
     for loop in _split_into_loops(frames, zero_s, playback.samples):
         truth_row[loop.rows] = loop.index
-    return ReconstructedRecording(
-        tuple(frames), truth_row, {name: (output.qpos, output.status) for name, output in made.items()}
-    )
+    failures = {name: output for name, output in made.items() if isinstance(output, str)}
+    estimates = {name: (out.qpos, out.status) for name, out in made.items() if not isinstance(out, str)}
+    return ReconstructedRecording(tuple(frames), truth_row, estimates, failures)
 
 
-def _begin_sessions(playback: Playback, methods: Sequence[str], progress: ProgressCallback) -> dict[str, Session]:
-    sessions, planned = dict[str, Session](), len(methods) + 1
+def _begin_sessions(playback: Playback, methods: Sequence[str], progress: ProgressCallback) -> dict[str, Session | str]:
+    """The sessions of the methods, or why one fails; names and options that do not exist are refused."""
+    sessions, planned = dict[str, Session | str](), len(methods) + 1
     for done, name in enumerate(methods):
         progress(f"learning {name}", done, planned)
-        fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
-        sessions[name] = fitted.begin(playback.calibration)
+        try:
+            fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
+            sessions[name] = fitted.begin(playback.calibration)
+        except (UnknownName, RenamedKey, BadInput):
+            raise
+        except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
+            sessions[name] = describe_failure(error)
     progress("playing the recording", len(methods), planned)
     return sessions
 
 
 def _run_methods(
-    stream: RecordingStream, sessions: Mapping[str, Session]
-) -> tuple[list[TrackerFrame], Floats, dict[str, _MethodOutput]]:
+    stream: RecordingStream, sessions: Mapping[str, Session | str]
+) -> tuple[list[TrackerFrame], Floats, dict[str, _Output]]:
     """The frames, the device time at which the device's clock was zero for each (F,) [s], and the methods' output."""
     frames, zero_s = [], []
-    estimates: dict[str, list[Estimate]] = {name: [] for name in sessions}
-    times_ms: dict[str, list[float]] = {name: [] for name in sessions}
+    failures = {name: session for name, session in sessions.items() if isinstance(session, str)}
+    running = {name: session for name, session in sessions.items() if not isinstance(session, str)}
+    estimates: dict[str, list[Estimate]] = {name: [] for name in running}
+    times_ms: dict[str, list[float]] = {name: [] for name in running}
     for frame in stream:
         frames.append(frame)
         zero_s.append(stream.device_zero_s)
-        for name, session in sessions.items():
+        for name in [name for name in running if name not in failures]:
             seen, start = replace(frame), time.perf_counter()
-            estimate = session.step(seen)
-            times_ms[name].append(1e3 * (time.perf_counter() - start))
-            estimates[name].append(estimate)
-    made = {name: _collect_output(estimates[name], times_ms[name]) for name in sessions}
+            try:
+                answer = running[name].step(seen)
+                times_ms[name].append(1e3 * (time.perf_counter() - start))
+                estimates[name].append(as_estimate(answer))
+            except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
+                failures[name] = describe_failure(error)
+    made = {name: failures.get(name) or _stack_by_frame(estimates[name], times_ms[name]) for name in sessions}
     return frames, np.array(zero_s), made
+
+
+def _stack_by_frame(estimates: Sequence[Estimate], step_ms: Sequence[float]) -> _Output:
+    try:
+        return stack_estimates(estimates, step_ms).by_frame()[0]
+    except ValueError as error:
+        return str(error)
 
 
 def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: DeviceSamples) -> list[LoopFrames]:
@@ -320,15 +316,20 @@ def _row_medians(values: Floats) -> Floats:
 
 
 def _score_method(
-    name: str, output: _MethodOutput, loops: Sequence[LoopFrames], arrived: Ints, playback: Playback
+    name: str, output: _Output, loops: Sequence[LoopFrames], arrived: Ints, playback: Playback
 ) -> RecordingScore:
     """The score of a method, where enough frames and enough of the (F,) records that `arrived` in each are there."""
+    records = sum(int(arrived[loop.rows].sum()) for loop in loops)
+    sent = len(playback.samples.stations) * sum(int(loop.index[-1] - loop.index[0]) + 1 for loop in loops)
+    if isinstance(output, str):
+        return RecordingScore(name, 0, 0, records, sent, _not_measured(), failure=output)
     rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
     skeleton, scores, expected, sigma = playback.body.skeleton, [], 0, list[SigmaSums]()
     for number, loop in enumerate(loops):
         first, last = int(loop.index[0]), int(loop.index[-1])
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
-        answered = output.answered(loop)
+        kept = loop.rows < len(output.qpos)
+        answered = LoopFrames(loop.rows[kept], loop.index[kept])
         scores.append(
             score_estimate(
                 skeleton,
@@ -342,18 +343,17 @@ def _score_method(
                 warm_up_s=warm_s,
             )
         )
-        if output.sigma_rad is not None:
+        if output.angle_sigma_rad is not None:
             rows, index = (values[scores[-1].scored] for values in (answered.rows, answered.index))
-            sigma.append(score_sigma(truth_qpos[index], output.qpos[rows], output.sigma_rad[rows]))
+            sigma.append(score_sigma(truth_qpos[index], output.qpos[rows], output.angle_sigma_rad[rows]))
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(score.scored.sum()) for score in scores)
-    records = sum(int(arrived[loop.rows].sum()) for loop in loops)
-    sent = len(playback.samples.stations) * sum(int(loop.index[-1] - loop.index[0]) + 1 for loop in loops)
     complete = records >= COVERAGE_FLOOR * sent or playback.tracker.overload
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected and complete
     metrics = _pool_metrics(scores, output.step_ms[1:]) if enough else _not_measured()
     sigma_scores = sum(sigma[1:], start=sigma[0]).scores() if enough and sigma else {}
-    return RecordingScore(name, matched, expected, records, sent, metrics, output.lag, sigma_scores)
+    lag = int(output.lag[-1]) if len(output.lag) else 0
+    return RecordingScore(name, matched, expected, records, sent, metrics, lag, sigma_scores)
 
 
 def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
@@ -373,14 +373,18 @@ def _not_measured() -> dict[str, float | None]:
 
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
-    """A row for each method, a table of the standard deviations if a method states them, and how few records came."""
-    rows = []
-    for one in judged:
+    """A row for each method that did not fail, and a table of the standard deviations if a method states them.
+
+    The failures follow, each with the last line of its reason, and a line if too few records arrived.
+    """
+    rows, done = [], [one for one in judged if not one.failure]
+    for one in done:
         figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
         rows.append([one.title, f"{one.frames_matched}/{one.frames_expected}", *figures])
     table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
-    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in judged])
-    return "\n".join([*table.lines(), *sigmas, *_missing_records(judged)])
+    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in done])
+    failed = [f"failed: {one.method}: {one.failure.strip().splitlines()[-1]}" for one in judged if one.failure]
+    return "\n".join([*(table.lines() if done else []), *sigmas, *failed, *_missing_records(judged)])
 
 
 def _missing_records(judged: Sequence[RecordingScore]) -> list[str]:

@@ -38,7 +38,7 @@ class Reconstructor(Protocol):
 
 
 class Method(Protocol):
-    """A configured algorithm. Its `repr` must show its options, as that of a dataclass does.
+    """A configured algorithm. Its attributes are its options, and part of a cell's key (`core.object_state`).
 
     It may also have an attribute `source`, the paper it comes from, which `harness list` prints.
     """

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.estimate import MAX_POSE_VALUE, QPOS_SIZE, check_sigma, find_impossible_pose, has_pose
 from harness.core.files import flush_together, move_into_place, temporary_path, to_json, to_json_types
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
-from harness.results.content_types import check_cell_types
+from harness.results.content_types import check_cell_types, find_cell_fault
 from harness.results.digests import check_file, insert_digest, read_result_json
-from harness.results.plausibility import find_impossible_frames, find_impossible_metric, find_impossible_sigma
+from harness.results.plausibility import find_impossible_errors, find_impossible_metric, find_impossible_sigma
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -59,10 +60,6 @@ _INTS = ("frame_index", "status", "origin")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
 MAX_FRAMES_BYTES = 1024 * MEGABYTE
 """Largest frames.npz that is read: some 600,000 frames."""
-MAX_POSE_VALUE, MIN_QUATERNION = 1e6, 1e-6
-"""Values of poses [m, rad] and sizes of quaternions beyond these are damage [choice]."""
-ROOT_QUATERNION = slice(3, 7)
-"""Columns of the root's orientation in a configuration."""
 _ERROR_PREFIX = "error."
 _ADVICE = "Delete the cell's folder and run again; finished cells are kept."
 
@@ -192,7 +189,8 @@ def has_cell(out: Path, key: str) -> bool:
 def write_cell(out: Path, cell: Cell) -> Path:
     """Write a finished cell into a folder; one that exists already stays as it is.
 
-    The cell reaches the disk whole or not at all. Its name does so with later ones, when the index gets its digest.
+    ValueError for values that `read_cell` would refuse; nothing is written then. The cell reaches the disk whole or not
+    at all. Its name does so with later ones, when the index gets its digest.
     """
     folder = cell_folder(out, cell.key)
     beside = temporary_path(folder)
@@ -209,6 +207,9 @@ def write_cell(out: Path, cell: Cell) -> Path:
     columns |= {_ERROR_PREFIX + name: values for name, values in per_frame.items()}
     columns["scored"] = cell.scores.scored
     frames = _npz_bytes(columns)
+    fault = find_cell_fault(to_json_types(content)) or _find_impossible_content(content)
+    if fault := fault or _find_impossible_frames(columns) or _find_excess(len(frames)):
+        raise ValueError(f"{cell.method} on {cell.clip} cannot be stored: {fault}")
     content["frames_sha256"] = hashlib.sha256(frames).hexdigest()
     files = {"cell.json": insert_digest(to_json(content)).encode(), "frames.npz": frames}
     try:
@@ -251,10 +252,9 @@ def read_content(folder: Path) -> dict[str, Any]:
     check_file(folder / "frames.npz", content.get("frames_sha256"), "the frames of a cell", _ADVICE)
     if content.get("key") != folder.name:
         raise BadFile(text, f"the cell {content.get('key')}", "the cell that its folder is named after", _ADVICE)
-    metrics = content.get("metrics")
-    if not isinstance(metrics, dict):
+    if not isinstance(content.get("metrics"), dict):
         raise BadFile(text, "no metrics", f"{expected} of this version of the harness", _ADVICE)
-    if found := find_impossible_metric(metrics) or find_impossible_sigma(content.get("sigma_scores", {})):
+    if found := _find_impossible_content(content):
         raise BadFile(text, found, "possible values", _ADVICE)
     return content
 
@@ -264,12 +264,10 @@ def read_cell(folder: Path) -> Cell:
     frames, content = folder / "frames.npz", read_content(folder)
     check_cell_types(folder / "cell.json", content, _ADVICE)
     arrays = read_npz(frames, "the frames of a cell", _ADVICE, limit_bytes=MAX_FRAMES_BYTES)
-    if fault := _find_wrong_array(arrays) or _find_impossible_pose(arrays):
+    if fault := _find_wrong_array(arrays) or _find_impossible_frames(arrays):
         raise BadFile(frames, fault, "the frames of a cell of this version of the harness", _ADVICE)
     try:
         per_frame = {name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS}
-        if found := find_impossible_frames(per_frame):
-            raise BadFile(frames, found, "possible values", _ADVICE)
         sigma = content.get("sigma_scores", {})
         scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"], sigma)
         return Cell(
@@ -298,20 +296,30 @@ def _find_wrong_array(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
     return ""
 
 
-def _find_impossible_pose(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
-    """What no pose or time can be; "" if nothing is."""
-    for name in ("time_s", "truth_qpos", "estimate_qpos"):
-        values = arrays[name]
-        if name == "estimate_qpos":
-            values = values[arrays["scored"]]  # others may be anything: a method answered NaN there
-        if not np.all(np.abs(values) < MAX_POSE_VALUE):
-            return f"a value of {name} that is not a number below {MAX_POSE_VALUE:g}"
-        if values.ndim == 2 and not np.all(np.abs(values[:, ROOT_QUATERNION]).sum(axis=1) > MIN_QUATERNION):
-            return f"a root orientation of {name} that is no quaternion"
-    sigma_rad = arrays.get(SIGMA_ARRAY, np.ones(1))
-    if not np.all((sigma_rad > 0.0) & (sigma_rad < MAX_POSE_VALUE)):
-        return f"a value of {SIGMA_ARRAY} that is not above 0 and below {MAX_POSE_VALUE:g}"
-    return ""
+def _find_excess(size: int) -> str:
+    return f"{size} bytes of frames, more than {MAX_FRAMES_BYTES}" if size > MAX_FRAMES_BYTES else ""
+
+
+def _find_impossible_content(content: Mapping[str, Any]) -> str:
+    """The first metric with an impossible value; "" if there is none."""
+    return find_impossible_metric(content["metrics"]) or find_impossible_sigma(content.get("sigma_scores", {}))
+
+
+def _find_impossible_frames(arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    """What no time, pose, standard deviation or error of a frame can be; "" if nothing is."""
+    if not np.all(np.abs(arrays["time_s"]) < MAX_POSE_VALUE):
+        return f"a value of time_s that is not a number below {MAX_POSE_VALUE:g}"
+    scored = arrays["estimate_qpos"][arrays["scored"]]  # others may be anything: a method answered NaN there
+    for name, qpos in (("truth_qpos", arrays["truth_qpos"]), ("estimate_qpos", scored)):
+        if qpos.ndim != 2 or qpos.shape[1] != QPOS_SIZE or not has_pose(qpos).all():
+            return f"a frame of {name} that is no pose"
+        if found := find_impossible_pose(qpos):
+            return f"{found} ({name})"
+    try:
+        check_sigma(arrays.get(SIGMA_ARRAY, np.ones((1, 1))))
+    except ValueError as error:
+        return str(error)
+    return find_impossible_errors({name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS})
 
 
 def read_row(folder: Path) -> dict[str, Any]:

@@ -70,15 +70,22 @@ _SUMMARY: Mapping[str, Any] = {
 
 def check_cell_types(path: Path, content: Mapping[str, Any], advice: str) -> None:
     """BadFile unless the entries of a cell.json have their types."""
+    if fault := find_cell_fault(content):
+        raise BadFile(path, fault, "a cell of this version of the harness", advice)
+
+
+def find_cell_fault(content: Mapping[str, Any]) -> str:
+    """What the content of a cell.json cannot be, such as a bone of more than 10 m; "" if nothing is."""
     try:
         check_entries(content, _CELL, "cell")
         if any(abs(value) > MAX_BONE_M for name in _BONES for vector in content[name] for value in vector):
-            raise TypeError(f"cell: a bone of more than {MAX_BONE_M:g} m")
+            return f"cell: a bone of more than {MAX_BONE_M:g} m"
         _check_lag(content["defined_by"].get("lag", 0), "defined_by.lag")
         if "disturbance" in content["defined_by"]:
             check_entries(content["defined_by"]["disturbance"], _DISTURBANCE, "defined_by.disturbance")
     except (TypeError, HarnessError) as error:
-        raise BadFile(path, str(error), "a cell of this version of the harness", advice) from error
+        return str(error)
+    return ""
 
 
 def _check_lag(value: Any, where: str) -> None:

@@ -63,7 +63,7 @@ def find_impossible_statistic(groups: Iterable[Mapping[str, Any]]) -> str:
     return ""
 
 
-def find_impossible_frames(per_frame: Mapping[str, Floats]) -> str:
+def find_impossible_errors(per_frame: Mapping[str, Floats]) -> str:
     """Describe the first metric with an impossible value in some frame; NaN is "undefined" and possible."""
     for name, values in per_frame.items():
         largest = _LARGEST.get(DEFINITIONS[name].unit, np.inf) * _ROUNDING

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.estimate import Origin, Status
+from harness.core.estimate import Origin, Status, has_pose
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
@@ -74,7 +74,7 @@ def score_estimate(
     complete = np.ones(len(estimate_qpos), bool) if complete is None else np.asarray(complete)
     frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
-    finite = np.isfinite(estimate_qpos).all(axis=1) & (np.linalg.norm(estimate_qpos[:, 3:7], axis=1) > 0.0)
+    finite = has_pose(estimate_qpos)
     warm = frame_index >= warm_up
     scored = finite & warm
     expected = max(len(truth_qpos) - warm_up, 0)

@@ -70,3 +70,25 @@ def test_integers_and_other_layouts_become_the_type_that_is_asked_for() -> None:
 def test_another_shape_is_refused() -> None:
     with pytest.raises(ShapeError):
         Readings(np.ones((2, 4)), [True, True])
+
+
+@pytest.mark.parametrize(
+    ("values", "error"),
+    [
+        (np.ones(3) + 1j, TypeError),
+        (np.array([1.0, None]), TypeError),
+        (["1.0", "2.0"], TypeError),
+        (np.ma.array([1.0, 2.0], mask=[False, True]), TypeError),
+        (np.array(["2026-01-01"], "datetime64[D]"), TypeError),
+        (np.array([np.longdouble("1e4000")]), ValueError),
+    ],
+)
+def test_floats_are_made_of_numbers_alone(values: Any, error: type[Exception]) -> None:
+    with pytest.raises(error):
+        immutable(values)
+
+
+def test_numbers_of_other_precision_are_converted() -> None:
+    for values in (np.float32([0.5, np.inf]), np.longdouble([0.5, np.inf]), [0.5, np.inf]):
+        np.testing.assert_array_equal(immutable(values), [0.5, np.inf])
+    assert immutable([]).dtype == np.float64

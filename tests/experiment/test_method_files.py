@@ -164,3 +164,65 @@ def test_errors_of_names_are_those_of_the_registry(folder: Path) -> None:
     write_method(folder, "return (")
     with pytest.raises(BadInput, match="SyntaxError"):
         resolve_method("mine:Mine[name=3]", Isolation())
+
+
+PLAIN = """
+import random
+import threading
+import numpy as np
+from upright import Trained, Upright as Other
+
+
+class Plain:
+    name, summary, needs_examples = "plain", "a class without repr", False
+
+    def __init__(self):
+        self.angle, self.names, self.gain = {angle}, {{"a", "b", "c"}}, lambda x: {angle} * x
+        self.table = np.arange(2000.0)
+        {more}
+
+    def fit(self, body, examples, rng):
+        return Other().fit(body, examples, rng)
+"""
+
+
+def write_plain(folder: Path, angle: float, more: str = "pass") -> None:
+    shutil.copy(UPRIGHT, folder)
+    (folder / "plain.py").write_text(PLAIN.format(angle=angle, more=more))
+
+
+@pytest.mark.long
+def test_a_class_without_repr_is_found_again(folder: Path, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    keys = []
+    for angle in (0.1, 0.1, 0.2):
+        write_plain(folder, angle)
+        engine.run(replace(ONE_CLIP, methods=("plain:Plain",)), tmp_path / "run")
+        keys.append({path.name for path in (tmp_path / "run" / "cells").iterdir()})
+    assert len(keys[0]) == 1
+    assert keys[0] == keys[1] < keys[2]
+
+
+def test_options_are_those_of_another_process(folder: Path) -> None:
+    write_plain(folder, 0.1)
+    texts = []
+    for _ in range(2):
+        texts.append(fit("plain:Plain").options)
+        close_methods()
+    assert texts[0] == texts[1]
+    assert texts[0].startswith("plain.Plain(angle=0.1, gain=plain.Plain.__init__.<locals>.<lambda>(")
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("self.lock = threading.Lock()", r"plain:Plain\.lock is a _thread\.lock"),
+        ("self.seed = random.random()", r"another state each time that it is made: .*seed="),
+        ("self.rng = np.random.default_rng()", r"another state each time that it is made"),
+    ],
+)
+def test_a_method_whose_cells_could_not_be_found_again_is_refused(folder: Path, more: str, message: str) -> None:
+    write_plain(folder, 0.1, more)
+    with pytest.raises(BadInput, match=message):
+        resolve_method("plain:Plain", Isolation())

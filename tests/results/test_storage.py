@@ -6,7 +6,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from shutil import rmtree as remove_folder
 from typing import Any
 
 import numpy as np
@@ -166,14 +168,96 @@ def test_impossible_rows_of_a_summary_are_refused(
         storage.read_summary(run_folder)
 
 
-@pytest.mark.parametrize("value", [0.0, -0.1, np.nan, np.inf])
-def test_impossible_standard_deviations_are_refused(run_folder: Path, make_cell: MakeCell, value: float) -> None:
+def far_off(column: int, value: float) -> Callable[[MakeCell], storage.Cell]:
+    """A cell with one value of one scored estimate replaced."""
+
+    def make(make_cell: MakeCell) -> storage.Cell:
+        qpos = make_cell().estimate_qpos.copy()
+        qpos[60, column] = value
+        return make_cell(estimate_qpos=qpos)
+
+    return make
+
+
+def without_orientation(make_cell: MakeCell) -> storage.Cell:
+    qpos = make_cell().estimate_qpos.copy()
+    qpos[60, 3:7] *= 1e-160
+    return make_cell(estimate_qpos=qpos)
+
+
+def with_sigma(value: float) -> Callable[[MakeCell], storage.Cell]:
+    def make(make_cell: MakeCell) -> storage.Cell:
+        sigma_rad = np.full((400, 48), 0.1)
+        sigma_rad[7, 3] = value
+        return make_cell(angle_sigma_rad=sigma_rad)
+
+    return make
+
+
+def with_long_bone(make_cell: MakeCell) -> storage.Cell:
+    bone_m = make_cell().bone_m.copy()
+    bone_m[3, 2] = 11.0
+    return make_cell(estimate_bone_m=bone_m)
+
+
+def with_negative_metric(make_cell: MakeCell) -> storage.Cell:
+    scores = make_cell().scores
+    return make_cell(scores=replace(scores, metrics={**scores.metrics, "mpjpe_mm": -1.0}))
+
+
+IMPOSSIBLE: dict[str, tuple[Callable[[MakeCell], storage.Cell], str]] = {
+    "an angle": (far_off(10, 1e17), "1e[+]17 at place 10 of a pose"),
+    "a negative angle": (far_off(54, -1e6), "-1e[+]06 at place 54"),
+    "a position": (far_off(0, 1e308), "1e[+]308 at place 0"),
+    "no number": (far_off(0, np.nan), "estimate_qpos that is no pose"),
+    "a quaternion": (without_orientation, "a root quaternion"),
+    "no standard deviation": (with_sigma(0.0), "hinge 3 is 0 rad"),
+    "a negative one": (with_sigma(-0.1), "hinge 3 is -0.1 rad"),
+    "an undefined one": (with_sigma(np.nan), "hinge 3 is nan rad"),
+    "an infinite one": (with_sigma(np.inf), "hinge 3 is inf rad"),
+    "one below single precision": (with_sigma(1e-50), "hinge 3 is 0 rad"),
+    "one beyond all angles": (with_sigma(1e6), "hinge 3 is 1e[+]06 rad"),
+    "a bone": (with_long_bone, "a bone of more than 10 m"),
+    "a metric": (with_negative_metric, "mpjpe_mm is -1"),
+}
+
+
+@pytest.mark.parametrize(("make", "fault"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_what_could_not_be_read_is_not_written(
+    run_folder: Path, make_cell: MakeCell, make: Callable[[MakeCell], storage.Cell], fault: str
+) -> None:
     storage.open_run(run_folder, manifest())
-    sigma_rad = np.full((400, 48), 0.1)
-    sigma_rad[7, 3] = value
-    folder = storage.write_cell(run_folder, make_cell(angle_sigma_rad=sigma_rad))
-    with pytest.raises(BadFile, match="a value of angle_sigma_rad that is not above 0"):
+    cell = make(make_cell)
+    with pytest.raises(ValueError, match=f"ik on walk_01 cannot be stored: .*{fault}"):
+        storage.write_cell(run_folder, cell)
+    assert not storage.has_cell(run_folder, cell.key)
+    assert list((run_folder / "cells").iterdir()) == []
+
+
+@pytest.mark.parametrize(("make", "fault"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_what_is_not_written_is_not_read_either(
+    run_folder: Path,
+    make_cell: MakeCell,
+    make: Callable[[MakeCell], storage.Cell],
+    fault: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    storage.open_run(run_folder, manifest())
+    with monkeypatch.context() as careless:
+        for name in ("find_cell_fault", "_find_impossible_content", "_find_impossible_frames"):
+            careless.setattr(f"harness.results.cell.{name}", lambda content: "")
+        folder = storage.write_cell(run_folder, make(make_cell))
+    with pytest.raises(BadFile, match=fault):
         storage.read_cell(folder)
+
+
+def test_the_largest_values_are_written_and_read(run_folder: Path, make_cell: MakeCell) -> None:
+    storage.open_run(run_folder, manifest())
+    for make in (far_off(10, 0.999e6), far_off(0, -0.999e6), with_sigma(0.999e6), with_sigma(1.2e-38)):
+        cell = make(make_cell)
+        back = storage.read_cell(storage.write_cell(run_folder, cell))
+        np.testing.assert_array_equal(back.estimate_qpos, cell.estimate_qpos)
+        remove_folder(run_folder / "cells" / cell.key)
 
 
 def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:

@@ -83,7 +83,9 @@ class DriverConfig:
     @property
     def settings(self) -> RecordFormat:
         """Number format that the device will be configured for."""
-        return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6, stylus_bytes=self.stylus_bytes)
+        return RecordFormat(
+            0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6, stylus_bytes=self.stylus_bytes
+        )
 
     def alignment_of(self, station: str) -> Alignment | None:
         """Return the reporting frame of the station with this name, or None."""

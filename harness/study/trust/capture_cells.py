@@ -6,7 +6,6 @@ cells are kept in the folder of the study, so that a stopped study goes on where
 
 import hashlib
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -20,12 +19,11 @@ from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.fault_report import named_folder_fault
 from harness.core.seeds import generator
-from harness.core.split import ExampleLeak
-from harness.errors import BadFile, BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
+from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.remote_method import hash_method, resolve_method, run_over_frames
+from harness.experiment.method_run import describe_failure
+from harness.experiment.remote_method import method_identity, resolve_method, run_over_frames
 from harness.experiment.scenario import Scenario, change_scenario, variants
 from harness.experiment.score_recording import (
     LoopFrames,
@@ -325,14 +323,8 @@ class _CaptureRun:
         for arm in self.task.arms:
             try:
                 found[str(arm)] = self._cell(arm, side, identity, load)
-            except (SystemFault, ExampleLeak):
-                raise
-            except (MethodFailure, HarnessError) as error:
-                self.failures[f"{arm} on {self.clip}, {side}"] = str(error)
             except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
-                if was_interrupted(error):
-                    raise KeyboardInterrupt from error
-                self.failures[f"{arm} on {self.clip}, {side}"] = traceback.format_exc()
+                self.failures[f"{arm} on {self.clip}, {side}"] = describe_failure(error)
         return found
 
     def _cell(
@@ -340,10 +332,9 @@ class _CaptureRun:
     ) -> dict[str, float | None]:
         method = resolve_method(arm.method, DEFAULT_ISOLATION)
         evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
-        described = {"name": arm.method, "options": repr(method), "source": hash_method(method)}
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
-        path = self.task.out / "cells" / f"{cell_key(content, described, source_hash())}.json"
+        path = self.task.out / "cells" / f"{cell_key(content, method_identity(method, arm.method), source_hash())}.json"
         if path.is_file():
             return read_cell_errors(path, self.task.metrics)
         frames, worn = load(), tuple(self.playback.scenario.worn_stations)

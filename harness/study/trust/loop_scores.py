@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.estimate import has_pose
 from harness.experiment.method_run import MethodAnswers
 from harness.experiment.score_recording import LoopFrames
 from harness.score import contact
@@ -32,7 +33,7 @@ def score_loops(
         warm_up = int(np.ceil(first + WARM_UP_S * rate_hz - 1e-9)) if number == 0 else 0
         answered = loop.rows < len(qpos)
         index, estimated = loop.index[answered], qpos[loop.rows[answered]]
-        finite = np.isfinite(estimated).all(axis=1) & (np.linalg.norm(estimated[:, 3:7], axis=1) > 0.0)
+        finite = has_pose(estimated)
         index = index[finite]
         pair = Pair(truth.at(index), compute_poses(truth.skeleton, estimated[finite]), index, rate_hz, ground_m)
         scored: Bools = index >= warm_up

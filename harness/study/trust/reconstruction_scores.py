@@ -10,9 +10,10 @@ from harness.calibrate.calibration_file import CalibrationFile
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.progress import ProgressCallback
-from harness.errors import BadInput
+from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.remote_method import resolve_method
+from harness.experiment.method_run import describe_failure
+from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.measure.registration import Registration
 from harness.score.score import WARM_UP_S, score_estimate
 from harness.simulate.trajectory import Trajectory
@@ -31,6 +32,8 @@ class RegisteredScore:
     metric: str
     value: float | None
     """Mean over the frames, in the metric's unit; None if it was not measured."""
+    failure: str = ""
+    """Why the method has no result, as for a failed cell; "" if it has one."""
 
 
 def measured_calibration(registration: Registration, names: Sequence[str] = ()) -> Calibration:
@@ -56,8 +59,8 @@ def score_registered(
     """Run methods on the frames of a capture with the registered calibration, and score them on the performer's body.
 
     A frame's true pose is that of the reference at the frame's mean time. Frames outside the reference, and those of
-    the first second, are not scored; of several loops the one with the most frames is. BadInput where the reference has
-    no performer or no frame is inside it.
+    the first second, are not scored; of several loops the one with the most frames is. A method that fails has no
+    values, and stops no other. BadInput where the reference has no performer or no frame is inside it.
     """
     playback = found.truth.playback
     if playback is None:
@@ -80,22 +83,28 @@ def score_registered(
     out = []
     for done, name in enumerate(methods):
         progress(f"reconstructing with {name}", done, len(methods))
-        fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
-        session = fitted.begin(calibrated.calibration)
-        estimates = [session.step(frames[row]) for row in rows.tolist()]
-        lag = max((estimate.lag for estimate in estimates), default=0)
-        scores = score_estimate(
-            playback.body.skeleton,
-            found.reader.wire.rate_hz,
-            truth_qpos,
-            np.array([estimate.qpos for estimate in estimates])[lag:],
-            np.arange(len(rows) - lag),
-            np.array([int(estimate.status) for estimate in estimates])[lag:],
-            np.full(len(rows) - lag, np.nan),
-        )
-        for metric in SCORED_METRICS:
-            value = scores.metrics.get(metric)
-            out.append(RegisteredScore(name, metric, value if value is not None and np.isfinite(value) else None))
+        values, failure = dict[str, float | None](), ""
+        try:
+            fitted = playback.clip_evaluation.fit_method(resolve_method(name, DEFAULT_ISOLATION), name)
+            seen = [frames[row] for row in rows.tolist()]
+            answers, lag = run_over_frames(fitted, calibrated.calibration, seen).by_frame()
+            kept = np.arange(len(rows) - lag)
+            values = dict(
+                score_estimate(
+                    playback.body.skeleton,
+                    found.reader.wire.rate_hz,
+                    truth_qpos,
+                    answers.qpos,
+                    kept,
+                    answers.status,
+                    np.full(len(kept), np.nan),
+                ).metrics
+            )
+        except (UnknownName, RenamedKey, BadInput):
+            raise
+        except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
+            failure = describe_failure(error)
+        out += [RegisteredScore(name, metric, values.get(metric), failure) for metric in SCORED_METRICS]
     return out
 
 
