@@ -18,7 +18,7 @@ from harness.results.digests import read_result_json, write_result_json
 from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
-from tests.results.finish import finish_run
+from tests.results.finish import finish_run, make_run
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
@@ -80,7 +80,7 @@ def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Pa
 
 def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., storage.Cell]) -> None:
     content = manifest()
-    storage.open_run(run_folder, content)
+    make_run(run_folder, content)
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]
     for cell in cells:
         storage.write_cell(run_folder, cell)

@@ -5,6 +5,7 @@ The folder has study.json (the identity of the study), a folder for each run, an
 
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -82,15 +83,15 @@ def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
     return rows
 
 
-def open_study(out: Path, identity: Mapping[str, Any]) -> None:
-    """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
+def open_study(out: Path, identity: Mapping[str, Any]) -> AbstractContextManager[None]:
+    """Create a study's folder, or open it to resume, and hold its lock; BadInput as `storage.open_folder`."""
 
     def difference(path: Path) -> str:
         advice = "Restore it from a copy, or name another folder with --out."
         stored, given = read_result_json(path, "the identity of a study", advice), to_json_types(identity)
         return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
 
-    open_folder(out, STUDY_FILE, identity, "study", difference)
+    return open_folder(out, STUDY_FILE, identity, "study", difference)
 
 
 def run_scenarios(

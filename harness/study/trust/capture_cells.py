@@ -130,6 +130,11 @@ def run_capture(task: CaptureTask) -> CaptureResult:
     return _CaptureRun(task).run()
 
 
+def find_stations(task: CaptureTask) -> tuple[str, ...]:
+    """Stations of a capture; raises as `run_capture` where its note or its stations do not fit."""
+    return tuple(_CaptureRun(task).playback.scenario.worn_stations)
+
+
 @dataclass(frozen=True, eq=False)
 class _SideFrames:
     """Frames of the device or of one simulation, with their truth."""

@@ -18,10 +18,12 @@ from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.experiment.status import read_status
 from harness.results.digests import read_result_json, write_result_json
 from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
+from harness.results.lock import folder_lock
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.tables import errors_by_clip
 from tests.interrupts import heeding_interrupts
+from tests.results.finish import folder_bytes
 from tests.study.papers.tiny import BOUTS, TINY, WALKS
 
 
@@ -142,13 +144,21 @@ def test_a_full_disk_is_no_failed_experiment(finished: Path, tmp_path: Path) -> 
         reproduce(replace(TINY, experiments={"fail": fail}), out)
 
 
+def test_a_second_command_changes_nothing_while_the_first_writes(finished: Path) -> None:
+    before = folder_bytes(finished)
+    with folder_lock(finished), pytest.raises(BadInput, match="Another process uses"):
+        reproduce(TINY, finished, command="second")
+    assert folder_bytes(finished) == before
+
+
 def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="seed: 1, not 2"):
         reproduce(TINY, finished, seed=2)
     with pytest.raises(BadInput, match="paper: tiny, not other"):
         reproduce(replace(TINY, name="other"), finished)
-    with pytest.raises(BadInput, match="motion: built-in performer, not cmu"):
-        open_study(finished, {"paper": "tiny", "motion": "cmu", "seed": 1})
+    motion = {"paper": "tiny", "motion": "cmu", "seed": 1}
+    with pytest.raises(BadInput, match="motion: built-in performer, not cmu"), open_study(finished, motion):
+        pass
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
         reproduce(TINY, tmp_path)

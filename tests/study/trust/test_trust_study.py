@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.errors import BadFile, BadInput, Outcome, UnknownName
+from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.digests import read_result_json, write_result_json
+from harness.results.lock import folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
@@ -32,6 +33,7 @@ from harness.study.trust.trust_study import (
     judge_outcome,
     run_trust_study,
 )
+from tests.results.finish import folder_bytes
 from tests.study.trust.conftest import CLIPS, SmallStudy
 
 pytestmark = pytest.mark.long
@@ -159,6 +161,19 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bytes(
     assert killed == 10
     assert subprocess.run([*command, "--out", str(out)], check=False, capture_output=True).returncode == 0
     assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
+
+
+def test_a_refused_study_changes_nothing(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
+    before = folder_bytes(finished)
+    with folder_lock(finished), pytest.raises(BadInput, match="Another process uses"):
+        run_trust_study(small_study.plan, small_study.captures, finished)
+    assert folder_bytes(finished) == before
+    simulation = prepare_playback(small_study.plan.with_name("small.toml"), clip=CLIPS[0], stations=2).simulation
+    note = {"scenario": "small", "plan": plan_digest(small_study.plan), "clip": CLIPS[0]}
+    record_capture(tmp_path / "two.rec", simulation.wire_format, simulation.wire, note)
+    with pytest.raises(HarnessError, match="station"):
+        run_trust_study(small_study.plan, [small_study.captures[0], tmp_path / "two.rec"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_damaged_cell_has_no_result(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
