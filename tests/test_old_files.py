@@ -161,7 +161,8 @@ def test_a_paper(old: Path) -> None:
         "mean_pose": pytest.approx(94.265458, abs=1e-5),
         "ik:previous": pytest.approx(13.702175, abs=1e-5),
     }
-    open_study(old / "paper", {"paper": "tiny", "motion": "built-in performer", "seed": 1})
+    with open_study(old / "paper", {"paper": "tiny", "motion": "built-in performer", "seed": 1}):
+        pass
 
 
 def test_a_placement_study(old: Path) -> None:

@@ -73,7 +73,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
         write_result_json(temporary / "summary.json", kept)
         advice = "Save it again."
         digests = {file: file_digest(temporary / file, "a file of a baseline", advice) for file in BASELINE_FILES}
-        write_text(temporary / CELLS_FILE, insert_digest(_cells_json(results, digests)))
+        write_text(temporary / CELLS_FILE, insert_digest(_cells_json(name, results, digests)))
         _replace_folder(temporary, target)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
@@ -96,7 +96,7 @@ def _replace_folder(new: Path, target: Path) -> None:
             shutil.rmtree(previous, ignore_errors=True)
 
 
-def _cells_json(results: ResultSet, digests: Mapping[str, str]) -> str:
+def _cells_json(name: str, results: ResultSet, digests: Mapping[str, str]) -> str:
     """The text of cells.json, which `load_results` reads; `digests` are those of the other files."""
     cells = sorted(results.cells, key=lambda cell: [str(to_json_types(getattr(cell, name))) for name in PAIRING_KEYS])
     definitions = [to_json_types(cell.defined_by) for cell in cells]
@@ -115,6 +115,7 @@ def _cells_json(results: ResultSet, digests: Mapping[str, str]) -> str:
         }
         lines.append({**line, "part": part, "metrics": [cell.metrics.get(name) for name in metrics]})
     head = {
+        "name": name,
         "schema": SCHEMA,
         "digests": digests,
         "planned": results.planned,

@@ -40,7 +40,6 @@ from harness.experiment.sweep_config import Sweep
 from harness.mocap.library import LibraryFolders
 from harness.results import storage
 from harness.results.index import CellIndex
-from harness.results.lock import folder_lock
 from harness.results.manifest import Manifest, describe_run, source_hash
 
 _CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault")
@@ -133,6 +132,7 @@ def run_cells(
     Tasks are planned for `workers` workers, by default one per core. BadInput when two cells have the same name.
     """
     names = [name for scenario in scenarios for name in cell_names(scenario)]
+    _check_distinct(names)
     tasks = plan_tasks(scenarios, folder, command, workers or os.cpu_count() or 1)
     with named_folder_fault(out), CellIndex(out) as index:
         outcomes = _run_tasks(index, names, tasks, out, executor, progress)
@@ -169,8 +169,9 @@ def _run_folder(
             near = difflib.get_close_matches(only, names, n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise BadInput(f"No cell is called {only!r}.{hint}", f"`harness status {out}` names those that failed.")
-    storage.open_run(out, _describe(content, scenarios, folder, command, isolation))
-    with folder_lock(out), named_folder_fault(out), CellIndex(out) as index:
+    _check_distinct(names)
+    manifest = _describe(content, scenarios, folder, command, isolation)
+    with storage.open_run(out, manifest), named_folder_fault(out), CellIndex(out) as index:
         index.add_from_folders()
         index.plan(names)
         index.note(kind=kind, name=name, command=command)
@@ -191,6 +192,12 @@ def _run_folder(
         if outcomes and all(cell.refused for cell in outcomes.values()):
             raise BadInput(f"Nothing could be run. {next(iter(outcomes.values())).failure}", "")
         return next(outcome for outcome in Outcome if outcome.word == summary["outcome"])
+
+
+def _check_distinct(names: Sequence[str]) -> None:
+    if len(set(names)) < len(names):
+        twice = next(name for place, name in enumerate(names) if name in names[:place])
+        raise BadInput(f"Two cells are called {twice!r}.", "Scenarios of other content need other names.")
 
 
 def _describe(
@@ -218,9 +225,6 @@ def _run_tasks(
     progress: ProgressCallback,
 ) -> dict[str, CellOutcome]:
     """Run tasks and record every cell in the index; the outcomes of the cells by name."""
-    if len(set(names)) < len(names):
-        twice = next(name for place, name in enumerate(names) if name in names[:place])
-        raise BadInput(f"Two cells are called {twice!r}.", "Scenarios of other content need other names.")
     (out / "cells").mkdir(exist_ok=True)
     storage.remove_leftovers(out)
     index.expect(names)

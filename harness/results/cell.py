@@ -23,7 +23,7 @@ from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
 from harness.results.content_types import check_cell_types, find_cell_fault
-from harness.results.digests import check_file, insert_digest, read_result_json
+from harness.results.digests import check_file, check_key, insert_digest, read_result_json
 from harness.results.plausibility import find_impossible_errors, find_impossible_metric, find_impossible_sigma
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
@@ -250,8 +250,7 @@ def read_content(folder: Path) -> dict[str, Any]:
     text, expected = folder / "cell.json", "a cell of a run"
     content = read_result_json(text, expected, _ADVICE)
     check_file(folder / "frames.npz", content.get("frames_sha256"), "the frames of a cell", _ADVICE)
-    if content.get("key") != folder.name:
-        raise BadFile(text, f"the cell {content.get('key')}", "the cell that its folder is named after", _ADVICE)
+    check_key(text, content.get("key"), folder.name, expected, _ADVICE)
     if not isinstance(content.get("metrics"), dict):
         raise BadFile(text, "no metrics", f"{expected} of this version of the harness", _ADVICE)
     if found := _find_impossible_content(content):

@@ -6,15 +6,18 @@ digest of any other file stands in a JSON file. Whoever changes a file and compu
 
 import hashlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from harness.core import files
 from harness.core.input_file import MEGABYTE, check_input_file, read_input_file
-from harness.errors import BadFile
+from harness.errors import BadFile, shorten
 
 MAX_DIGESTED_BYTES = 1024 * MEGABYTE
 """Largest file whose digest is computed [choice]."""
+STUDY_FILE = "study.json"
+"""File that says of which study a folder is (see `storage.open_folder`)."""
 _KEY = "sha256"
 _LINE = re.compile(rb'{\n "sha256": "([0-9a-f]{64})",\n')
 
@@ -46,6 +49,25 @@ def read_result_json(path: Path, expected: str, advice: str, limit_bytes: int = 
     if state.hexdigest() != line[1].decode():
         raise BadFile(path, "damaged or edited: its content does not fit its digest", expected, advice)
     return content
+
+
+def check_key(path: Path, found: Any, key: Any, expected: str, advice: str) -> None:
+    """BadFile when the key in a file is not the one by which it is read: the file belongs into another place."""
+    if found != key:
+        what = "no word of what it is of" if found is None else f"of {shorten(str(found), 80)}"
+        raise BadFile(path, what, f"{expected}, of {shorten(str(key), 80)}", advice)
+
+
+def check_study(path: Path, identity: Mapping[str, Any], expected: str, advice: str) -> None:
+    """BadFile when the findings at `path` are of another study than study.json beside them.
+
+    Nothing is checked without study.json: such a folder is of no study.
+    """
+    study = path.with_name(STUDY_FILE)
+    if study.is_file():
+        stored = read_result_json(study, "the identity of a study", advice)
+        for name, value in identity.items():
+            check_key(path, value, stored.get(name), f"{expected}, as {STUDY_FILE} says", advice)
 
 
 def file_digest(path: Path, expected: str, advice: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from harness.core.fields import build
 from harness.core.files import to_json_types
 from harness.errors import BadFile, UnknownName
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.digests import check_study, read_result_json, write_result_json
 
 SCHEMA = 1
 ClaimVerdict = Literal["reproduced", "same", "not reproduced", "cannot tell", "not comparable", "not run"]
@@ -155,10 +155,13 @@ def write_findings(path: Path, findings: PaperFindings) -> None:
 
 
 def read_findings(path: Path) -> PaperFindings:
-    """Read the findings of a paper study; BadFile when the file is missing, damaged, edited or malformed."""
+    """Read the findings of a paper study; BadFile when they are missing, damaged, edited, malformed or another's."""
     expected, advice = "the findings of a paper's study", "Give the command of the study again."
     content = read_result_json(path, expected, advice)
     try:
-        return build(PaperFindings, content, "findings")
+        findings = build(PaperFindings, content, "findings")
     except (TypeError, ValueError, UnknownName) as error:
         raise BadFile(path, str(error), expected, advice) from error
+    identity = {"paper": findings.paper, "motion": findings.motion, "seed": findings.seed}
+    check_study(path, identity, expected, advice)
+    return findings

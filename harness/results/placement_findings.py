@@ -13,7 +13,7 @@ from typing import Any, Literal
 from harness.core.fields import build
 from harness.core.files import read_json, to_json_types
 from harness.errors import BadFile, UnknownName
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.digests import check_study, read_result_json, write_result_json
 from harness.results.findings import Claim
 
 SCHEMA = 1
@@ -312,7 +312,8 @@ def write_placement(path: Path, findings: PlacementFindings) -> None:
 def read_placement(path: Path) -> PlacementFindings:
     """Read the findings of a placement study.
 
-    BadFile when the file is missing, damaged, edited, malformed, of another version, or names unknown candidates.
+    BadFile when the file is missing, damaged, edited, malformed, of another version or study, or names unknown
+    candidates.
     """
     expected, advice = "the findings of a placement study", "Give the command of the study again."
     content = read_result_json(path, expected, advice)
@@ -324,6 +325,8 @@ def read_placement(path: Path) -> PlacementFindings:
         raise BadFile(path, str(error), expected, advice) from error
     if strangers := _unknown_stations(findings):
         raise BadFile(path, f"names {strangers[0]!r}, which is no candidate of it", expected, advice)
+    identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}
+    check_study(path, identity, expected, advice)
     return findings
 
 

@@ -10,7 +10,7 @@ from harness.core.line_loss import excess_loss
 from harness.core.names import check_words
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder, read_content, row_of_content
-from harness.results.digests import check_file, read_result_json
+from harness.results.digests import check_file, check_key, read_result_json
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_folder, check_row
 from harness.results.manifest import Manifest, flatten
@@ -84,7 +84,7 @@ def load_results(where: Path | str) -> ResultSet:
             raise BadFile(folder, "no such folder", "a run, a sweep or a baseline", "`harness run` writes one.")
         if str(where) not in known:
             raise UnknownName("folder or baseline", str(where), known)
-        folder = BASELINES / folder
+        return _load_baseline(BASELINES / folder, str(where))
     if (folder / CELLS_FILE).exists():
         return _load_baseline(folder)
     check_folder(folder)
@@ -107,14 +107,20 @@ def _cell_from_row(folder: Path, row: Mapping[str, Any]) -> CellResult:
     return replace(cell, line_loss=excess_loss(row["health"], allowed=allowed))
 
 
-def _load_baseline(folder: Path) -> ResultSet:
+def _load_baseline(folder: Path, name: str | None = None) -> ResultSet:
+    """The baseline in a folder. BadFile when it is damaged, or not the one that was asked for by `name`.
+
+    Versions before did not store the name.
+    """
     path, expected = folder / CELLS_FILE, "the cells of a baseline"
     content = read_result_json(path, expected, _BASELINE_ADVICE)
     if content.get("schema") != SCHEMA:
         raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", _BASELINE_ADVICE)
+    stored = content.get("name", name or folder.name)
+    check_key(path, stored, name or stored, expected, _BASELINE_ADVICE)
     try:
-        for name in BASELINE_FILES:
-            check_file(folder / name, content["digests"][name], f"the {name} that {CELLS_FILE} names", _BASELINE_ADVICE)
+        for file in BASELINE_FILES:
+            check_file(folder / file, content["digests"][file], f"the {file} that {CELLS_FILE} names", _BASELINE_ADVICE)
         shared, parts, planned = content["shared"], content["parts"], int(content["planned"])
         names, complete = content["metrics"], []
         for cell in content["cells"]:
@@ -125,7 +131,7 @@ def _load_baseline(folder: Path) -> ResultSet:
     cells = tuple(_check_cell(path, cell) for cell in complete)
     if planned != len(cells):
         raise BadFile(path, f"{len(cells)} cells of {planned}", expected, _ADVICE)
-    return ResultSet(f"baseline {folder.name}", Manifest.read(folder / "manifest.json"), cells, planned)
+    return ResultSet(f"baseline {stored}", Manifest.read(folder / "manifest.json"), cells, planned)
 
 
 def _check_cell(path: Path, content: Mapping[str, Any]) -> CellResult:

@@ -6,6 +6,7 @@ inputs, the method and the source of both, so that edited code never reuses stal
 
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
+from harness.results.lock import LOCK_FILE, folder_lock
 from harness.results.manifest import Manifest
 from harness.results.plausibility import find_impossible_metric, find_impossible_sigma, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
@@ -50,40 +52,52 @@ def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: 
     return content_key({"inputs": inputs, "method": method, "source": source_hash})
 
 
+@contextmanager
 def open_folder(
     out: Path, identity_file: str, identity: Mapping[str, Any], kind: str, difference: Callable[[Path], str]
-) -> None:
-    """Create a results folder and its `identity_file`, or open it to resume.
+) -> Iterator[None]:
+    """Create a results folder and its `identity_file`, or open it to resume, and hold its lock in the block.
 
     `difference` says in what an existing identity file differs, "" if it does not. BadInput when it differs, when the
-    folder holds other files, and when its name is no folder's.
+    folder holds other files, when its name is no folder's, and when another process holds the lock. A folder that is
+    refused is left as it was.
     """
+
+    def check() -> None:
+        advice = "Name another folder with --out, or delete this one."
+        if out.exists() and not out.is_dir():
+            raise BadInput(f"{out} is a file.", "Name a folder with --out.")
+        names = {path.name for path in out.iterdir()} if out.is_dir() else set()
+        names = {name for name in names if not name.startswith(TEMPORARY) and name != LOCK_FILE}
+        if identity_file in names:
+            if text := difference(out / identity_file):
+                raise BadInput(f"{out} holds another {kind} ({text}).", advice)
+        elif names:
+            raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
+
     check_words(out)
-    advice = "Name another folder with --out, or delete this one."
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"{out} is a file.", "Name a folder with --out.")
-    names = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
-    if identity_file in names:
-        if text := difference(out / identity_file):
-            raise BadInput(f"{out} holds another {kind} ({text}).", advice)
-    elif names:
-        raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
+    check()  # before the lock, whose file would be a change
     try:
         out.mkdir(parents=True, exist_ok=True)
     except (NotADirectoryError, FileExistsError) as error:  # the name of a folder in it is a file's
         raise BadInput(f"{out} cannot be made ({error.strerror}).", "Name another folder with --out.") from error
-    write_result_json(out / identity_file, identity)  # first: it tells later that the folder is ours
+    with folder_lock(out):
+        check()  # another process may have made it meanwhile
+        write_result_json(out / identity_file, identity)  # first: it tells later that the folder is ours
+        yield
 
 
-def open_run(out: Path, manifest: Manifest) -> None:
-    """Create the folder of a run or sweep, or open it to resume; BadInput when it holds another run or other files."""
+@contextmanager
+def open_run(out: Path, manifest: Manifest) -> Iterator[None]:
+    """Create the folder of a run or sweep, or open it to resume, and hold its lock; BadInput as `open_folder`."""
 
     def difference(path: Path) -> str:
         keys = manifest.differences(Manifest.read(path))
         return f"differs in {', '.join(keys)}" if keys else ""
 
-    open_folder(out, "manifest.json", manifest.as_dict(), "run", difference)
-    (out / "cells").mkdir(exist_ok=True)
+    with open_folder(out, "manifest.json", manifest.as_dict(), "run", difference):
+        (out / "cells").mkdir(exist_ok=True)
+        yield
 
 
 def read_summary(out: Path) -> dict[str, Any]:

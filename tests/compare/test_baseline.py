@@ -1,6 +1,7 @@
 """Baselines and runs as sides: what is kept comes back, names stay in their folder, damage is told in one line."""
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +14,11 @@ from harness.compare.comparison import compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.results import storage
+from harness.results.digests import read_result_json, write_result_json
 from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
-from tests.results.finish import finish_run
+from tests.results.finish import finish_run, make_run
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
@@ -50,13 +52,26 @@ def test_what_a_baseline_keeps_is_what_the_run_measured(run: Path, baselines: Pa
     assert (comparison.outcome, {line.difference for line in comparison.differences}) == (Outcome.PASS, {0.0})
 
 
+def test_a_baseline_in_the_place_of_another_is_refused(run: Path, baselines: Path, tmp_path: Path) -> None:
+    write_baseline(run, "main")
+    shutil.copytree(baselines / "main", baselines / "release")
+    with pytest.raises(BadFile, match=r"cells.json: of main; expected the cells of a baseline, of release"):
+        load_results("release")
+    assert load_results(baselines / "release").title == "baseline main"  # named as a folder, it is what it is
+    content = read_result_json(baselines / "release" / "cells.json", "", "")
+    write_result_json(baselines / "release" / "cells.json", {k: v for k, v in content.items() if k != "name"})
+    assert load_results("release").title == "baseline release"  # of a version that stored no name
+
+
 def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Path, tmp_path: Path) -> None:
     first, turned = side(methods=METHODS), write_run(tmp_path / "turned", side(methods=dict(reversed(METHODS.items()))))
     one, other = write_baseline(run, "one"), write_baseline(turned, "other")
     assert sorted(path.name for path in one.iterdir()) == ["cells.json", "manifest.json", "summary.json"]
     text = (one / "cells.json").read_text()
-    assert text == (other / "cells.json").read_text()
-    content = json.loads(text)
+    content, turned_content = json.loads(text), json.loads((other / "cells.json").read_text())
+    assert (content.pop("name"), turned_content.pop("name")) == ("one", "other")
+    del content["sha256"], turned_content["sha256"]
+    assert content == turned_content
     clips = [(cell["clip"], cell["method"]) for cell in content["cells"]]
     assert clips == sorted((cell.clip, cell.method) for cell in first.cells)
     assert len(content["parts"]) == 8, "methods of a clip share what defines them"
@@ -65,7 +80,7 @@ def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Pa
 
 def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., storage.Cell]) -> None:
     content = manifest()
-    storage.open_run(run_folder, content)
+    make_run(run_folder, content)
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]
     for cell in cells:
         storage.write_cell(run_folder, cell)

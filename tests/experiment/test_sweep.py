@@ -29,6 +29,7 @@ from harness.results.lock import folder_lock
 from harness.results.storage import read_cell
 from harness.results.table import TIME_COLUMNS
 from tests.experiment.made_up import FAILING, judge, made_up, sweep_file
+from tests.results.finish import folder_bytes
 
 __all__ = ["made_up"]
 
@@ -136,8 +137,10 @@ def test_more_methods_are_added_and_other_sweeps_refused(made_up: Path) -> None:
     (made_up / "mine" / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
         sweep(sweep_file(made_up), made_up / "mine")
+    before = folder_bytes(out)
     with folder_lock(out), pytest.raises(BadInput, match="Another process uses"):
         sweep(sweep_file(made_up), out)
+    assert folder_bytes(out) == before
 
 
 def test_a_cell_that_fails_stops_no_other_and_its_command_makes_it_again(

@@ -15,7 +15,7 @@ from harness.core.seeds import generator
 from harness.mocap.synthetic import SOURCE, generate
 from harness.results import manifest, storage
 from harness.score.score import score_estimate
-from tests.results.finish import finish_run
+from tests.results.finish import finish_run, make_run
 
 RATE_HZ = 40.0
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
@@ -56,7 +56,7 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
     methods = METHODS if plan.methods is None else plan.methods
     scenario = {"name": "fabricated", "methods": list(methods), **asdict(replace(plan, methods=None))}
     command = "harness run fabricated.toml --out results/fabricated"
-    storage.open_run(out, manifest.describe_run(scenario, motion_source=SOURCE, command=command))
+    make_run(out, manifest.describe_run(scenario, motion_source=SOURCE, command=command))
     keys, failures, planned = [], {}, 0
     takes = range(1, plan.takes + 1)
     for times, behaviour, take, inputs in itertools.product(

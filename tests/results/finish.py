@@ -1,4 +1,4 @@
-"""Finishes a run that a test wrote cell by cell: its index and its summary."""
+"""Makes the folder of a run, and finishes one that a test wrote cell by cell: its index and its summary."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,7 +7,20 @@ from typing import Any
 from harness.results import storage
 from harness.results.digests import write_result_json
 from harness.results.index import CellIndex
+from harness.results.lock import LOCK_FILE
 from harness.results.manifest import Manifest
+
+
+def make_run(out: Path, manifest: Manifest) -> None:
+    """Make or open the folder of a run as a command does, and release it at once."""
+    with storage.open_run(out, manifest):
+        pass
+
+
+def folder_bytes(out: Path) -> dict[str, bytes]:
+    """Content of every file below a folder but the lock, by its path there."""
+    files = (path for path in out.rglob("*") if path.is_file() and path.name != LOCK_FILE)
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
 
 
 def finish_run(

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile
+from harness.results.digests import write_result_json
 from harness.results.findings import (
     BarChart,
     Claim,
@@ -61,3 +62,15 @@ def test_what_is_none_is_refused(tmp_path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new))
     with pytest.raises(BadFile, match=r"findings\.json"):
         read_findings(path)
+
+
+@pytest.mark.parametrize("other", [{"paper": "kim2012"}, {"seed": 2}, {"motion": "cmu"}])
+def test_findings_of_another_study_are_refused(tmp_path: Path, other: dict[str, str | int]) -> None:
+    """A findings.json that was copied into the folder of another study fits its own digest."""
+    identity = {"paper": "liu2011", "motion": "built-in performer", "seed": 1}
+    write_findings(tmp_path / "findings.json", FINDINGS)
+    write_result_json(tmp_path / "study.json", identity)
+    assert read_findings(tmp_path / "findings.json") == FINDINGS
+    write_result_json(tmp_path / "study.json", {**identity, **other})
+    with pytest.raises(BadFile, match=r"as study\.json says, of"):
+        read_findings(tmp_path / "findings.json")

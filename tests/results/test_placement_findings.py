@@ -52,3 +52,15 @@ def test_damage_is_named(tmp_path: Path, damage: Damage, said: str) -> None:
     write_json(path, content)
     with pytest.raises(BadFile, match=said):
         read_placement(path)
+
+
+@pytest.mark.parametrize("other", [{"placement": "another"}, {"seed": 99}, {"motion": "cmu"}])
+def test_findings_of_another_study_are_refused(tmp_path: Path, other: dict[str, str | int]) -> None:
+    findings, path = made_up(at_most=2), tmp_path / "findings.json"
+    identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}
+    write_placement(path, findings)
+    write_json(tmp_path / "study.json", identity)
+    assert read_placement(path) == findings
+    write_json(tmp_path / "study.json", {**identity, **other})
+    with pytest.raises(BadFile, match=r"as study\.json says, of"):
+        read_placement(path)

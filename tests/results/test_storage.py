@@ -22,7 +22,8 @@ from harness.results.cell import as_row, read_row
 from harness.results.digests import file_digest
 from harness.results.index import CellIndex
 from harness.results.integrity import check_row
-from tests.results.finish import finish_run
+from harness.results.lock import LOCK_FILE
+from tests.results.finish import finish_run, folder_bytes, make_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 
 MakeCell = Callable[..., storage.Cell]
@@ -40,7 +41,7 @@ def manifest(**changes: object) -> manifests.Manifest:
 
 def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCell) -> None:
     cell = make_cell()
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     assert not storage.has_cell(run_folder, cell.key)
     back = storage.read_cell(storage.write_cell(run_folder, cell))
     assert storage.has_cell(run_folder, cell.key)
@@ -56,7 +57,7 @@ def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCe
 
 def test_what_calibration_found_is_kept(run_folder: Path, make_cell: MakeCell) -> None:
     """The estimate stands on the true bones unless others are named."""
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     known, found = make_cell(), make_cell(0.02, calibration_errors={"length_mm": 4.0})
     np.testing.assert_array_equal(known.estimate_bone_m, known.bone_m)
     longer = make_cell(0.03, calibration_errors={"length_mm": 4.0}, estimate_bone_m=1.05 * known.bone_m)
@@ -79,7 +80,7 @@ def stating(make_cell: MakeCell, judge: Callable[..., Any], **fields: Any) -> st
 
 
 def test_lag_and_standard_deviations_are_kept(run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any]) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     cell = stating(make_cell, judge)
     back = storage.read_cell(storage.write_cell(run_folder, cell))
     assert back.angle_sigma_rad is not None
@@ -93,7 +94,7 @@ def test_lag_and_standard_deviations_are_kept(run_folder: Path, make_cell: MakeC
 def test_rows_of_versions_without_lag_and_standard_deviations_are_read(run_folder: Path, make_cell: MakeCell) -> None:
     """A folder that such a version wrote has neither column in cell.json, index, summary.json and summary.csv."""
     cell = make_cell()
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     folder = storage.write_cell(run_folder, cell)
     assert not {"lag", "sigma_scores"} & set(read_json(folder / "cell.json"))
     finish_run(run_folder, keys=[cell.key], planned=1)
@@ -128,7 +129,7 @@ def test_rows_of_versions_without_lag_and_standard_deviations_are_read(run_folde
 def test_impossible_scores_of_standard_deviations_are_refused(
     run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], name: str, value: float | None, found: str
 ) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     folder = storage.write_cell(run_folder, stating(make_cell, judge))
     scores = read_json(folder / "cell.json")["sigma_scores"]
     rewrite_json(folder / "cell.json", sigma_scores={**scores, name: value})
@@ -137,7 +138,7 @@ def test_impossible_scores_of_standard_deviations_are_refused(
 
 
 def test_an_impossible_lag_is_refused(run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any]) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     folder = storage.write_cell(run_folder, stating(make_cell, judge))
     conditions = read_json(folder / "cell.json")["defined_by"]
     rewrite_json(folder / "cell.json", defined_by={**conditions, "lag": -2})
@@ -158,7 +159,7 @@ def test_impossible_rows_of_a_summary_are_refused(
     run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], part: str, changes: dict[str, Any], found: str
 ) -> None:
     cell = stating(make_cell, judge)
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     storage.write_cell(run_folder, cell)
     finish_run(run_folder, keys=[cell.key], planned=1)
     content = read_json(run_folder / "summary.json")
@@ -226,7 +227,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[MakeCell], storage.Cell], str]] = {
 def test_what_could_not_be_read_is_not_written(
     run_folder: Path, make_cell: MakeCell, make: Callable[[MakeCell], storage.Cell], fault: str
 ) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     cell = make(make_cell)
     with pytest.raises(ValueError, match=f"ik on walk_01 cannot be stored: .*{fault}"):
         storage.write_cell(run_folder, cell)
@@ -242,7 +243,7 @@ def test_what_is_not_written_is_not_read_either(
     fault: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     with monkeypatch.context() as careless:
         for name in ("find_cell_fault", "_find_impossible_content", "_find_impossible_frames"):
             careless.setattr(f"harness.results.cell.{name}", lambda content: "")
@@ -266,7 +267,7 @@ def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
 
 
 def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: MakeCell) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     cells = [make_cell(0.01), make_cell(0.03, clip="walk_02", stations=("head", "torso"))]
     for cell in cells:
         storage.write_cell(run_folder, cell)
@@ -331,14 +332,14 @@ def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: Make
 
 
 def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path, make_cell: MakeCell) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     cell = make_cell()
     storage.write_cell(run_folder, cell)
     half = run_folder / "cells" / f"{TEMPORARY}12345-abc"
     half.mkdir()
     (half / "cell.json").write_text("{")
     (run_folder / f"{TEMPORARY}12345-summary.json").write_text("{")
-    storage.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
+    make_run(run_folder, manifest(methods=["ik", "local_pca"]))
     storage.remove_leftovers(run_folder)
     assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
     assert os.listdir(run_folder / "cells") == [cell.key]
@@ -354,22 +355,47 @@ def test_writing_a_finished_cell_again_keeps_the_first(run_folder: Path, make_ce
 
 
 def test_another_run_is_refused_and_says_in_what_it_differs(run_folder: Path) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     before = (run_folder / "manifest.json").read_bytes()
     with pytest.raises(BadInput, match=r"motion\.test.*--out"):
-        storage.open_run(run_folder, manifest(motion={"test": ["a"]}))
+        make_run(run_folder, manifest(motion={"test": ["a"]}))
     with pytest.raises(BadInput, match="seed"):
-        storage.open_run(run_folder, manifest(seed=2))
+        make_run(run_folder, manifest(seed=2))
     assert (run_folder / "manifest.json").read_bytes() == before
+
+
+def test_a_second_command_changes_nothing_while_another_process_writes(run_folder: Path) -> None:
+    """The manifest of the first stays, though the second would write other circumstances into it."""
+    with storage.open_run(run_folder, manifest(methods=["first"])):
+        before = folder_bytes(run_folder)
+        assert "first" in before["manifest.json"].decode()
+        with pytest.raises(BadInput, match="Another process uses"):
+            make_run(run_folder, manifest(methods=["second"]))
+        assert folder_bytes(run_folder) == before
+    make_run(run_folder, manifest(methods=["second"]))
+    assert b"second" in folder_bytes(run_folder)["manifest.json"]
+
+
+def test_a_refused_folder_gets_no_lock_file(run_folder: Path, tmp_path: Path) -> None:
+    make_run(run_folder, manifest())
+    (run_folder / LOCK_FILE).unlink()
+    with pytest.raises(BadInput, match="another run"):
+        make_run(run_folder, manifest(seed=2))
+    assert not (run_folder / LOCK_FILE).exists()
+    new = tmp_path / "killed"
+    new.mkdir()
+    (new / LOCK_FILE).touch()  # of a process that was killed before it wrote the manifest
+    make_run(new, manifest())
+    assert (new / "manifest.json").exists()
 
 
 def test_a_folder_of_other_files_is_refused_untouched(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
-        storage.open_run(tmp_path, manifest())
+        make_run(tmp_path, manifest())
     assert os.listdir(tmp_path) == ["thesis.tex"]
     with pytest.raises(BadInput, match="is a file"):
-        storage.open_run(tmp_path / "thesis.tex", manifest())
+        make_run(tmp_path / "thesis.tex", manifest())
 
 
 @pytest.mark.parametrize(
@@ -424,7 +450,7 @@ for n in itertools.count():
 
 
 def test_a_kill_at_any_moment_leaves_whole_cells_only(run_folder: Path, make_cell: MakeCell) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     key = storage.write_cell(run_folder, make_cell()).name
     for turn, delay_s in enumerate((0.0, 0.013, 0.029)):
         child = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, str(run_folder), key, str(turn)])
@@ -464,7 +490,7 @@ def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
 
 
 def test_a_run_without_an_index_is_refused_with_advice(run_folder: Path, make_cell: MakeCell) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     storage.write_cell(run_folder, make_cell())
     with pytest.raises(BadFile, match=r"index\.sqlite.*Give its command again"):
         storage.read_cells(run_folder)
@@ -490,7 +516,7 @@ def test_a_key_depends_on_inputs_method_and_source_and_on_nothing_else() -> None
 
 
 def test_a_manifest_survives_its_file_and_names_the_machine(run_folder: Path) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     back = manifests.Manifest.read(run_folder / "manifest.json")
     assert back.differences(manifest()) == []
     assert back.metric_versions["mpjpe_mm"] >= 1

@@ -284,7 +284,7 @@ def test_a_cell_in_the_folder_of_another_is_refused_although_its_digests_fit(run
     first, second, *_ = cells(run)
     shutil.rmtree(first)
     shutil.copytree(second, first)
-    with pytest.raises(BadFile, match=f"the cell {second.name}; expected the cell that its folder is named after"):
+    with pytest.raises(BadFile, match=f"of {second.name}; expected a cell of a run, of "):
         read_row(first)
 
 

@@ -44,7 +44,6 @@ from harness.experiment.remote_method import close_methods, resolve_method
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results.cell import cell_folder, read_cell
-from harness.results.lock import folder_lock
 from harness.results.manifest import current_circumstances
 from harness.study.papers.paper_study import open_study
 
@@ -112,8 +111,7 @@ def measure_accuracy(
         scenarios = plan_scenarios(conditions, method, seeds, quick=quick)
         lagged, no_lag = _plan_supported_lag(method, seeds, quick)
         check_names([*scenarios, *lagged], folder)
-        open_study(out, {"benchmark": "accuracy"})
-        with folder_lock(out):
+        with open_study(out, {"benchmark": "accuracy"}):
             (out / "cells").mkdir(exist_ok=True)
             results = run_cells(
                 [*scenarios, *lagged],

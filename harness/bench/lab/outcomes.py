@@ -13,7 +13,7 @@ from harness.core.fields import build
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, HarnessError
 from harness.experiment.executors import TaskExecutor
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.study.trust.characterization import characterize_capture
 from harness.study.trust.named_departures import NamedDeparture
@@ -143,7 +143,7 @@ def _finite(value: float) -> float | None:
 
 
 def _read_outcome(path: Path) -> CaptureOutcome | None:
-    """A stored outcome of this version of the source; None without one."""
+    """A stored outcome of this version of the source; None without one. BadFile for one of another kind or seed."""
     if not path.exists():
         return None
     content = read_result_json(path, _STORED, _ADVICE)
@@ -151,4 +151,5 @@ def _read_outcome(path: Path) -> CaptureOutcome | None:
         outcome = build(CaptureOutcome, content, "outcome")
     except (TypeError, ValueError, HarnessError) as error:
         raise BadFile(path, f"unusable content ({error})", _STORED, _ADVICE) from error
+    check_key(path, f"{outcome.kind}/{outcome.seed:04d}", f"{path.parent.name}/{path.stem}", _STORED, _ADVICE)
     return outcome if outcome.source == source_hash() else None

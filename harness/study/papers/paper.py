@@ -17,7 +17,6 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
-from harness.results.lock import folder_lock
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.provenance import provenance_tables
 from harness.study.papers.quick_form import shorten
@@ -94,8 +93,7 @@ def reproduce(
     check_names(runs.values(), library)
     source = open_scenario_motion(next(iter(plan.values())).motion, library, seed)
     title = source.title + (", quick form" if quick else "")
-    open_study(out, {"paper": paper.name, "motion": title, "seed": seed})
-    with folder_lock(out):
+    with open_study(out, {"paper": paper.name, "motion": title, "seed": seed}):
         cells = count_cells(runs)
         planned = cells + len(paper.experiments)
         failures = run_scenarios(

@@ -5,12 +5,13 @@ The folder has study.json (the identity of the study), a folder for each run, an
 
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.files import to_json_types
+from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
@@ -18,10 +19,8 @@ from harness.experiment.scenario import Scenario, variants
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.digests import STUDY_FILE, check_key, read_result_json, write_result_json
 from harness.results.storage import open_folder, read_summary
-
-_IDENTITY_FILE = "study.json"
 
 
 @dataclass(frozen=True)
@@ -56,19 +55,25 @@ class PaperStudy:
         return (read_cell(cell_folder(self.out / run, row["key"])) for row in self.rows(run, **where))
 
     def cached_measurement(self, name: str, measure: Callable[[], Any]) -> Any:
-        """Result of `measure` in JSON types, cached on disk until the source of the package changes."""
+        """Result of `measure` in JSON types, cached on disk until the source of the package changes.
+
+        BadFile for a cached result that is damaged, edited, or of another measurement or study.
+        """
         path = self.out / "measured" / f"{name}.json"
+        study = {run: scenario.content() for run, scenario in self.runs.items()}
+        key = content_key({"measurement": name, "motion": self.motion, "seed": self.seed, "runs": study})
+        written = {"key": key, "measurement": name, "source_hash": manifest.source_hash()}
         if path.is_file():
-            cached = _read_measurement(path)
-            if cached.get("source_hash") == manifest.source_hash() and "value" in cached:
+            expected, advice = "a cached measurement of this study", "Delete it and give the command again."
+            cached = read_result_json(path, expected, advice)
+            if cached.get("source_hash") == manifest.source_hash():
+                for entry in ("measurement", "key"):
+                    check_key(path, cached.get(entry), written[entry], expected, advice)
                 return cached["value"]
         path.parent.mkdir(exist_ok=True)
-        write_result_json(path, {"value": measure(), "source_hash": manifest.source_hash()})
-        return _read_measurement(path)["value"]
-
-
-def _read_measurement(path: Path) -> dict[str, Any]:
-    return read_result_json(path, "a cached measurement of a study", "Delete it and give the command again.")
+        value = to_json_types(measure())
+        write_result_json(path, {**written, "value": value})
+        return value
 
 
 @lru_cache(maxsize=16)
@@ -78,15 +83,15 @@ def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
     return rows
 
 
-def open_study(out: Path, identity: Mapping[str, Any]) -> None:
-    """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
+def open_study(out: Path, identity: Mapping[str, Any]) -> AbstractContextManager[None]:
+    """Create a study's folder, or open it to resume, and hold its lock; BadInput as `storage.open_folder`."""
 
     def difference(path: Path) -> str:
         advice = "Restore it from a copy, or name another folder with --out."
         stored, given = read_result_json(path, "the identity of a study", advice), to_json_types(identity)
         return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
 
-    open_folder(out, _IDENTITY_FILE, identity, "study", difference)
+    return open_folder(out, STUDY_FILE, identity, "study", difference)
 
 
 def run_scenarios(

@@ -21,7 +21,6 @@ from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import Claim
-from harness.results.lock import folder_lock
 from harness.results.placement_findings import (
     BestSet,
     PlacementFindings,
@@ -109,8 +108,8 @@ def _run_plan(
     shorten: Callable[[float], tuple[PlacementPlan, str]] | None = None,
 ) -> tuple[PlacementFindings, Outcome]:
     """Run a plan; `shorten` gives another one, and a note, for the duration of a cell on one worker [s]."""
-    open_study(cache.out, {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed})
-    with folder_lock(cache.out):
+    identity = {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed}
+    with open_study(cache.out, identity):
         (cache.out / "cells").mkdir(exist_ok=True)
         sets = choose_pilot(plan.first_sets())
         pilot = _PlacementRun(plan, cache).measure(sets) if sets else {}

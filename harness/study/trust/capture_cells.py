@@ -32,7 +32,7 @@ from harness.experiment.score_recording import (
     match_recording,
 )
 from harness.mocap.library import LibraryFolders
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.results.storage import cell_key
 from harness.score.pair import PoseSequence, compute_poses
@@ -126,6 +126,11 @@ def run_capture(task: CaptureTask) -> CaptureResult:
     fails costs its own cells.
     """
     return _CaptureRun(task).run()
+
+
+def find_stations(task: CaptureTask) -> tuple[str, ...]:
+    """Stations of a capture; raises as `run_capture` where its note or its stations do not fit."""
+    return tuple(_CaptureRun(task).playback.scenario.worn_stations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,8 +340,9 @@ class _CaptureRun:
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
         path = self.task.out / "cells" / f"{cell_key(content, method_identity(method, arm.method), source_hash())}.json"
+        cell = {"key": path.stem, "arm": str(arm), "clip": self.clip, "side": side}
         if path.is_file():
-            return read_cell_errors(path, self.task.metrics)
+            return read_cell_errors(path, cell, self.task.metrics)
         frames, worn = load(), tuple(self.playback.scenario.worn_stations)
         rows = np.array([worn.index(station) for station in arm.stations])
         shown = frames.of_stations(rows)
@@ -346,13 +352,19 @@ class _CaptureRun:
         self.methods_s += time.perf_counter() - start
         errors = score_loops(self.task.metrics, answers, frames.loops, frames.truth, frames.rate_hz)
         with named_folder_fault(self.task.out):
-            write_result_json(path, {"arm": str(arm), "clip": self.clip, "side": side, "errors": errors})
+            write_result_json(path, {**cell, "errors": errors})
         return errors
 
 
-def read_cell_errors(path: Path, metrics: Sequence[str]) -> dict[str, float | None]:
-    """Metric -> error of a finished cell; BadFile when it is damaged, edited or of other metrics."""
-    errors = read_result_json(path, _EXPECTED, _ADVICE).get("errors")
+def read_cell_errors(path: Path, cell: Mapping[str, str], metrics: Sequence[str]) -> dict[str, float | None]:
+    """Metric -> error of a finished cell; BadFile when it is damaged, edited, another cell's or of other metrics.
+
+    `cell` has the entries that tell the cell apart: key, arm, clip and side.
+    """
+    content = read_result_json(path, _EXPECTED, _ADVICE)
+    for name, value in cell.items():
+        check_key(path, content.get(name), value, _EXPECTED, _ADVICE)
+    errors = content.get("errors")
     if not isinstance(errors, dict) or set(errors) != set(metrics):
         raise BadFile(path, "errors of other metrics", _EXPECTED, _ADVICE)
     for value in errors.values():

@@ -23,7 +23,6 @@ from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import write_result_json
-from harness.results.lock import folder_lock
 from harness.results.trust_findings import (
     Equivalence,
     ErrorDistance,
@@ -34,7 +33,7 @@ from harness.results.trust_findings import (
 )
 from harness.stream.recording.recording import PLAN, read_recording
 from harness.study.papers.paper_study import open_study
-from harness.study.trust.capture_cells import Arm, CaptureResult, CaptureTask, run_capture
+from harness.study.trust.capture_cells import Arm, CaptureResult, CaptureTask, find_stations, run_capture
 from harness.study.trust.energy_distance import (
     CORRELATION_TIMES,
     compare_errors,
@@ -122,15 +121,13 @@ def run_trust_study(
         replace(task, capture=capture, clip=clip)
         for capture, clip in zip(captures, clips or [""] * len(captures), strict=True)
     ]
+    clear_caches()
+    if len({find_stations(each) for each in tasks}) > 1:
+        raise BadInput("The captures have different stations.", "Name captures of one session.")
     identity = {"study": "trust", "plan": digest, "captures": [_sha256(capture) for capture in captures]}
-    open_study(out, identity)
-    with folder_lock(out):
+    with open_study(out, identity):
         (out / "cells").mkdir(exist_ok=True)
-        clear_caches()
         results = _run_tasks(tasks, executor, progress)
-        stations = {result.stations for result in results}
-        if len(stations) > 1:
-            raise BadInput("The captures have different stations.", "Name captures of one session.")
         head = TrustFindings(
             title=plan.title or path.stem,
             scenario=plan.scenario,

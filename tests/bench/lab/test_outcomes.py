@@ -1,5 +1,6 @@
 """Outcomes of planted captures: stored once, used again, and the same bytes however many processes find them."""
 
+import shutil
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
@@ -72,6 +73,15 @@ def test_a_damaged_outcome_is_named(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("0.2", "0.3"))
     with pytest.raises(BadFile, match=r"0002\.json"):
         collect_outcomes(TASKS, tmp_path, run_in_process, _no_progress)
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("other", [("none", 1), ("clock", 2)])
+def test_an_outcome_in_the_place_of_another_is_refused(tmp_path: Path, other: tuple[str, int]) -> None:
+    collect_outcomes(TASKS, tmp_path, run_in_process, _no_progress)
+    shutil.copy(outcome_path(tmp_path, *other), outcome_path(tmp_path, "clock", 1))
+    with pytest.raises(BadFile, match=f"0001.json: of {other[0]}/000{other[1]}; expected .*, of clock/0001"):
+        collect_outcomes(TASKS, tmp_path, _refuse, _no_progress)
 
 
 def test_a_capture_that_is_refused_is_an_outcome(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,8 +120,8 @@ def test_experiments_are_judged_from_what_ran(tmp_path: Path) -> None:
         short = replace(motion, test=motion.test[:1], examples=motion.examples[:1], longest_s=2.2)
         vary = {key: values[::10] for key, values in scenario.vary.items()} if name.startswith("sensors") else None
         runs[name] = replace(scenario, motion=short, vary=scenario.vary if vary is None else vary)
-    open_study(tmp_path / "study", {"paper": "kim2012"})
-    assert run_scenarios(runs, tmp_path / "study") == {}
+    with open_study(tmp_path / "study", {"paper": "kim2012"}):
+        assert run_scenarios(runs, tmp_path / "study") == {}
     study = PaperStudy(tmp_path / "study", "builtin", 1, runs)
     found = tuple(PAPER.experiments[name](study) for name in READ_BACK)
     assert {claim.verdict for experiment in found for claim in experiment.claims} <= {"cannot tell", "not run"}

@@ -14,13 +14,16 @@ import pytest
 
 from harness.cli import main
 from harness.core.files import TEMPORARY
-from harness.errors import BadInput, Outcome, UnknownName
+from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.experiment.status import read_status
+from harness.results.digests import read_result_json, write_result_json
 from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
+from harness.results.lock import folder_lock
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.tables import errors_by_clip
 from tests.interrupts import heeding_interrupts
+from tests.results.finish import folder_bytes
 from tests.study.papers.tiny import BOUTS, TINY, WALKS
 
 
@@ -141,13 +144,21 @@ def test_a_full_disk_is_no_failed_experiment(finished: Path, tmp_path: Path) -> 
         reproduce(replace(TINY, experiments={"fail": fail}), out)
 
 
+def test_a_second_command_changes_nothing_while_the_first_writes(finished: Path) -> None:
+    before = folder_bytes(finished)
+    with folder_lock(finished), pytest.raises(BadInput, match="Another process uses"):
+        reproduce(TINY, finished, command="second")
+    assert folder_bytes(finished) == before
+
+
 def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="seed: 1, not 2"):
         reproduce(TINY, finished, seed=2)
     with pytest.raises(BadInput, match="paper: tiny, not other"):
         reproduce(replace(TINY, name="other"), finished)
-    with pytest.raises(BadInput, match="motion: built-in performer, not cmu"):
-        open_study(finished, {"paper": "tiny", "motion": "cmu", "seed": 1})
+    motion = {"paper": "tiny", "motion": "cmu", "seed": 1}
+    with pytest.raises(BadInput, match="motion: built-in performer, not cmu"), open_study(finished, motion):
+        pass
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
         reproduce(TINY, tmp_path)
@@ -230,3 +241,21 @@ def test_cells_are_counted_over_clips_methods_inputs_and_variants() -> None:
     """Two clips, two methods, two kinds of inputs and three values of an option; and one clip with two methods."""
     varied = replace(WALKS, inputs=("pos+ori", "pos"), vary={"tracker.rate_hz": [40.0, 60.0, 90.0]})
     assert count_cells({"walks": varied, "bouts": BOUTS}) == 2 * 2 * 2 * 3 + 1 * 2
+
+
+def test_a_measurement_in_the_place_of_another_is_refused(tmp_path: Path) -> None:
+    study = PaperStudy(tmp_path, "builtin", 1, TINY.plan("builtin", 1))
+    assert study.cached_measurement("golf", lambda: (1.0, float("nan"))) == [1.0, None]
+    assert study.cached_measurement("walking", lambda: 2.0) == 2.0
+    assert study.cached_measurement("golf", lambda: 3.0) == [1.0, None]
+    golf, walking = (tmp_path / "measured" / f"{name}.json" for name in ("golf", "walking"))
+    shutil.copy(walking, golf)
+    with pytest.raises(BadFile, match=r"golf\.json: of walking; expected a cached measurement of this study, of golf"):
+        study.cached_measurement("golf", lambda: 1.0)
+    golf.unlink()
+    for other in (replace(study, seed=2), replace(study, motion="cmu"), replace(study, runs={"bouts": BOUTS})):
+        with pytest.raises(BadFile, match=r"walking\.json"):
+            other.cached_measurement("walking", lambda: 3.0)
+    earlier = read_result_json(walking, "", "") | {"source_hash": "0" * 16}
+    write_result_json(walking, {"value": earlier["value"], "source_hash": earlier["source_hash"]})
+    assert study.cached_measurement("walking", lambda: 4.0) == 4.0  # of other source: measured again

@@ -21,6 +21,7 @@ from harness.study.placement.cell_cache import link_rate_hz
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import FINDINGS, run_placement
 from harness.study.placement.plan import plan_placement
+from tests.results.finish import folder_bytes
 
 SCENARIO = """
 schema = 1
@@ -350,8 +351,18 @@ def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
         load_placement_study("scenarios/demo.toml")
 
 
+def test_a_second_command_changes_nothing_while_the_first_writes(tmp_path: Path) -> None:
+    path, out = written(tmp_path, "[ablate]"), tmp_path / "out"
+    with open_study(out, {"placement": "which", "motion": "built-in performer", "seed": 1}):
+        before = folder_bytes(out)
+        with pytest.raises(BadInput, match="Another process uses"):
+            run_placement(path, out)
+        assert folder_bytes(out) == before
+
+
 def test_a_folder_of_another_study_is_left_alone(tmp_path: Path) -> None:
-    open_study(tmp_path / "out", {"placement": "another", "motion": "x", "seed": 1})
+    with open_study(tmp_path / "out", {"placement": "another", "motion": "x", "seed": 1}):
+        pass
     before = (tmp_path / "out" / "study.json").read_bytes()
     with pytest.raises(BadInput, match="holds another study"):
         run_placement(written(tmp_path, "[ablate]"), tmp_path / "out")

@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.errors import BadFile, BadInput, Outcome, UnknownName
+from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
+from harness.results.digests import read_result_json, write_result_json
+from harness.results.lock import folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
 from harness.study.trust import capture_cells
-from harness.study.trust.capture_cells import Arm, CaptureTask, run_capture
+from harness.study.trust.capture_cells import Arm, CaptureTask, read_cell_errors, run_capture
 from harness.study.trust.expected_values import preset_components
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import (
@@ -31,6 +33,7 @@ from harness.study.trust.trust_study import (
     judge_outcome,
     run_trust_study,
 )
+from tests.results.finish import folder_bytes
 from tests.study.trust.conftest import CLIPS, SmallStudy
 
 pytestmark = pytest.mark.long
@@ -160,6 +163,19 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bytes(
     assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
 
 
+def test_a_refused_study_changes_nothing(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
+    before = folder_bytes(finished)
+    with folder_lock(finished), pytest.raises(BadInput, match="Another process uses"):
+        run_trust_study(small_study.plan, small_study.captures, finished)
+    assert folder_bytes(finished) == before
+    simulation = prepare_playback(small_study.plan.with_name("small.toml"), clip=CLIPS[0], stations=2).simulation
+    note = {"scenario": "small", "plan": plan_digest(small_study.plan), "clip": CLIPS[0]}
+    record_capture(tmp_path / "two.rec", simulation.wire_format, simulation.wire, note)
+    with pytest.raises(HarnessError, match="station"):
+        run_trust_study(small_study.plan, [small_study.captures[0], tmp_path / "two.rec"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_damaged_cell_has_no_result(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(finished, out)
@@ -168,6 +184,41 @@ def test_a_damaged_cell_has_no_result(finished: Path, small_study: SmallStudy, t
     found = run_trust_study(small_study.plan, small_study.captures, out).findings
     assert found.outcome is Outcome.INCOMPLETE
     assert [cell.name in why and "digest" in why for why in found.failures.values()] == [True]
+
+
+def test_a_cell_in_the_place_of_another_has_no_result(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
+    """Its digest fits, but it is of another method, of the other side, or of an earlier version without a key."""
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    cells = {}
+    for path in (out / "cells").iterdir():
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["clip"] == CLIPS[0]:
+            cells[content["arm"], content["side"]] = path
+    shutil.copy(cells["mean_pose, all", "device"], cells["best_match, all", "device"])
+    shutil.copy(cells["ik:previous, all", "seed 1"], cells["ik:previous, all", "device"])
+    shutil.copy(cells["ik:previous, four", "seed 1"], cells["ik:previous, four", "seed 2"])
+    keyless = read_result_json(cells["mean_pose, four", "device"], "", "")
+    del keyless["key"]
+    write_result_json(cells["mean_pose, four", "device"], keyless)
+    found = run_trust_study(small_study.plan, small_study.captures[:1], _of_first_capture(out)).findings
+    assert set(found.failures) == {
+        f"best_match, all on {CLIPS[0]}, device",
+        f"ik:previous, all on {CLIPS[0]}, device",
+        f"ik:previous, four on {CLIPS[0]}, seed 2",
+        f"mean_pose, four on {CLIPS[0]}, device",
+    }
+    assert "no word of what it is of" in found.failures[f"mean_pose, four on {CLIPS[0]}, device"]
+    path = cells["ik:previous, all", "seed 1"]
+    with pytest.raises(BadFile, match="of seed 1; expected the errors of a finished cell, of device"):
+        read_cell_errors(path, {"key": path.stem, "side": "device"}, ("joint_angle_mean_deg", "mpjpe_mm"))
+
+
+def _of_first_capture(out: Path) -> Path:
+    """The folder with the identity of a study of the first capture alone, whose cells are the same."""
+    study = read_result_json(out / "study.json", "", "")
+    write_result_json(out / "study.json", {**study, "captures": study["captures"][:1]})
+    return out
 
 
 def test_a_changed_plan_is_not_comparable_unless_exploratory(small_study: SmallStudy, tmp_path: Path) -> None:
