@@ -8,8 +8,6 @@ from harness.core.fault_report import describe_fault, save_traceback
 from harness.core.standard_streams import discard_stdout
 from harness.errors import HarnessError, Outcome, SystemFault, shorten, was_interrupted
 
-ENDLESS_VERBS = ("emulate", "live", "record")
-"""Verbs that run until Ctrl-C, which is then the normal end."""
 _MAX_LINE = 1000
 """Most characters of the line that says why a command ended."""
 _KEPT = "Files are written whole or not at all; those that were finished are kept."
@@ -35,14 +33,13 @@ def print_data(text: str) -> bool:
 def describe_ending(words: Sequence[str], error: BaseException) -> tuple[Outcome, dict[str, Any]]:
     """The outcome of a command that an exception ended, and what --json adds; it prints one line to stderr.
 
-    `words` is the command line without the program's name. Notes of the exception say what is kept.
+    `words` is the command line without the program's name. Notes of the exception say what is kept. A verb that runs
+    until Ctrl-C takes the interrupt itself, once it does its work.
     """
     kept = " ".join(getattr(error, "__notes__", ()))
     if was_interrupted(error):
-        endless = bool(words) and words[0] in ENDLESS_VERBS
-        advice = "" if endless else f". {(kept or _KEPT).rstrip('.')}, and the same command resumes."
-        print(f"harness: stopped{advice}", file=sys.stderr)
-        return Outcome.PASS if endless else Outcome.INTERRUPTED, {}
+        print(f"harness: stopped. {(kept or _KEPT).rstrip('.')}, and the same command resumes.", file=sys.stderr)
+        return Outcome.INTERRUPTED, {}
     if isinstance(error, HarnessError) and error.outcome is not Outcome.FAILED:
         print(f"harness: {shorten(str(error), _MAX_LINE)}", file=sys.stderr)
         return error.outcome, {"error": shorten(str(error), _MAX_LINE)}

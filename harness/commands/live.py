@@ -89,7 +89,7 @@ def run_live(args: argparse.Namespace) -> Outcome:
     except (KeyboardInterrupt, Exception) as error:
         if not was_interrupted(error):
             raise
-        return print_result(args, {"poses": 0}, "stopped before the first pose")
+        return print_result(args, {"poses": 0}, "stopped before the first pose", outcome=Outcome.INTERRUPTED)
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
@@ -149,7 +149,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
             "events": [asdict(event) for event in events.events],
         }
     line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
-    outcome = Outcome.PASS if (done.poses or done.stopped) and not done.failed else Outcome.INCOMPLETE
+    outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
+    if done.stopped and not done.poses and not done.failed:
+        outcome = Outcome.INTERRUPTED
     lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
     stations = args.stations if "=" in (args.stations or "") else ",".join(playback.scenario.stations)
     following = ["record", args.port, "take.rec", "--stations", stations, *repeat_flags(args, "rate", *LINE_FLAGS)]

@@ -4,7 +4,7 @@ import argparse
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
     LINE_FLAGS,
@@ -21,7 +21,10 @@ from harness.commands.common import (
     show_progress,
 )
 from harness.core.package_data import VERSION
-from harness.errors import BadInput, Outcome
+from harness.errors import BadInput, Outcome, was_interrupted
+
+if TYPE_CHECKING:
+    from harness.stream.recording.recording import RecordingWriter
 
 SIMULATION_PREFIX = "sim:"
 """Prefix of a scenario's name in place of a port: the simulated line is recorded."""
@@ -64,6 +67,16 @@ def add_record(verbs: Verbs) -> None:
 
 
 def run_record(args: argparse.Namespace) -> Outcome:
+    try:
+        return _record(args)
+    except (KeyboardInterrupt, Exception) as error:
+        if was_interrupted(error):
+            kept = "What was recorded is kept in" if args.file.exists() else "Nothing was recorded into"
+            error.add_note(f"{kept} {args.file}.")
+        raise
+
+
+def _record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
@@ -126,7 +139,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     wire = add_byte_faults(simulation.wire, played.fault, played.seed)
     marks = () if playback.posing else stretch_marks(str(playback.clip_evaluation.part))
     written = record_capture(args.file, simulation.wire_format, wire, note, seconds=seconds, marks=marks)
-    return _print_recording(args, written.counts)
+    return _print_recording(args, written)
 
 
 def _plan_note(args: argparse.Namespace) -> dict[str, str]:
@@ -149,7 +162,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     note = {"source": "port", "port": args.port, "harness": VERSION, **_plan_note(args)}
     with RecordingWriter(args.file, note) as writer:
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
-    return _print_recording(args, writer.counts, line.get("out_of_range", 0))
+    return _print_recording(args, writer, line)
 
 
 def _record_served(args: argparse.Namespace) -> Outcome:
@@ -174,7 +187,7 @@ def _record_served(args: argparse.Namespace) -> Outcome:
     text = [f"{counts['unread']} bytes were not read by a program"] if counts["unread"] else []
     if counts["undelivered"]:
         text.append(f"{counts['undelivered']} bytes of a program found no device")
-    return _print_recording(args, writer.counts, more=counts, lines=text)
+    return _print_recording(args, writer, more=counts, lines=text)
 
 
 def _record_commands(args: argparse.Namespace) -> Outcome:
@@ -198,23 +211,29 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
             args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
         )
     content = [exchange.as_dict() for exchange in exchanges]
-    return _print_recording(args, writer.counts, more={"exchanges": content}, lines=format_exchanges(content))
+    return _print_recording(args, writer, more={"exchanges": content}, lines=format_exchanges(content))
 
 
 def _print_recording(
     args: argparse.Namespace,
-    counts: Mapping[str, int],
-    out_of_range: int = 0,
+    writer: "RecordingWriter",
+    line: Mapping[str, int] | None = None,
     *,
     more: Mapping[str, Any] | None = None,
     lines: Sequence[str] = (),
 ) -> Outcome:
+    """Print what was recorded; `line` are the counts of the driver, where it set the device up."""
+    counts, out_of_range = writer.counts, (line or {}).get("out_of_range", 0)
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
     content |= {"set_up": counts["conf"], "events": counts["evnt"], "out_of_range": out_of_range}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
-    if not args.file.exists():
-        text = f"{args.file}: ended before the device was set up; nothing was recorded"
+    outcome = Outcome.PASS
+    if writer.empty:
+        text, outcome = f"{args.file}: stopped before anything was recorded into it", Outcome.INTERRUPTED
+    elif line is not None and not line.get("records"):
+        text += ", not a single record of a station"
+        outcome = Outcome.INTERRUPTED if line.get("interrupted") else Outcome.NOT_COMPARABLE
     text += f", {counts['evnt']} events" if counts["evnt"] else ""
     text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
     following = ["replay", args.file] if args.file.exists() else []
-    return print_result(args, {**content, **(more or {})}, *lines, text, following=following)
+    return print_result(args, {**content, **(more or {})}, *lines, text, outcome=outcome, following=following)

@@ -15,7 +15,9 @@ LineEventKind = Literal[
     "reset",  # the device has lost its configuration
     "wrong list",  # the records are not of the configured output list
     "garbage",  # bytes that belong to no record and no reply
-    "missing",  # a station that was present is no longer present
+    "missing",  # a station of the session sends nothing any more
+    "present",  # a station that was missing sends again
+    "unexpected",  # a station that the session did not ask for was switched on
     "out of range",  # a station is farther away than the output list can report
     "settings",  # another program left settings in the device, or they are put back
     "refused",  # the device that came back cannot be used as it is

@@ -77,7 +77,7 @@ def test_ctrl_c_ends_it_well(tmp_path: Path, rehearsal: Playback, ending: signal
         _same_as_a_run(rehearsal, rows)
 
 
-def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Playback) -> None:
+def test_ctrl_c_before_the_first_pose_is_an_interrupt(tmp_path: Path, rehearsal: Playback) -> None:
     with (
         serve_emulator(rehearsal.samples, tcp="127.0.0.1:0") as device,
         live("--port", device.name, "--poses", str(tmp_path / "poses.csv")) as program,
@@ -87,9 +87,10 @@ def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Playba
             assert program.poll() is None
         program.send_signal(signal.SIGINT)
         said, talk = program.communicate(timeout=120.0)
-    assert program.returncode == 0, talk
-    assert said.splitlines()[-1] == "pass"
+    assert program.returncode == 130, talk
+    assert said.splitlines()[-2:] == ["stopped before the first pose", "interrupted"]
     assert "Traceback" not in talk
+    assert not (tmp_path / "poses.csv").exists()
 
 
 def _same_as_a_run(rehearsal: Playback, rows: list[dict[str, str]]) -> None:

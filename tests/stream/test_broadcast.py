@@ -176,6 +176,28 @@ def test_silence_is_reported_once_and_ends_when_packets_return() -> None:
     assert list(frames) == []
 
 
+def test_stations_of_a_broadcast_that_come_and_go_are_told_by_name() -> None:
+    events: list[LineEvent] = []
+    timing = DriverTiming(stalled_s=0.4, silent_s=0.8, measure_s=0.5)
+    with broadcast(characters="135B") as (emulator, port):
+        client = open_transport(emulator.name)
+        client.write(b"lB,0\r\n")
+        time.sleep(0.2)
+        config = DriverConfig(stations=("head", "hand"), characters="13")
+        with Is900Broadcast(port, config, on_event=events.append, timing=timing) as tracker:
+            assert tracker.station_list == "1 head, 3 hand"
+            frames = iter(tracker)
+            for command, kind in ((b"", "connected"), (b"l3,0\r", "missing"), (b"l3,1\r", "present"), (b"lB,1\r", "unexpected")):
+                client.write(command)
+                began_s = time.monotonic()
+                while kind not in {event.kind for event in events} and time.monotonic() - began_s < TIMEOUT_S:
+                    assert len(next(frames).quality) == 2
+        client.close()
+    assert [event.kind for event in events] == ["connected", "missing", "present", "unexpected"], events
+    assert "station 3 (hand)" in events[1].text
+    assert "station B was switched on" in events[3].text, "station 5 was there before, unasked"
+
+
 def test_packets_of_other_hosts_are_left_out() -> None:
     with broadcast() as (_, port), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         try:

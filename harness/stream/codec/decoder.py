@@ -59,6 +59,8 @@ class Garbage:
 
     offset: int
     size: int
+    station: int = 0
+    """Code of the station, of which no list is known, whose record these bytes seem to be; 0 for none."""
 
 
 DecoderEvent = RecordRun | Reply | Garbage
@@ -71,8 +73,13 @@ def merge_adjacent(events: Iterable[DecoderEvent]) -> list[DecoderEvent]:
     out: list[DecoderEvent] = []
     for event in events:
         last = out[-1] if out else None
-        if isinstance(event, Garbage) and isinstance(last, Garbage) and last.offset + last.size == event.offset:
-            out[-1] = Garbage(last.offset, last.size + event.size)
+        if (
+            isinstance(event, Garbage)
+            and isinstance(last, Garbage)
+            and not event.station
+            and last.offset + last.size == event.offset
+        ):
+            out[-1] = Garbage(last.offset, last.size + event.size, last.station)
         elif (
             isinstance(event, RecordRun)
             and isinstance(last, RecordRun)
@@ -159,7 +166,7 @@ class Decoder:
         self._in_step = size > 0
         if size == 0:
             size = self._next_head(buffer, offset + 1) - offset
-            events.append(Garbage(self._offset + offset, size))
+            events.append(Garbage(self._offset + offset, size, self._other_station(head)))
         elif head[0] == RECORD_HEAD:
             layout = self._layouts[head[1]]
             events.append(RecordRun(self._offset + offset, layout.items, layout.table(buffer, offset, 1), layout.size))
@@ -192,6 +199,11 @@ class Decoder:
             all(byte in accepted for byte, accepted in zip(head, allowed, strict=False))
             for allowed in (_RECORD_HEAD_BYTES, *_REPLY_HEAD_BYTES)
         )
+
+    def _other_station(self, head: bytes) -> int:
+        """Return the station of a record's head if no list is known of it, else 0."""
+        is_head = len(head) == HEADER_BYTES and head[0] == RECORD_HEAD and self._may_begin(head)
+        return head[1] if is_head and head[1] not in self._layouts else 0
 
     def _has_one_error(self, head: bytes) -> bool:
         """Whether these bytes are a record's head with exactly one wrong byte."""

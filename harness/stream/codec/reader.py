@@ -1,6 +1,6 @@
 """The complete path from bytes to frames, without input or output. Every source of IS-900 bytes uses it."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -69,7 +69,12 @@ class FrameReader:
         self.records = 0
         self.out_of_range: Ints = np.zeros(len(wire.stations), dtype=np.int64)
         """(S,) number of records of each station whose position is beyond the range of the list."""
+        self.station_records: Counter[str] = Counter()
+        """Number of records by station, also of those that are not in the format, whose bytes are garbage."""
         self.garbage_bytes = 0
+        self.other_bytes = 0
+        """Garbage that is records of stations that are not in the format [bytes]."""
+        self._garbage_end, self._other_station = -1, 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
         self._decoder = make_decoder(wire)
@@ -142,8 +147,18 @@ class FrameReader:
                     self.replies.append(event)
                     self._take_reply(parse_reply(event.line))
                 case Garbage():
-                    self.garbage_bytes += event.size
+                    self._take_garbage(event)
         return frames
+
+    def _take_garbage(self, garbage: Garbage) -> None:
+        self.garbage_bytes += garbage.size
+        if garbage.station or garbage.offset != self._garbage_end:
+            self._other_station = garbage.station
+        self._garbage_end = garbage.offset + garbage.size
+        if self._other_station:
+            self.other_bytes += garbage.size
+        if garbage.station:
+            self.station_records[chr(garbage.station)] += 1
 
     def _defer(self, run: RecordRun) -> bool:
         """Defer records until they may complete a frame; return whether they may."""
@@ -151,6 +166,8 @@ class FrameReader:
         last_byte = run.offset + run.size * np.arange(1, count + 1)
         self._deferred.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
         self.records += count
+        for code in run.table["station"].tolist():
+            self.station_records[chr(code)] += 1
         previous_row, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
         return count > 1 or self._row <= previous_row or self._row == len(self.wire.stations) - 1
 

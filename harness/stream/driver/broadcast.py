@@ -2,7 +2,7 @@
 
 import contextlib
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from types import TracebackType
 
@@ -20,6 +20,7 @@ from harness.stream.driver.detection import NoAnswer
 from harness.stream.driver.health import describe_health
 from harness.stream.driver.host import Host
 from harness.stream.driver.rate_measurement import MIN_RECORDS, estimate_rate_hz
+from harness.stream.driver.station_watch import StationWatch
 from harness.stream.driver.transport import LineLost
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, NullLineObserver
@@ -66,6 +67,9 @@ class Is900Broadcast:
         except BaseException:
             self.close()
             raise
+        self._stations = StationWatch(self._timing)
+        self._packets: Counter[str] = Counter()
+        """Packets of this session by station."""
         self._trouble: LineEventKind | None = "stalled"
         self._last_byte_s = self._host.monotonic_s()
         self._streaming = False
@@ -153,6 +157,7 @@ class Is900Broadcast:
 
     def _on_data(self, data: bytes, now_s: float) -> None:
         self._last_byte_s = now_s
+        self._packets.update(map(_character, split_packets(data)))
         self._add_frames(self._reader.feed(data, now_s))
 
     def _add_frames(self, frames: list[TrackerFrame]) -> None:
@@ -160,7 +165,10 @@ class Is900Broadcast:
         self._recent_s.extend(frame.received_s for frame in frames)
 
     def _report_trouble(self, now_s: float) -> None:
-        """Report silence once, and the return of packets."""
+        """Report silence once, the return of packets, and stations that come and go."""
+        for event in self._stations.update(self._packets, now_s):
+            text = "; its packets are left out" if event.kind == "unexpected" else ""
+            self._report(event.kind, event.text + text)
         silent_s = now_s - self._last_byte_s
         if self._frames and self._trouble is not None:
             self._trouble = None
@@ -188,42 +196,42 @@ class Is900Broadcast:
             pass
         self._line = self._connect(self._observer)
         self._observer.on_configured(self._wire)
+        self._stations.start(self._wire, self._host.monotonic_s(), self._heard)
         self._reader.begin_session(self._wire, self._host.monotonic_s())
         self._line.on_data, self._streaming = self._on_data, True
 
     def _read_wire_format(self) -> WireFormat:
         """Listen for a while, and find the stations, the rate and whether packets have a time."""
         packets = self._listen()
-        numbers = sorted({packet.station for packet in packets})
-        if not numbers:
+        heard = "".join(c for c in STATION_CHARACTERS.decode() if c in map(_character, packets))
+        if not heard:
             raise NoAnswer(
                 f"Port {self.port}: no packet of an IS-900 arrived in {self._timing.silent_s:g} s.",
                 "Switch the broadcast on (MEthUdp1), and listen at its port: udp://0.0.0.0:5001 hears the network.",
             )
-        if self.config.characters is not None:
-            asked = [1 + STATION_CHARACTERS.index(c) for c in self.config.characters.encode()]
-            if missing := sorted(set(asked) - set(numbers)):
-                raise BadInput(
-                    f"Port {self.port}: no packets of station {', '.join(map(str, missing))} arrive; "
-                    f"they are of {', '.join(map(str, numbers))}.",
-                    "Name one of these, or switch the missing one on.",
-                )
-            numbers = asked
-        names = self.config.stations or tuple(chr(STATION_CHARACTERS[number - 1]) for number in numbers)
-        if len(names) > len(numbers):
+        self._heard = heard
+        characters = self.config.characters or heard
+        if missing := [c for c in characters if c not in heard]:
             raise BadInput(
-                f"Port {self.port}: {len(names)} stations requested ({', '.join(names)}), packets of {len(numbers)} "
-                f"arrive ({', '.join(map(str, numbers))}).",
+                f"Port {self.port}: no packets of station {', '.join(missing)} arrive; they are of {', '.join(heard)}.",
+                "Name one of these, or switch the missing one on.",
+            )
+        names = self.config.stations or tuple(characters)
+        if len(names) > len(characters):
+            raise BadInput(
+                f"Port {self.port}: {len(names)} stations requested ({', '.join(names)}), packets of {len(characters)} "
+                f"arrive ({', '.join(characters)}).",
                 "Name at most these.",
             )
-        times_s = [packet.time_s for packet in packets if packet.station == numbers[0] and packet.time_s is not None]
+        first = [packet for packet in packets if _character(packet) == characters[0]]
+        times_s = [packet.time_s for packet in first if packet.time_s is not None]
         has_time = len(set(times_s)) >= _MIN_TIME_STEPS
         return WireFormat(
             stations=names,
-            rate_hz=self.config.rate_hz or self._rate_hz(packets, numbers[0], has_time),
+            rate_hz=self.config.rate_hz or self._rate_hz(first, has_time),
             items=DATAGRAM_LIST if has_time else tuple(code for code in DATAGRAM_LIST if code != 21),
             settings=DATAGRAM_FORMAT,
-            characters=bytes(STATION_CHARACTERS[number - 1] for number in numbers[: len(names)]),
+            characters=characters[: len(names)].encode(),
             zeroed=False,
             datagrams=True,
         )
@@ -239,11 +247,15 @@ class Is900Broadcast:
             packets += new
         return packets
 
-    def _rate_hz(self, packets: list[Datagram], station: int, has_time: bool) -> float:
-        """Return rounds per second by the stamps, or by the number of packets where there are none."""
-        own = [packet for packet in packets if packet.station == station]
+    def _rate_hz(self, own: list[Datagram], has_time: bool) -> float:
+        """Return rounds per second by the stamps of a station's packets, or by their number where there are none."""
         rate_hz = estimate_rate_hz(np.array([packet.time_s for packet in own], float)) if has_time else None
         rate_hz = rate_hz or len(own) / self._timing.measure_s
         if len(own) < MIN_RECORDS:
-            raise BadInput(f"Port {self.port}: too few packets of station {station} arrived.", "Give the rate.")
+            raise BadInput(f"Port {self.port}: too few packets of station {_character(own[0])} arrived.", "Give the rate.")
         return rate_hz
+
+
+def _character(packet: Datagram) -> str:
+    """Return the character of a packet's station."""
+    return chr(STATION_CHARACTERS[packet.station - 1])

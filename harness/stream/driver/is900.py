@@ -4,6 +4,7 @@ import contextlib
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import TracebackType
 
 from harness.errors import BadInput
@@ -253,10 +254,16 @@ class Is900:
 
     def _handle(self, diagnosis: Diagnosis) -> None:
         """Report a diagnosis and carry out its recovery action."""
+        text = diagnosis.text
+        if station := diagnosis.unexpected:
+            text += "; it is switched off until the session ends, since it would load the line"
+            self._stations = replace(self._stations, others=self._stations.others + station)
+            self._line.send(commands.switch_station(station, False))
         if diagnosis.kind is not None:
-            self._report(diagnosis.kind, diagnosis.text)
+            self._report(diagnosis.kind, text)
         if diagnosis.action == "ask":
             self._line.send(commands.STATUS)
+            self._line.send(commands.STATION_STATES)
             for station in self._stations.characters:
                 self._line.send(commands.query_output_list(station))
         elif diagnosis.action != "none" and self._streaming:
@@ -362,8 +369,8 @@ class Is900:
 
     def _restore(self) -> None:
         if missing := restore_stations(self.port, self._line, self._stations):
-            now_s = self._host.monotonic_s()
-            self._handle(self._watchdog.report("missing", f"station {', '.join(missing)} is missing", now_s))
+            for diagnosis in self._watchdog.report_missing(missing):
+                self._handle(diagnosis)
 
     def _pause(self) -> None:
         """Wait before the next attempt, in short steps, so that closing is prompt."""

@@ -10,10 +10,18 @@ from typing import Literal
 
 import numpy as np
 
-from harness.stream.codec.items import STANDARD_LIST, position_range_m
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, position_range_m
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.replies import OutputList, ParsedReply, StatusRecord, parse_reply
+from harness.stream.codec.replies import (
+    OutputList,
+    ParsedReply,
+    StationStates,
+    StatusRecord,
+    TrackingStatus,
+    parse_reply,
+)
 from harness.stream.driver.config import DriverTiming
+from harness.stream.driver.station_watch import StationEvent, StationWatch
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEventKind
 
@@ -29,6 +37,8 @@ class Diagnosis:
     action: RecoveryAction
     kind: LineEventKind | None = None
     text: str = ""
+    unexpected: str = ""
+    """Character of a station that was switched on without being asked for."""
 
 
 class Watchdog:
@@ -49,6 +59,7 @@ class Watchdog:
         self._complaints: dict[str, float] = {}
         """Differences found in replies, and when [s]."""
         self._connected = False
+        self._stations = StationWatch(timing)
         self._beyond: set[str] = set()
         """Stations that were reported as out of range."""
 
@@ -60,6 +71,7 @@ class Watchdog:
         """Data are about to flow in this format."""
         self._wire = wire
         self._began_s = self._last_record_s = self._last_byte_s = self._asked_s = now_s
+        self._stations.start(wire, now_s)
         self._garbage_bytes, self._resets, self._expected_resets, self._complaints, self._connected = 0, 0, 0, {}, False
 
     def note_zeroing(self) -> None:
@@ -97,7 +109,7 @@ class Watchdog:
         if bytes_arrived:
             self._last_byte_s = now_s
         diagnoses = self._check_garbage(now_s, reader) + self._check_range(reader)
-        diagnoses += self._check_silence(now_s)
+        diagnoses += self._check_silence(now_s) + self._check_stations(now_s, reader)
         while reader.replies:
             diagnoses += self._check_reply(self._wire, parse_reply(reader.replies.popleft().line), now_s)
         if reader.clock_resets > self._resets + self._expected_resets:
@@ -108,7 +120,8 @@ class Watchdog:
         return diagnoses
 
     def _check_garbage(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
-        new_bytes, self._garbage_bytes = reader.garbage_bytes - self._garbage_bytes, reader.garbage_bytes
+        garbage_bytes = reader.garbage_bytes - reader.other_bytes
+        new_bytes, self._garbage_bytes = garbage_bytes - self._garbage_bytes, garbage_bytes
         if not new_bytes:
             if now_s - self._last_garbage_s > self._timing.garbage_s:
                 self._reported.pop("garbage", None)
@@ -120,6 +133,18 @@ class Watchdog:
         if min(now_s - self._garbage_began_s, now_s - self._asked_s) > self._timing.stalled_s:
             diagnoses.append(self._ask(now_s))  # garbage continues: check the output list
         return diagnoses
+
+    def _check_stations(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
+        """Report stations that come and go; ask the device about one that is silent."""
+        diagnoses = _station_diagnoses(self._stations.update(reader.station_records, now_s))
+        late = now_s - self._asked_s > self._timing.stalled_s
+        if late and self._stations.hears(now_s) and self._stations.silent(now_s):
+            diagnoses.append(self._ask(now_s))
+        return diagnoses
+
+    def report_missing(self, stations: str) -> list[Diagnosis]:
+        """Report stations that the device does not have any more."""
+        return _station_diagnoses(self._stations.report_missing(stations, "is not there"))
 
     def _check_range(self, reader: FrameReader) -> list[Diagnosis]:
         """Report each station once, however often its position is beyond the range of the list."""
@@ -154,6 +179,9 @@ class Watchdog:
 
         A difference counts when it soon occurs twice, since one may be damage.
         """
+        if (active := _active_stations(reply)) is not None:
+            off = [station for station in self._stations.silent(now_s) if station not in active]
+            return _station_diagnoses(self._stations.report_missing(off, "is switched off"))
         recent_s = now_s - self._timing.silent_s
         self._complaints = {text: since_s for text, since_s in self._complaints.items() if since_s > recent_s}
         kind, complaint = diagnose_reply(wire, reply)
@@ -164,6 +192,20 @@ class Watchdog:
         first = not self._complaints
         self._complaints[complaint] = now_s
         return [self._ask(now_s)] if first else []
+
+
+def _station_diagnoses(events: list[StationEvent]) -> list[Diagnosis]:
+    return [
+        Diagnosis("none", event.kind, event.text, event.station if event.kind == "unexpected" else "")
+        for event in events
+    ]
+
+
+def _active_stations(reply: ParsedReply) -> tuple[str, ...] | None:
+    """Return the stations that a reply to `l*` or `MP` tells as active; None for another reply."""
+    if isinstance(reply, TrackingStatus):
+        return tuple(c for c, state in zip(STATION_CHARACTERS.decode(), reply.states, strict=True) if state != "X")
+    return reply.stations if isinstance(reply, StationStates) and reply.station is None else None
 
 
 def diagnose_reply(wire: WireFormat, reply: ParsedReply, streaming: bool = True) -> tuple[LineEventKind | None, str]:

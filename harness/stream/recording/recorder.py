@@ -1,8 +1,8 @@
 """Recording of a device until told to stop."""
 
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from harness.stream.codec.blocks import RECEIVED
 from harness.stream.driver import DriverConfig, Tracker, open_tracker
@@ -26,13 +26,13 @@ def record_port(
     """Let a device stream until Ctrl-C, or for `seconds`, and record everything that passes over its line.
 
     `log` receives the messages that deserve a line of their own, `progress` the text of the progress line. Returns the
-    counts of the driver; none when it ended before the device was set up. Raises BadInput when there is no device, and
+    counts of the driver, and 1 as `interrupted` if a signal ended it; there are no counts before the device was set up. Raises BadInput when there is no device, and
     BadFile when the recording cannot be written; blocks written before are kept.
     """
 
     counts: dict[str, int] = {}
     events = EventCounter(log)
-    with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=events) as device:
+    with _count_interrupt(counts), open_tracker(port, config, observer=writer, on_event=events) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
@@ -48,8 +48,16 @@ def record_port(
         finally:
             end.cancel()
             progress("")
-            counts = device.counts
+            counts |= device.counts
     return counts
+
+
+@contextmanager
+def _count_interrupt(counts: dict[str, int]) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        counts["interrupted"] = 1
 
 
 def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:

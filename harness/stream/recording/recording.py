@@ -20,6 +20,7 @@ import stat
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import islice, pairwise
@@ -35,7 +36,7 @@ from harness.core.fields import build
 from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
-from harness.errors import BadFile, HarnessError, SystemFault, shorten
+from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
 from harness.stream.codec.blocks import (
     ANSWERED,
     CONFIGURED,
@@ -261,6 +262,8 @@ class RecordingWriter:
         self._stations = existing[-1].stations if existing else None
         self._file: int | None = None
         self._closed = self._kept = False
+        self._begin_bytes = 0
+        """Length of the file before this writer [bytes]."""
         self._lock = Lock()
         """Held while writing: the thread that reads and the one that closes both write."""
 
@@ -319,6 +322,19 @@ class RecordingWriter:
         self._append_json(ANSWERED, fitting)
         self.counts[ANSWERED] += 1
 
+    @property
+    def empty(self) -> bool:
+        """Whether no device was ever configured or answered, and no program used it: nothing usable was recorded."""
+        return not (self._kept or self.counts[CONFIGURED] or self.counts[ANSWERED])
+
+    def discard(self) -> None:
+        """Take back everything that this writer has written, and close it; the file is as it was before."""
+        with self._lock:
+            if self._file is not None:
+                os.ftruncate(self._file, self._begin_bytes)
+        self._kept, self.counts = False, dict.fromkeys(self.counts, 0)
+        self.close()
+
     def keep(self) -> None:
         """Keep a new file also when no device was configured in it: a program used the device."""
         self._kept = True
@@ -335,7 +351,7 @@ class RecordingWriter:
                 os.fsync(self._file)
                 os.close(self._file)
                 self._file = None
-                if self._new and not self._kept and not self.counts[CONFIGURED] and not self.counts[ANSWERED]:
+                if self._new and self.empty:
                     self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> "RecordingWriter":
@@ -378,8 +394,8 @@ class RecordingWriter:
         if not _lock_file(file):
             os.close(file)
             raise BadFile(self.path, "in use", _WRITABLE_FILE, "Another process is recording into it.")
-        size = os.fstat(file).st_size
-        _write_all(file, FILE_HEADER[size:])
+        self._begin_bytes = os.fstat(file).st_size
+        _write_all(file, FILE_HEADER[self._begin_bytes :])
         return file
 
     def _existing_formats(self) -> list[WireFormat] | None:
@@ -427,11 +443,12 @@ def record_capture(
     """Record what a simulated line carried in its first `seconds`, chunk by chunk.
 
     The simulation's clock serves as both of the host's clocks. `marks` are the times on it [s] at which stretches
-    begin, in order, and their names. Returns the writer, closed, for its counts.
+    begin, in order, and their names. Returns the writer, closed, for its counts. An interrupt leaves the file as it was
+    before: the same command would otherwise append to a part.
     """
     ends, received_s = capture.ends.tolist(), capture.received_s.tolist()
     begins = [0, *ends]
-    with RecordingWriter(path, note) as writer:
+    with RecordingWriter(path, note) as writer, _undone_by_interrupts(writer):
         start_s = received_s[0] if received_s else 0.0
         writer.on_configured(wire, start_s, start_s)
         count = int(np.count_nonzero(capture.received_s - start_s < seconds))
@@ -443,6 +460,16 @@ def record_capture(
                 writer.on_mark({"stretch": stretch}, at_s, at_s)
             writer.on_simulated([(received_s[i], capture.data[begins[i] : ends[i]]) for i in range(first, last)])
     return writer
+
+
+@contextmanager
+def _undone_by_interrupts(writer: RecordingWriter) -> Iterator[None]:
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        if was_interrupted(error):
+            writer.discard()
+        raise
 
 
 def _split(kind: str, data: bytes, monotonic_s: float, wall_s: float) -> Iterator[RecordingBlock]:

@@ -1,0 +1,141 @@
+"""Verbs that run until Ctrl-C: an interrupt before they did anything is `interrupted`, and nothing half done stays."""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+from harness.cli import main
+from harness.experiment import playback
+from harness.stream.codec.reader import WireFormat
+from harness.stream.recording import command_recording, line_server, recorder, recording
+from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.stream.recording.replay import RecordingStream
+from tests.stream.wire import FOUR, device_bytes, in_chunks, stamps_s
+
+
+def interrupt(*_: object, **__: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def last_words(capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
+    said = capsys.readouterr()
+    return said.out.splitlines()[-1], said.err
+
+
+def test_a_simulated_recording_that_is_stopped_before_it_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(playback, "prepare_playback", interrupt)
+    path = tmp_path / "a.rec"
+    assert main(["record", "sim:demo", str(path)]) == 130
+    word, talk = last_words(capsys)
+    assert word == "interrupted"
+    assert f"Nothing was recorded into {path}" in talk
+    assert not path.exists()
+    assert main(["record", "sim:demo", str(path), "--json"]) == 130
+    assert json.loads(capsys.readouterr().out)["outcome"] == "interrupted"
+
+
+@pytest.mark.parametrize("existing", [False, True])
+@pytest.mark.parametrize("calls", [0, 1, 3])
+def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_it_was(
+    calls: int, existing: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same command would append to a part otherwise."""
+    path = tmp_path / "a.rec"
+    stamp_s = stamps_s(200)
+    capture = in_chunks(device_bytes(stamp_s), stamp_s)
+    if existing:
+        record_capture(path, FOUR, capture, {})
+    before = path.read_bytes() if existing else None
+    monkeypatch.setattr(recording, "_CHUNKS_PER_WRITE", 100)
+    original, seen = RecordingWriter.on_simulated, list[int]()
+
+    def stop_after(writer: RecordingWriter, chunks: Any) -> None:
+        seen.append(len(chunks))
+        if len(seen) > calls:
+            raise KeyboardInterrupt
+        original(writer, chunks)
+
+    monkeypatch.setattr(RecordingWriter, "on_simulated", stop_after)
+    with pytest.raises(KeyboardInterrupt):
+        record_capture(path, FOUR, capture, {})
+    assert len(seen) == calls + 1
+    assert (path.read_bytes() if path.exists() else None) == before
+    monkeypatch.setattr(RecordingWriter, "on_simulated", original)
+    record_capture(path, FOUR, capture, {})
+    assert len(list(RecordingStream(path))) == (2 if existing else 1) * 200
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "options"),
+    [
+        (recorder, "open_tracker", []),
+        (command_recording, "detect_device", ["--send", "S"]),
+        (line_server, "detect_device", ["--serve", "LINK"]),
+    ],
+)
+def test_a_recording_of_a_device_that_is_stopped_before_the_device_was_set_up(
+    module: Any, name: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(module, name, interrupt)
+    path = tmp_path / "a.rec"
+    words = [str(tmp_path / "link") if word == "LINK" else word for word in options]
+    assert main(["record", "tcp://127.0.0.1:9", str(path), *words]) == 130
+    word, _ = last_words(capsys)
+    assert word == "interrupted"
+    assert not path.exists()
+
+
+class _Device:
+    """A device that is set up and sends nothing or something before Ctrl-C."""
+
+    identification, station_list, setup_note, stations = "IS900", "1 head", "", ("head",)
+
+    def __init__(self, writer: RecordingWriter, records: int) -> None:
+        self.counts: Mapping[str, int] = {"frames": 0, "records": records, "out_of_range": 0}
+        writer.on_configured(WireFormat(("head",), 40.0))
+
+    def close(self) -> None: ...
+
+    def __iter__(self) -> Iterator[NoReturn]:
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("records", "code"), [(0, 130), (1, 0)])
+def test_a_recording_is_good_from_its_first_record_on(
+    records: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @contextmanager
+    def opened(port: str, config: object, *, observer: RecordingWriter, on_event: object) -> Iterator[_Device]:
+        yield _Device(observer, records)
+
+    monkeypatch.setattr(recorder, "open_tracker", opened)
+    assert main(["record", "tcp://127.0.0.1:9", str(tmp_path / "a.rec")]) == code
+    assert last_words(capsys)[0] == ("pass" if records else "interrupted")
+
+
+@pytest.mark.parametrize("words", [["emulate", "demo", "--tcp", "127.0.0.1:0"], ["live", "--port", "x", "--scenario", "demo"]])
+def test_emulate_and_live_that_are_stopped_while_they_prepare(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(playback, "prepare_playback", interrupt)
+    assert main(words) == 130
+    assert last_words(capsys)[0] == "interrupted"
+
+
+def test_a_discarded_recording_of_nothing_leaves_no_file(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.discard()
+    assert not (tmp_path / "a.rec").exists()
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.on_configured(FOUR)
+        writer.on_simulated([(0.0, b"01 ")])
+        writer.discard()
+        writer.on_simulated([(1.0, b"01 ")])
+    assert not (tmp_path / "a.rec").exists()

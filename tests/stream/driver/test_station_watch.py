@@ -1,0 +1,173 @@
+"""Stations that are switched on and off while data flow: events by name, and frames whose stations never change."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.driver import DriverConfig, Is900
+from harness.stream.driver.config import DriverTiming
+from harness.stream.driver.station_watch import StationWatch
+from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.device import Device
+from harness.stream.recording.recording import RecordingWriter, read_recording
+from tests.stream.driver.bench import START_S, Bench, EmulatedDevice, frames_for, make_samples
+
+WATCHED = ("missing", "present", "unexpected", "garbage")
+
+
+def make_bench(characters: str = "1234") -> Bench:
+    return Bench(EmulatedDevice(make_samples(len(characters), 40.0), EmulatorConfig(characters=characters), START_S))
+
+
+def device_of(bench: Bench) -> Device:
+    assert isinstance(bench.device, EmulatedDevice)
+    return bench.device.emulator.device
+
+
+def switch(bench: Bench, line: bytes) -> Callable[[], None]:
+    """Return an action of someone at the device's other port."""
+    return lambda: device_of(bench).receive(line, bench.now_s)
+
+
+def texts(bench: Bench) -> list[tuple[str, str]]:
+    return [(event.kind, event.text) for event in bench.events if event.kind in WATCHED]
+
+
+def test_a_station_that_is_switched_off_and_on_again_is_told_by_name() -> None:
+    bench = make_bench()
+    with bench.driver(DriverConfig(stations=("head", "torso", "left", "right"))) as stream:
+        frames_for(stream, bench, 1.0)
+        switch(bench, b"l2,0\r")()
+        off = frames_for(stream, bench, 3.0)
+        assert texts(bench) == [
+            ("missing", "station 2 (torso) is switched off: its rows are invalid until it comes back")
+        ]
+        assert bench.events[-1].monotonic_s - off[0].received_s < 1.5
+        assert all(frame.position_valid.tolist() == [True, False, True, True] for frame in off[2:])
+        switch(bench, b"l2,1\r")()
+        on = frames_for(stream, bench, 3.0)
+        assert texts(bench)[1:] == [("present", "station 2 (torso) sends records again")]
+        assert all(frame.position_valid.all() for frame in on[2:])
+        switch(bench, b"l1,0\rl4,0\r")()
+        frames_for(stream, bench, 2.0)
+        assert [text.split(" is")[0] for _, text in texts(bench)[2:]] == ["station 1 (head)", "station 4 (right)"]
+        assert stream.stations == ("head", "torso", "left", "right")
+
+
+@pytest.mark.parametrize("items", [None, b"2,4,1", b"40,2,11,21,1", b"2,11"])
+def test_a_station_outside_the_session_is_told_by_name_and_is_no_garbage(items: bytes | None) -> None:
+    """Whatever list it has. The stations of the session stay whole, and the line is as the session needs it."""
+    bench = make_bench("1245A")
+    switch(bench, b"l5,0\rlA,0\r" + (b"OA,%b\r" % items if items else b""))()
+    with bench.driver(DriverConfig(stations=("a", "b", "c"))) as stream:
+        frames_for(stream, bench, 1.0)
+        switch(bench, b"lA,1\r")()
+        frames = frames_for(stream, bench, 3.0)
+        ((kind, text),) = texts(bench)
+        assert kind == "unexpected"
+        assert text.startswith("station A was switched on: it is none of this session; it is switched off")
+        assert stream.stations == ("a", "b", "c")
+        assert all(frame.position_valid.all() for frame in frames[:-1])
+        assert len(frames) >= 115
+        assert device_of(bench).active == "124", "it is off while the session needs the line"
+        bench.sleep(5.0)
+        switch(bench, b"lA,1\r")()
+        frames_for(stream, bench, 2.0)
+    assert device_of(bench).active == "124A", "as the one who switched it on left it"
+
+
+def test_all_stations_that_are_switched_off_are_told_and_return() -> None:
+    bench = make_bench("13")
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        switch(bench, b"l1,0\rl3,0\r")()
+        frames = frames_for(stream, bench, 5.0)
+    kinds = [kind for kind, _ in texts(bench)]
+    assert kinds[:2] == ["missing", "missing"]
+    assert kinds[2:] == ["present", "present"]
+    assert frames[-1].position_valid.all()
+
+
+def test_a_silent_station_is_told_where_the_device_does_not_answer() -> None:
+    bench = make_bench()
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        bench.corrupt = lambda data: data.replace(b"21l", b"2xl").replace(b"31P", b"3xP")
+        switch(bench, b"l3,0\r")()
+        frames_for(stream, bench, 4.0)
+    assert ("missing", "station 3 sends no record for 2.0 s: its rows are invalid until it comes back") in texts(bench)
+
+
+def test_one_damaged_station_character_is_no_news() -> None:
+    watch, wire = StationWatch(DriverTiming()), WireFormat(("head", "torso"), 40.0)
+    watch.start(wire, 0.0)
+    now_s, totals = 0.0, {"1": 0, "2": 0, "5": 0}
+    for k in range(400):
+        now_s += 0.025
+        totals["1"] += 1
+        totals["2"] += 1
+        totals["5"] += k % 50 == 49  # one in 1.25 s
+        assert watch.update(totals, now_s) == []
+    events = []
+    for _ in range(3):
+        totals["5"] += 1
+        events += watch.update(totals, now_s)
+    assert [(event.kind, event.station) for event in events] == [("unexpected", "5")]
+
+
+def test_the_first_record_after_a_silence_of_all_makes_no_other_station_missing() -> None:
+    watch, wire = StationWatch(DriverTiming()), WireFormat(("head", "torso"), 40.0)
+    watch.start(wire, 0.0)
+    assert watch.update({"1": 1, "2": 1}, 0.1) == []
+    assert watch.update({"1": 1, "2": 1}, 9.0) == []
+    assert watch.update({"1": 2, "2": 1}, 10.0) == []
+    assert watch.update({"1": 2, "2": 2}, 10.1) == []
+    for k in range(19):
+        assert watch.update({"1": 3 + k, "2": 2}, 10.2 + 0.1 * k) == []
+    assert [event.kind for event in watch.update({"1": 100, "2": 2}, 12.15)] == ["missing"]
+
+
+def test_a_device_that_is_slow_by_nature_has_no_missing_stations() -> None:
+    bench = Bench(EmulatedDevice(make_samples(2, 0.5), None, START_S))
+    timing = DriverTiming(silent_s=20.0, stalled_s=5.0)
+    with bench.driver(DriverConfig(rate_hz=0.5), timing) as stream:
+        frames_for(stream, bench, 30.0)
+    assert texts(bench) == []
+
+
+def test_the_events_are_in_the_recording_and_its_replay_counts_the_same(tmp_path: Path) -> None:
+    bench, path = make_bench("1345"), tmp_path / "take.rec"
+    with (
+        RecordingWriter(path) as writer,
+        Is900("bench", DriverConfig(stations=("a", "b")), observer=writer, host=bench.host) as stream,
+    ):
+        frames_for(stream, bench, 1.0)
+        switch(bench, b"l3,0\r")()
+        frames_for(stream, bench, 2.0)
+        switch(bench, b"l3,1\rl5,1\r")()
+        frames_for(stream, bench, 2.0)
+    kinds = [event["kind"] for event in read_recording(path).events]
+    assert [kind for kind in kinds if kind in WATCHED] == ["missing", "present", "unexpected"]
+
+
+def test_records_of_another_station_are_told_apart_from_garbage_at_every_split() -> None:
+    device = device_of(make_bench("12"))
+    device.receive(b"fuO1,40,2,11,21,1\rO2,2,4,1\rMZ\rC", START_S)
+    data = device.advance(START_S + 0.2)
+    wire = WireFormat(("head",), 40.0)
+    expected = None
+    for cut in range(1, len(data)):
+        reader = FrameReader(wire)
+        reader.feed(data[:cut], 0.0)
+        reader.feed(data[cut:], 0.0)
+        reader.finish()
+        counts = dict(reader.station_records), reader.garbage_bytes, reader.other_bytes, reader.records
+        expected = expected or counts
+        assert counts == expected, cut
+    assert expected is not None
+    stations, garbage_bytes, other_bytes, records = expected
+    assert stations["1"] == records > 5
+    assert stations["2"] >= records - 1
+    assert garbage_bytes == other_bytes == 29 * stations["2"]
