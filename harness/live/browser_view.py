@@ -5,6 +5,7 @@ The session writes each frame to shared memory and waits for nobody. A process o
 
 import os
 import time
+from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
 from threading import Thread
@@ -118,4 +119,5 @@ def _run_process(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
 
         run_browser(config, ring, pipe)
     except OSError as error:
-        pipe.send(OSError(str(error)))
+        with suppress(OSError):  # the session has been killed
+            pipe.send(OSError(str(error)))
