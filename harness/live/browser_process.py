@@ -87,7 +87,7 @@ def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
                 if now_s - status_s >= _STATUS_PERIOD_S:
                     status_s = now_s
                     server.publish("status", {**history.content(now_s), "recording": commands.path})
-        except EOFError:
+        except (EOFError, ConnectionError):  # the session has closed the pipe, or was killed
             return
 
 

@@ -5,6 +5,7 @@ The session writes each frame to shared memory and waits for nobody. A process o
 
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -109,4 +110,5 @@ def _run_process(pipe: Any, config: BrowserConfig, ring: PoseRing) -> None:
 
         run_browser(config, ring, pipe)
     except OSError as error:
-        pipe.send(OSError(str(error)))
+        with suppress(OSError):  # the session has been killed
+            pipe.send(OSError(str(error)))

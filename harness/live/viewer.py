@@ -6,6 +6,7 @@ is ready for one and skips the others. If OpenGL is missing or crashes, only the
 
 import os
 import sys
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -125,4 +126,5 @@ def _run_viewer_process(pipe: Any, config: ViewerConfig, shared: SharedPose) -> 
 
         run_viewer(config, shared, pipe)
     except Exception as error:  # the session's process reports it to the user
-        pipe.send(f"{type(error).__name__}: {error}")
+        with suppress(OSError):  # the session has been killed
+            pipe.send(f"{type(error).__name__}: {error}")

@@ -186,6 +186,20 @@ def test_children_see_no_signal() -> None:
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, []) & set(interrupts.SIGNALS)
 
 
+def test_the_first_use_of_multiprocessing_leaves_signals_blocked() -> None:
+    """It starts a process of its own, and unblocked SIGINT and SIGTERM: Ctrl-C then ended the page with a traceback."""
+    script = """
+import multiprocessing, signal
+from harness.core.interrupts import SIGNALS, shield_children
+with shield_children():
+    multiprocessing.get_context("spawn").Lock()
+    print(set(SIGNALS) <= signal.pthread_sigmask(signal.SIG_BLOCK, []))
+print(set(SIGNALS) & signal.pthread_sigmask(signal.SIG_BLOCK, []))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("True\nset()\n", "")
+
+
 def test_a_signal_to_this_process_is_not_lost_while_a_child_starts() -> None:
     with interrupted():
         with shield_children():

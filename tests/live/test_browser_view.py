@@ -2,10 +2,12 @@
 
 import http.client
 import json
+import multiprocessing
 import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -16,7 +18,10 @@ from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.errors import BadFile
-from harness.live.browser_view import BrowserOutput
+from harness.live.browser_process import BrowserConfig
+from harness.live.browser_view import BrowserOutput, _run_process
+from harness.live.pose_ring import PoseRing
+from harness.live.viewer import _run_viewer_process
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.recording_switch import RecordingSwitch
@@ -128,3 +133,45 @@ def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: R
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
     with pytest.raises(BadFile, match="no folder"):
         BrowserOutput(BODY.skeleton, ("head",), None, switch, tmp_path / "none", "a session")
+
+
+@pytest.mark.parametrize("unread", [False, True])
+def test_the_page_of_a_killed_session_ends_without_a_word(unread: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A killed session leaves a pipe that is broken, or one that is reset because it had not read its end."""
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    context = multiprocessing.get_context("spawn")
+    session, pipe = context.Pipe()
+    ring = PoseRing(context, 2)
+    config = BrowserConfig(BODY.skeleton.bone_m, ("head", "torso"), None, "a session")
+    ended = Thread(target=_run_process, kwargs={"config": config, "ring": ring, "pipe": pipe}, daemon=True)
+    if unread:
+        ended.start()
+        assert session.poll(20.0)  # the address, which the session never reads
+        session.close()
+    else:
+        session.close()
+        ended.start()
+    ended.join(20.0)
+    assert not ended.is_alive()
+
+
+@pytest.mark.parametrize("module", ["harness.live.browser_view", "harness.live.viewer"])
+def test_a_viewer_that_fails_after_its_session_was_killed_is_silent(
+    module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its report through the pipe raised BrokenPipeError, whose traceback was printed."""
+    monkeypatch.setattr("os.nice", lambda _: 0)
+    monkeypatch.setenv("LP_NUM_THREADS", "1")  # the viewer sets it
+    session, pipe = multiprocessing.Pipe()
+    session.close()
+
+    def fail(*_: object) -> None:
+        raise OSError("no screen")
+
+    if module.endswith("browser_view"):
+        monkeypatch.setattr("harness.live.browser_process.run_browser", fail)
+        _run_process(config=None, ring=None, pipe=pipe)  # type: ignore[arg-type]  # `fail` takes anything
+    else:
+        pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
+        monkeypatch.setattr("harness.live.viewer_process.run_viewer", fail)
+        _run_viewer_process(config=None, shared=None, pipe=pipe)  # type: ignore[arg-type]  # as above

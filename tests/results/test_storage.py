@@ -253,7 +253,7 @@ def test_what_is_not_written_is_not_read_either(
 
 
 def test_the_largest_values_are_written_and_read(run_folder: Path, make_cell: MakeCell) -> None:
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     for make in (far_off(10, 0.999e6), far_off(0, -0.999e6), with_sigma(0.999e6), with_sigma(1.2e-38)):
         cell = make(make_cell)
         back = storage.read_cell(storage.write_cell(run_folder, cell))
@@ -284,7 +284,7 @@ def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: Mak
 
 def test_no_name_in_the_table_is_a_formula(run_folder: Path, make_cell: MakeCell) -> None:
     """A spreadsheet runs what begins with such a sign; numbers below 0 stay numbers."""
-    storage.open_run(run_folder, manifest())
+    make_run(run_folder, manifest())
     names = {"clip": "=1+1", "method": "-2+3", "behaviour": "@SUM(A1)", "scenario": "+cmd"}
     cell = make_cell(0.01, **names, varied={"-k": -0.5, "name": "=x"})
     storage.write_cell(run_folder, cell)
