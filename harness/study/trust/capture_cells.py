@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
-from harness.core.fault_report import named_folder_fault
+from harness.core.fault_report import find_system_fault, named_folder_fault
 from harness.core.seeds import generator
 from harness.core.split import ExampleLeak
 from harness.errors import BadFile, BadInput, HarnessError, SystemFault, UnknownName, was_interrupted
@@ -332,6 +332,8 @@ class _CaptureRun:
             except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
                 if was_interrupted(error):
                     raise KeyboardInterrupt from error
+                if fault := find_system_fault(error):
+                    raise fault from error
                 self.failures[f"{arm} on {self.clip}, {side}"] = traceback.format_exc()
         return found
 
