@@ -168,7 +168,7 @@ def test_a_full_disk_is_no_fault_of_the_method(folder: Path, error: str) -> None
     )
     name = "writes:Writes"
     process = MethodProcess(name, Isolation())
-    with closing(process), pytest.raises(SystemFault, match="No space left|Input/output error"):
+    with closing(process), pytest.raises(SystemFault, match=r"No space left|Input/output error"):
         RemoteMethod(name, process).describe()
 
 
