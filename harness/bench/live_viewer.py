@@ -6,17 +6,18 @@ browser: it reads every frame and draws nothing.
 
 import json
 import re
-import subprocess
 import tempfile
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
+from subprocess import PIPE
 from threading import Thread
 
 import numpy as np
 
 from harness.bench.rows import BenchmarkRow
+from harness.bench.wire import start_device
 from harness.bench.wire_cases import SCENARIO
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import PythonProcess
 from harness.errors import HarnessError
 from harness.view.server import EVENTS_PATH
 
@@ -29,14 +30,12 @@ _SECONDS, _RATE_HZ, _STATIONS = 6.0, 40.0, 4
 def bench_live_viewer(seed: int = 1, *, runs: int = 1) -> list[BenchmarkRow]:
     """Measure `PAIRS` pairs of sessions `runs` times; HarnessError when a session fails."""
     with tempfile.TemporaryDirectory(prefix="harness-viewer-") as folder:
-        device = _start_device(Path(folder), seed)
-        try:
+        arguments = [str(Path(folder) / "sent.npz"), str(seed), str(_STATIONS), str(_RATE_HZ), "pty", "paced"]
+        with start_device(*arguments, str(Path(folder) / "tracker")) as device:
             port = device.stdout.readline().strip() if device.stdout else ""
             pairs = [
                 [_session_p50_ms(port, with_page=with_page) for with_page in (False, True)] for _ in range(PAIRS * runs)
             ]
-        finally:
-            device.communicate()
     return viewer_rows(pairs)
 
 
@@ -50,29 +49,11 @@ def viewer_rows(pairs: list[list[float]]) -> list[BenchmarkRow]:
     return [BenchmarkRow(name, float(shown / without), "x", reference, f"<= {MAX_RATIO:g}")]
 
 
-def _start_device(folder: Path, seed: int) -> "subprocess.Popen[str]":
-    arguments = [str(folder / "sent.npz"), str(seed), str(_STATIONS), str(_RATE_HZ), "pty", "paced"]
-    return subprocess.Popen(
-        python_command("-m", "harness.bench.wire_device", *arguments, str(folder / "tracker")),
-        env=python_environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-
-
 def _session_p50_ms(port: str, *, with_page: bool) -> float:
     """Median time from the last byte to the pose of one session [ms]."""
     words = ["--port", port, "--scenario", SCENARIO, "--stations", str(_STATIONS), "--rate", f"{_RATE_HZ:g}"]
     words += ["--seconds", f"{_SECONDS:g}", "--json", *(["--view", "browser", "--no-browser"] if with_page else [])]
-    with subprocess.Popen(
-        python_command("-m", "harness.cli", "live", *words),
-        env=python_environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as session:
+    with PythonProcess("harness.cli", "live", *words, stdout=PIPE) as session:
         reader: Thread | None = None
         said = []
         for line in session.stderr or ():
@@ -81,6 +62,7 @@ def _session_p50_ms(port: str, *, with_page: bool) -> float:
                 reader = Thread(target=_read_events, args=(found[1],), daemon=True)
                 reader.start()
         content = (session.stdout.read() if session.stdout else "") or "{}"
+        session.wait()
     if session.returncode or (with_page and reader is None):
         raise HarnessError(f"harness live failed: {''.join(said[-3:]).strip()}")
     return float(json.loads(content)["latency"]["last byte to pose"]["p50_ms"])

@@ -6,14 +6,13 @@ prints the peak in bytes. With METHOD "nothing" the process is a baseline withou
 linear algebra with its work space, makes the frames, and follows them with plain inverse kinematics.
 """
 
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve
 
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import run_python
 from harness.core.seeds import generator
 from harness.experiment import benchmark_clips
 from harness.reconstruct import registry
@@ -28,11 +27,7 @@ _STATUS = Path("/proc/self/status")
 
 def measure_peak_bytes(method: str, folder: Path, seed: int) -> int:
     """Peak resident memory of a new process that runs the method [bytes]; RuntimeError when it fails."""
-    command = python_command("-m", "harness.bench.peak_memory", method, str(folder), str(seed))
-    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"{method} in its own process: {done.stderr.strip()[-2000:]}")
-    return int(done.stdout)
+    return int(run_python("harness.bench.peak_memory", method, str(folder), str(seed)))
 
 
 def run_method(name: str, folder: Path, seed: int) -> int:

@@ -5,21 +5,22 @@ scheduling jitter is measured at the same time. The emulator's line is a pty, so
 has two passes through a pty: emulator to recorder, and recorder to client.
 """
 
+import math
 import os
 import select
-import subprocess
 import tempfile
 import time
 import tty
 from pathlib import Path
+from subprocess import DEVNULL
 from typing import NamedTuple
 
 import numpy as np
 
 from harness.bench.rows import BenchmarkRow
-from harness.bench.wire import SECONDS
+from harness.bench.wire import SECONDS, start_device
 from harness.core.arrays import Floats
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import PythonProcess
 from harness.live.scheduling_jitter import JitterProbe
 from harness.stream.codec import commands
 from harness.stream.codec.blocks import RECEIVED
@@ -83,22 +84,18 @@ def _run(seed: int) -> ServedRun:
         folder = Path(name)
         sent, link, recording = folder / "sent.npz", folder / "link", folder / "a.rec"
         arguments = [str(sent), str(seed), str(STATIONS), str(RATE_HZ), "pty", "paced", str(folder / "tracker")]
-        device = _start(python_command("-m", "harness.bench.wire_device", *arguments))
-        try:
+        with start_device(*arguments) as device:
             port = device.stdout.readline().strip() if device.stdout else ""
-            command = python_command("-m", "harness.cli", "record", port, str(recording), "--serve", str(link))
             direct = _read_client(Path(port), SECONDS)
-            recorder = _start(command)
-            try:
+            words = ["record", port, str(recording), "--serve", str(link)]
+            with PythonProcess("harness.cli", *words, stderr=DEVNULL, shielded=False) as recorder:
                 _wait_for(link, recorder)
                 with JitterProbe() as probe:
                     served = _read_client(link, SECONDS)
                     timer = probe.finish()
-            finally:
                 recorder.terminate()
-                recorder.communicate()
-        finally:
-            device.communicate()
+                recorder.finish(math.inf)
+            device.finish(math.inf)  # it ends with its standard input
         content = np.load(sent)
         recorded = b"".join(block.payload for block in read_recording(recording).blocks() if block.kind == RECEIVED)
     sent_data, written_s = content["data"].tobytes(), content["written_s"]
@@ -109,18 +106,7 @@ def _run(seed: int) -> ServedRun:
     return ServedRun(1e3 * delay_s, float(timer["timer"]["p99_ms"]), missing, 1e3 * direct_s)
 
 
-def _start(command: list[str]) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        command,
-        env=python_environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-
-
-def _wait_for(link: Path, recorder: "subprocess.Popen[str]") -> None:
+def _wait_for(link: Path, recorder: PythonProcess) -> None:
     until_s = time.monotonic() + _START_S
     while not link.is_symlink():
         if recorder.poll() is not None or time.monotonic() > until_s:

@@ -10,7 +10,6 @@ import json
 import os
 import resource
 import shutil
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +21,7 @@ import numpy as np
 
 from harness.bench.rows import BenchmarkRow
 from harness.core.arrays import Floats
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import run_python
 from harness.core.split import ClipPart
 from harness.experiment.cells import ClipTask, evaluate_cell, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
@@ -149,9 +148,9 @@ def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
     out = folder / "many"
     _fabricate_cells(folder / "jobs-1", out, count)
     work: dict[str, Callable[[], Any]] = {
-        "harness status": lambda: _run_harness("status", str(out), "--json"),
+        "harness status": lambda: run_python("harness.cli", "status", str(out), "--json"),
         "summary.csv and groups": lambda: _write_summary(out),
-        "harness report": lambda: _run_harness("report", str(out), "--json"),
+        "harness report": lambda: run_python("harness.cli", "report", str(out), "--json"),
     }
     rows = []
     for name, call in work.items():
@@ -197,14 +196,7 @@ def _fabricate_row(row: Mapping[str, Any], seed: int, latency_ms: int) -> dict[s
 
 def _time_sweep(sweep: Path, out: Path, seed: int, jobs: int = 1) -> Floats:
     words = ("sweep", str(sweep), "--out", str(out), "--jobs", str(jobs), "--seed", str(seed), "--json")
-    return _time_call(lambda: _run_harness(*words))
-
-
-def _run_harness(*words: str) -> None:
-    command = python_command("-m", "harness.cli", *words)
-    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"harness {' '.join(words)}: {done.stderr.strip()[-2000:]}")
+    return _time_call(lambda: run_python("harness.cli", *words))
 
 
 def _time_call(work: Callable[[], Any]) -> Floats:

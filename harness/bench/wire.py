@@ -7,11 +7,12 @@ The operating system's scheduling jitter is measured at the same time.
 
 import csv
 import json
-import subprocess
+import math
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from subprocess import PIPE
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from harness.bench.rows import BenchmarkRow
 from harness.bench.wire_cases import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import PythonProcess, run_python
 from harness.experiment.playback import prepare_playback
 from harness.stream.codec import ascii_records
 from harness.stream.codec.decoder import Decoder
@@ -106,32 +107,26 @@ def _run_line(case: WireCase, seconds: float, seed: int, folder: Path) -> LineRu
     port = str(folder / "tracker") if case.kind == "pty" else "127.0.0.1:0"
     pace = "paced" if case.kind == "pty" else "unpaced"
     arguments = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
-    device = subprocess.Popen(
-        python_command("-m", "harness.bench.wire_device", *arguments),
-        env=python_environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
+    with start_device(*arguments) as device:
         name = device.stdout.readline().strip() if device.stdout else ""
         report = _run_live(name, case, seconds, seed, folder / "poses.csv")
-    finally:
-        device.communicate()
+        device.finish(math.inf)  # it ends with its standard input
     if device.returncode:
         raise RuntimeError(f"the emulator ended with {device.returncode}")
     return _line_run(case, report, np.load(folder / "sent.npz"), folder / "poses.csv")
 
 
+def start_device(*arguments: str) -> PythonProcess:
+    """Start `wire_device`: it prints its name, and ends when its standard input does."""
+    return PythonProcess("harness.bench.wire_device", *arguments, stdin=PIPE, stdout=PIPE, stderr=None)
+
+
 def _run_live(port: str, case: WireCase, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
-    command = python_command("-m", "harness.cli", "live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP)
+    command = ["live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP]
     command += ["--stations", str(case.stations), "--rate", str(case.rate_hz), "--method", METHOD]
     command += ["--items", ",".join(map(str, case.items)), "--seconds", str(seconds), "--seed", str(seed)]
     command += ["--poses", str(poses), "--json"]
-    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"harness live: {done.stderr.strip()[-2000:]}")
-    return dict(json.loads(done.stdout))
+    return dict(json.loads(run_python("harness.cli", *command)))
 
 
 def _line_run(case: WireCase, report: dict[str, Any], sent: Any, poses: Path) -> LineRun:

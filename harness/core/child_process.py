@@ -1,4 +1,6 @@
-"""Child processes: every Python process of the harness is started here, but those that Dask starts.
+"""Child processes: every Python process of the harness is started here.
+
+Only Dask starts its own, and `harness bench startup` times commands as a shell starts them.
 
 A child has a session and a temporary folder of its own, and it imports nothing from the working folder. It ends with
 the program that started it, however that ends, and its process group ends with it. Nobody waits for the end of a pipe
@@ -22,9 +24,9 @@ from multiprocessing.connection import wait
 from threading import Lock, Thread
 from typing import IO, Any
 
-from harness.core.interrupts import SIGNALS, shield_children
+from harness.core.interrupts import SIGNALS, defer_interrupts, shield_children
 from harness.core.python_process import python_command, python_environment
-from harness.errors import HarnessError, SystemFault
+from harness.errors import SystemFault
 
 SPAWN = get_context("spawn")
 """What shared memory for a `FunctionProcess` is made with."""
@@ -51,14 +53,15 @@ class PythonProcess(subprocess.Popen[str]):
         folder: str | None = None,
         passed: tuple[int, ...] = (),
         watched: bool = True,
+        shielded: bool = True,
     ) -> None:
         """Start the process; SystemFault when the system refuses.
 
         `environment` has variables to set, `folder` is the working folder, and `passed` are descriptors to inherit.
         The process watches this one from a thread. One that forks has to do so itself: not `watched`, it calls `main`
-        of the module with the arguments.
+        of the module with the arguments. `shielded`, it sees no signal: one ends this process, which ends the child.
         """
-        with shield_children():  # a signal ends this process, which ends the child
+        with shield_children() if shielded else defer_interrupts():
             self._temporary = tempfile.TemporaryDirectory(prefix="harness-child-", ignore_cleanup_errors=True)
             given = {**python_environment(), "TMPDIR": self._temporary.name, **(environment or {})}
             start = ("-c", _START, str(os.getpid()), self._temporary.name)
@@ -119,12 +122,12 @@ class PythonProcess(subprocess.Popen[str]):
         self.close()
 
 
-def run_python(module: str, *arguments: str, stderr: Stream = subprocess.PIPE) -> str:
-    """What a module, run as a program, has written to stdout; HarnessError with the end of its stderr if it fails."""
-    with PythonProcess(module, *arguments, stdout=subprocess.PIPE, stderr=stderr) as process:
+def run_python(module: str, *arguments: str) -> str:
+    """What a module, run as a program, has written to stdout; RuntimeError with the end of its stderr if it fails."""
+    with PythonProcess(module, *arguments, stdout=subprocess.PIPE) as process:
         out, err = process.finish(float("inf")) or ("", "")
     if process.returncode:
-        raise HarnessError(f"{' '.join([module, *arguments])}: {err.strip()[-2000:]}")
+        raise RuntimeError(f"{' '.join([module, *arguments])}: {err.strip()[-2000:]}")
     return out
 
 

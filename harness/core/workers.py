@@ -162,14 +162,20 @@ def _carry_out(future: Future[Any], process: FunctionProcess, new: bool, call: t
     try:
         began = began or process.receive()
         process.pipe.send(call)
-        result, error = process.receive()
     except (EOFError, OSError):
+        pass  # it has ended, as `receive` says too
+    except Exception as error:  # the call cannot be pickled
+        future.set_exception(error)
+        return
+    try:
+        result, error = process.receive()
+    except EOFError:
         process.close()
         advice = "Its own message is above. Does `harness doctor` pass?"
         fault = SystemFault("A worker process ended before its first task.", advice)
         future.set_exception(BrokenExecutor("a worker process died") if began else fault)
-    except Exception as problem:  # the call cannot be pickled, or its answer cannot be read
-        future.set_exception(BrokenExecutor(f"{type(problem).__name__}: {problem}"))
+    except Exception as problem:
+        future.set_exception(BrokenExecutor(f"its answer cannot be read ({type(problem).__name__}: {problem})"))
     else:
         future.set_exception(error) if error is not None else future.set_result(result)
 

@@ -18,6 +18,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
 
+from harness.core.input_file import check_input_file
 from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
@@ -188,4 +189,7 @@ def _declared_files(method: object) -> Iterator[Path]:
         path = Path(os.path.abspath(_defining_file(owner).parent / name))
         if not path.exists():
             raise BadInput(f"{type(method).__name__} declares {path}, which does not exist.", "Correct `files`.")
-        yield from (file for file in path.rglob("*") if file.is_file()) if path.is_dir() else (path,)
+        for file in sorted(path.rglob("*")) if path.is_dir() else (path,):
+            if file.exists() and not file.is_dir():
+                check_input_file(file, f"a data file of {type(method).__name__}", sys.maxsize, "Correct `files`.")
+                yield file

@@ -113,7 +113,10 @@ def _commit(root: Path) -> dict[str, Any]:
         return {"commit": None, "dirty": None}
 
     def run_git(*arguments: str) -> str | None:
-        done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, timeout=20)
+        try:
+            done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, timeout=20)
+        except (subprocess.TimeoutExpired, OSError):  # a busy machine: the commit stays unknown
+            return None
         return done.stdout.strip() if done.returncode == 0 else None
 
     status = run_git("status", "--porcelain", "--", "harness", "models", "scenarios")

@@ -1,7 +1,9 @@
 """The contract suite for a method from outside the package, in a process that it may end, hang or crash."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
+from harness.errors import SystemFault
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_messages import MAX_TEXT
 from harness.experiment.method_process import MethodFailure, MethodProcess
@@ -9,19 +11,27 @@ from harness.experiment.remote_method import RemoteMethod
 from harness.testing.method_checks import RuleResult
 from harness.testing.rules import RULES
 
+_REFERENCE = "mean_pose"
+"""Method of the package that satisfies every rule."""
+_SEE_DOCTOR = "Something is wrong with this computer or installation: does `harness doctor` pass?"
+
 
 def check_rules_apart(name: str, isolation: Isolation = DEFAULT_ISOLATION) -> Iterator[RuleResult]:
     """Check all rules in turn; the end of the method's process violates the rule that was checked.
 
-    UnknownName and BadInput as for `registry.resolve`.
+    A rule that the method violates is checked with a method of the package too, in another process: SystemFault when
+    that one violates it as well. UnknownName and BadInput as for `registry.resolve`.
     """
-    process = MethodProcess(name, isolation, "harness.testing.check_worker")
-    method = RemoteMethod(name, process)
-    try:
+    tested, reference = (
+        RemoteMethod(each, MethodProcess(each, isolation, "harness.testing.check_worker"))
+        for each in (name, _REFERENCE)
+    )
+    with closing(tested.process), closing(reference.process):
         for rule in RULES:
-            yield _check_rule(method, rule)
-    finally:
-        process.close()
+            result = _check_rule(tested, rule)
+            if not result.ok and not (control := _check_rule(reference, rule)).ok:
+                raise SystemFault(f"No method can be checked: {rule}: {_REFERENCE} {control.seen}.", _SEE_DOCTOR)
+            yield result
 
 
 def _check_rule(method: RemoteMethod, rule: str) -> RuleResult:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from harness.core.fault_report import find_system_fault
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
 from harness.testing.contract_case import ContractCase, make_case
@@ -50,7 +51,7 @@ def check_rules(method: Method) -> Iterator[RuleResult]:
 
 
 def check_rule(case: ContractCase, rule: str) -> RuleResult:
-    """Check one rule; an exception in the method counts as a violation."""
+    """Check one rule; an exception in the method counts as a violation. SystemFault where no method is to blame."""
     try:
         return RuleResult(rule, True, RULES[rule](case))
     except RuleViolation as violation:
@@ -58,4 +59,6 @@ def check_rule(case: ContractCase, rule: str) -> RuleResult:
     except (Exception, SystemExit) as error:  # a method may raise anything
         if was_interrupted(error):
             raise
+        if fault := find_system_fault(error):
+            raise fault from error
         return RuleResult(rule, False, f"raised {type(error).__name__}: {error}")

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from harness.core.child_process import FunctionProcess, PythonProcess, run_python
-from harness.errors import HarnessError
 from tests.processes import is_running, wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
@@ -129,7 +128,7 @@ def test_a_child_ends_with_a_program_that_is_killed(kind: str, tmp_path: Path) -
 
 def test_what_a_program_prints_is_returned_and_its_failure_told() -> None:
     assert run_python("calendar", "2026", "11").split()[:2] == ["November", "2026"]
-    with pytest.raises(HarnessError, match="No module named no_such_module"):
+    with pytest.raises(RuntimeError, match="No module named no_such_module"):
         run_python("no_such_module")
 
 

@@ -1,11 +1,13 @@
 """The contract suite survives what a method from outside does to its process."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from harness.cli import main
 from harness.experiment.isolation import Isolation
+from harness.experiment.worker_process import close_fork_server
 from harness.testing.check_process import check_rules_apart
 from harness.testing.method_checks import check_rules
 from harness.testing.rules import RULES
@@ -29,3 +31,28 @@ def test_a_method_that_ends_its_process_violates_the_rules_instead_of_passing(
 def test_the_findings_are_those_of_this_process() -> None:
     apart = list(check_rules_apart(method_name(Honest), Isolation()))
     assert apart == list(check_rules(Honest()))
+
+
+BROKEN = """
+import harness.core.rotations
+
+def about_z(angle_rad):
+    raise RuntimeError("the installation is broken")
+
+harness.core.rotations.about_z = about_z
+"""
+
+
+@pytest.mark.long
+def test_a_rule_that_no_method_can_satisfy_is_a_fault_of_the_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Python runs `sitecustomize` first; this one breaks a function in every process that is started."""
+    (tmp_path / "sitecustomize.py").write_text(BROKEN)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    close_fork_server()
+    try:
+        assert main(["check", method_name(Honest), "--json"]) == 5
+    finally:
+        close_fork_server()
+    assert json.loads(capsys.readouterr().out)["outcome"] == "failed"

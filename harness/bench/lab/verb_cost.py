@@ -7,14 +7,13 @@ boxing, of which `validate` needs the true motion.
 """
 
 import json
-import subprocess
 import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from harness.bench.peak_memory import peak_bytes
-from harness.core.python_process import python_command, python_environment
+from harness.core.child_process import run_python
 
 BOXING_KIND = "none_validated"
 """Kind of the planted captures that are validated."""
@@ -32,11 +31,8 @@ class VerbCost:
 
 def measure_verb(verb: str, capture: Path, seed: int = 0) -> VerbCost:
     """The cost of `characterize` or `validate` for a capture; RuntimeError when it fails."""
-    command = python_command("-m", "harness.bench.lab.verb_cost", verb, str(capture), str(seed))
-    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"{verb} in its own process: {done.stderr.strip()[-2000:]}")
-    return VerbCost(**json.loads(done.stdout.splitlines()[-1]))
+    output = run_python("harness.bench.lab.verb_cost", verb, str(capture), str(seed))
+    return VerbCost(**json.loads(output.splitlines()[-1]))
 
 
 def run_verb(verb: str, capture: Path, seed: int) -> VerbCost:

@@ -7,7 +7,6 @@ that load on the machine affects all equally. Memory is the peak of a process of
 
 import hashlib
 import math
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -21,8 +20,8 @@ from harness.body import mounts, retargeting
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import Mount
+from harness.core.child_process import run_python
 from harness.core.motion import BodyMotion
-from harness.core.python_process import python_command, python_environment
 from harness.mocap import synthetic
 from harness.simulate.components.clock import Clock
 from harness.simulate.noise import Noise, noise_preset
@@ -117,11 +116,7 @@ def _block_row(body: Body, take: BodyMotion, seed: int) -> BenchmarkRow:
 
 
 def _measure_peak(kind: str, seconds: float, seed: int) -> int:
-    command = python_command("-m", "harness.bench.physics.speed", kind, str(seconds), str(seed))
-    done = subprocess.run(command, env=python_environment(), capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"{kind} in its own process: {done.stderr.strip()[-2000:]}")
-    return int(done.stdout)
+    return int(run_python("harness.bench.physics.speed", kind, str(seconds), str(seed)))
 
 
 def _time_call(work: Callable[[], object]) -> float:
