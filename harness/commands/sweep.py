@@ -9,7 +9,7 @@ from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, progress_note
 from harness.commands.isolation_flags import add_isolation_flags, isolation_words, read_isolation
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 _DEFAULT_CLUSTER_WORKERS = 64
@@ -64,7 +64,8 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     summary = read_summary_json(out)
     if args.cell in summary["failures"]:
         print(summary["failures"][args.cell], file=sys.stderr)
-    page = write_sweep_page(out)
+    with show_steps("parts of the report"):
+        page = write_sweep_page(out)
     files = (f"table: {out / 'summary.csv'}", f"report: {page}")
     following = [] if outcome is Outcome.PASS else ["status", out]
     content = {**summary, "out": str(out), "report": str(page)}
