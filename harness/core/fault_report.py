@@ -32,7 +32,13 @@ _ADVICE = {
     errno.ENOMEM: "Free some memory or use fewer --jobs, then give the same command again.",
 }
 
-_SETTINGS_PREFIX = {"matplotlib": "MPL", "mujoco": "MUJOCO_", "numba": "NUMBA_", "tqdm": "TQDM_"}
+_SETTINGS_PREFIX = {
+    "matplotlib": "MPL",
+    "mujoco": "MUJOCO_",
+    "numba": "NUMBA_",
+    "numpy": "SOURCE_DATE_EPOCH",
+    "tqdm": "TQDM_",
+}
 """Library -> the beginning of the names of its environment variables."""
 
 
