@@ -18,6 +18,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
 
+from harness.core.cache_folder import cache_folder
 from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
@@ -97,8 +98,9 @@ def library_folders() -> tuple[Path, ...]:
 
 @cache
 def foreign_folders() -> tuple[Path, ...]:
-    """Folders whose files are no method's own: the harness, its data, Python and installed packages."""
+    """Folders whose files are no method's own: the harness, its data and cache, Python and installed packages."""
     ours = [PACKAGE_FOLDER, *(PACKAGE_FOLDER.parent / name for name in ("models", "scenarios"))]
+    ours += [folder for folder in [cache_folder()] if folder is not None]
     python = [Path(prefix) for prefix in (sys.prefix, sys.base_prefix)]
     return tuple(dict.fromkeys([*ours, *python, *(p.resolve() for p in (*ours, *python)), *library_folders()]))
 
