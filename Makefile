@@ -41,18 +41,18 @@ docs: $(VENV)/.dev
 $(VENV)/.ready: pyproject.toml requirements.lock
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --constraint requirements.lock --editable '.[viz,test]'
+	$(BIN)/python -m pip install --disable-pip-version-check --constraint requirements.lock --editable '.[viz,test]'
 	touch $@
 
 compiled: $(VENV)/.compiled
 
 $(VENV)/.compiled: $(VENV)/.ready
-	@echo 'compiling the inner loops once, for about a minute'
+	@echo 'compiling the inner loops once, for about a minute (docs/installation.md)'
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m harness.testing.compile_all
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.ready
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --constraint requirements.lock --editable '.[viz,test,dev]'
+	$(BIN)/python -m pip install --disable-pip-version-check --constraint requirements.lock --editable '.[viz,test,dev]'
 	touch $@
 
 clean:

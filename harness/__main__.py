@@ -1,7 +1,11 @@
 """`python -m harness` is the command `harness`. `python -P -m harness` never looks into the working folder."""
 
-import os
 import sys
+
+if __name__ == "__main__":  # modules that are imported from here on do not come from the working folder
+    working_folder = "" if sys.flags.safe_path else sys.path.pop(0)
+
+import os
 import time
 from threading import Thread
 
@@ -45,5 +49,5 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
-    leave_working_folder_out()
+    leave_working_folder_out(working_folder)
     sys.exit(main())

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 ACCURACY = "accuracy"
@@ -91,7 +91,8 @@ def _bench_truth(args: argparse.Namespace) -> Outcome:
         rows = truth_rows(seeds, progress)
         models = compare_error_models(seeds, progress)
     comparison = ErrorModelComparison(models, tuple(rows), this_command(), LIMIT_M, MERGE_S, SEGMENT_S)
-    page = write_physics_page(out / "report.html", comparison)
+    with show_steps("parts of the report"):
+        page = write_physics_page(out / "report.html", comparison)
     content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "page": str(page)}
     lines = [*truth_lines(rows), result_sentence("the physical simulation", rows), f"report: {page}"]
     return print_result(args, content, *lines)

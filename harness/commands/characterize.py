@@ -19,7 +19,7 @@ from harness.commands.common import (
     this_command,
 )
 from harness.core.package_data import VERSION
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -88,7 +88,8 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     }
     if args.out is not None:
         write_unit_file(args.out, found.unit, force=args.force)
-        page = write_unit_page(args.out.with_suffix(".html"), report)
+        with show_steps("parts of the report"):
+            page = write_unit_page(args.out.with_suffix(".html"), report)
         lines += [f"unit file: {args.out}", f"report: {page}"]
         content |= {"unit_file": str(args.out), "page": str(page)}
     return print_result(args, content, *lines)

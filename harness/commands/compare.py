@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result, this_words
+from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
 _SIDE_HELP = "the folder of a run, sweep or baseline, or the name of a baseline"
@@ -44,7 +45,8 @@ def run_compare(args: argparse.Namespace) -> Outcome:
         metrics=args.metrics.split(",") if args.metrics else GATED_METRICS,
         allow=args.allow.split(",") if args.allow else None,
     )
-    page = write_comparison_page(comparison, args.html) if args.html else None
+    with show_steps("parts of the report"):
+        page = write_comparison_page(comparison, args.html) if args.html else None
     content = {**to_json_types(asdict(comparison)), "page": page and str(page)}
     lines = [text(comparison), *([f"page: {page}"] if page else [])]
     following = () if page else (*this_words(), "--html", "comparison.html")

@@ -43,11 +43,14 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     if args.out is not None and args.out.exists() and not args.force:
         raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")
     constellation = _load(args.file)
-    content = _content(args, constellation)
     from harness.core.files import write_text
+    from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page
 
-    html = coverage_page(content)
+    with show_steps("parts"):
+        report_step("coverage")
+        content = _content(args, constellation)
+        html = coverage_page(content)
     page.parent.mkdir(parents=True, exist_ok=True)
     write_text(page, html)
     lines = [f"{content.emitters}; {content.reach}; {content.turn}", *place_table(content.rows).lines()]

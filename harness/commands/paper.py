@@ -15,7 +15,7 @@ from harness.commands.common import (
     this_command,
     this_words,
 )
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
 
@@ -61,7 +61,8 @@ def run_paper(args: argparse.Namespace) -> Outcome:
             command=this_command(),
             progress=bar,
         )
-    page = write_paper_page(out)
+    with show_steps("parts of the report"):
+        page = write_paper_page(out)
     content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     following = [] if outcome is Outcome.PASS else [*this_words()]
     lines = (text_tables(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")

@@ -19,7 +19,7 @@ from harness.commands.common import (
     this_command,
     this_words,
 )
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ def run_placement(args: argparse.Namespace) -> Outcome:
             progress=bar,
             announce=_announce,
         )
-    page = write_placement_page(out)
+    with show_steps("parts of the report"):
+        page = write_placement_page(out)
     answer = sentence(findings)
     content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     lines = (text(findings), "", f"findings: {out / placement_study.FINDINGS}", f"report: {page}", answer)

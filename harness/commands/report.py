@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 
@@ -34,7 +34,7 @@ def run_report(args: argparse.Namespace) -> Outcome:
         return _report_sweep(args)
     from harness.report.run.writer import write_run_page
 
-    with ProgressBar("movies") as bar:
+    with show_steps("parts of the report"), ProgressBar("movies") as bar:
         page = write_run_page(args.run, movie=args.movie, progress=bar)
     return print_result(
         args, {"report": str(page)}, f"report: {page}", following=["plot", args.run, "--kind", "ranking"]
@@ -48,7 +48,8 @@ def _report_sweep(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             f"--movie with {args.run}, a sweep.", "Movies show cells of a run: name the folder of `harness run`."
         )
-    page = write_sweep_page(args.run)
+    with show_steps("parts of the report"):
+        page = write_sweep_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}")
 
 
@@ -64,7 +65,8 @@ def _report_findings(args: argparse.Namespace) -> Outcome:
             f"--movie or --readme with {args.run}, a placement study.",
             "--movie is for runs, --readme for papers: leave it out.",
         )
-    page = write_placement_page(args.run)
+    with show_steps("parts of the report"):
+        page = write_placement_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}", following=["plot", args.run])
 
 
@@ -77,7 +79,8 @@ def _report_paper(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             "--movie with a paper's folder.", "Movies show cells of a run: name the folder of one of its runs."
         )
-    page = write_paper_page(args.run)
+    with show_steps("parts of the report"):
+        page = write_paper_page(args.run)
     if args.readme:
         update_readme(args.readme, read_findings(args.run / FINDINGS))
     lines = [f"report: {page}", *([f"tables: {args.readme}"] if args.readme else [])]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result, progress_note, this_command
 from harness.commands.isolation_flags import add_isolation_flags, read_isolation
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
 
@@ -65,7 +65,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         from harness.report.run.writer import write_run_page
 
         print("writing the report", file=sys.stderr)
-        with ProgressBar("movies") as bar:
+        with show_steps("parts of the report"), ProgressBar("movies") as bar:
             page = write_run_page(out, movie=args.movie, progress=bar)
     summary = read_summary(out)
     content = {**summary, "out": str(out), "report": page and str(page)}

@@ -6,7 +6,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
 
@@ -52,6 +52,7 @@ def run_trust(args: argparse.Namespace) -> Outcome:
             progress=bar,
         )
     report = TrustReport(study.findings, this_command())
-    page = write_trust_page(out / "report.html", report)
+    with show_steps("parts of the report"):
+        page = write_trust_page(out / "report.html", report)
     content = {**to_json_types(asdict(study.findings)), "out": str(out), "report": str(page)}
     return print_result(args, content, format_trust(report), "", f"report: {page}", outcome=study.findings.outcome)

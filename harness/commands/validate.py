@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result, this_command
-from harness.core.progress import ProgressBar
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 
@@ -74,7 +74,8 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     lines = [format_validation(report)]
     if args.out is not None:
         write_unit_file(args.out, session_unit(found, expected, args.out.stem), force=args.force)
-        page = write_validation_page(args.out.with_suffix(".html"), report)
+        with show_steps("parts of the report"):
+            page = write_validation_page(args.out.with_suffix(".html"), report)
         lines += [f"unit file: {args.out}", f"report: {page}"]
         content |= {"unit_file": str(args.out), "page": str(page)}
     failures = {one.method: one.failure for one in scores if one.failure}

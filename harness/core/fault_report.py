@@ -34,6 +34,15 @@ _ADVICE = {
     errno.ENOMEM: "Free some memory or use fewer --jobs, then give the same command again.",
 }
 
+_SETTINGS_PREFIX = {
+    "matplotlib": "MPL",
+    "mujoco": "MUJOCO_",
+    "numba": "NUMBA_",
+    "numpy": "SOURCE_DATE_EPOCH",
+    "tqdm": "TQDM_",
+}
+"""Library -> the beginning of the names of its environment variables."""
+
 
 def is_system_fault(error: OSError) -> bool:
     """Whether an error is the system's, such as a full disk, and not of the name that was given."""
@@ -86,11 +95,24 @@ def describe_fault(error: BaseException) -> tuple[str, str]:
         case sqlite3.Error():
             cause = f"index.sqlite cannot be used ({error})."
             advice = _CHECK_DISK
+        case _ if settings := _library_settings(error):
+            cause = f"a library failed ({type(error).__name__}: {error}) where {settings} is set."
+            advice = "Unset it, then give the same command again."
         case _:
             cause = f"a defect of the program ({type(error).__name__}: {error})."
             advice = "Please report it with the traceback."
     cause = " ".join(cause.split())
     return cause if len(cause) <= MAX_CAUSE_CHARACTERS else f"{cause[: MAX_CAUSE_CHARACTERS - 1]}…", advice
+
+
+def _library_settings(error: BaseException) -> str:
+    """The environment variables of the library in which an error arose, as NAME=VALUE; "" if there are none."""
+    frame = error.__traceback__
+    while frame is not None and frame.tb_next is not None:
+        frame = frame.tb_next
+    library = str(frame.tb_frame.f_globals.get("__name__")).partition(".")[0] if frame else ""
+    prefix = _SETTINGS_PREFIX.get(library)
+    return " and ".join(f"{k}={v}" for k, v in sorted(os.environ.items()) if prefix and k.startswith(prefix))
 
 
 def save_traceback(error: BaseException) -> str:

@@ -1,11 +1,31 @@
 """Progress of long work on a terminal."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 ProgressCallback = Callable[[str, int, int], None]
 """Called with the name of the last step, or of the present one, the number of finished steps and of planned ones."""
+
+_observer: ContextVar[Callable[[str], None]] = ContextVar("observer", default=lambda step: None)
+
+
+def report_step(step: str) -> None:
+    """Tell the bar of `show_steps`, if there is one, what is done next."""
+    _observer.get()(step)
+
+
+@contextmanager
+def show_steps(unit: str) -> Iterator[None]:
+    """Show a bar that counts the steps which code in the block reports, however deep it is called."""
+    with ProgressBar(unit) as bar:
+        token = _observer.set(bar.count)
+        try:
+            yield
+        finally:
+            _observer.reset(token)
 
 
 class ProgressBar:

@@ -44,15 +44,12 @@ def safe_import_path() -> Iterator[None]:
             os.environ[_SAFE_PATH] = before
 
 
-def leave_working_folder_out() -> None:
-    """Take the working folder, which `python -m` puts first, off the import path of this process.
+def leave_working_folder_out(folder: str) -> None:
+    """Leave the working folder, which `python -m` puts first and `__main__` takes off, out of the import path.
 
     A checkout of the harness that is the working folder moves behind the standard library, so that worker processes
-    import the same harness.
+    import the same harness. "" stands for no folder.
     """
-    if sys.flags.safe_path:
-        return
-    folder = sys.path.pop(0)
-    if Path(folder).resolve() == PACKAGE_FOLDER.parent.resolve():
+    if folder and Path(folder).resolve() == PACKAGE_FOLDER.parent.resolve():
         sites = [place for place, name in enumerate(sys.path) if Path(name).name in _SITE_FOLDERS]
         sys.path.insert(sites[0] if sites else len(sys.path), folder)

@@ -58,7 +58,7 @@ def name_module(module: str) -> None:
 
 
 def leave_relative_folders_out() -> None:
-    """Take relative folders of PYTHONPATH off the import path; an empty one, as `:` at an end makes it, is this folder."""
+    """Take relative folders of PYTHONPATH off the import path; `:` at an end adds an empty one, the working folder."""
     entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     relative = {os.path.abspath(entry) for entry in entries if not os.path.isabs(entry)} - {*entries}
     library = os.path.dirname(os.__file__)

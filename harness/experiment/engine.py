@@ -233,6 +233,7 @@ def _run_tasks(
     index.reset(names if index.facts().get("sources") != sources else [name for name in names if name in failed])
     index.note(sources=sources, started_s=time.time(), made=0)
     count = CellCount(out, lambda last, ended: progress(last, ended, len(names)))
+    progress("", 0, len(names))  # a bar is there while the first cells compile
     stop, outcomes, made = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, CellOutcome](), 0
 
     def record(cell: CellOutcome) -> None:

@@ -18,7 +18,11 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
 
+<<<<<<< HEAD
 from harness.core.input_file import check_input_file
+=======
+from harness.core.cache_folder import cache_folder
+>>>>>>> h/install
 from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
@@ -98,8 +102,9 @@ def library_folders() -> tuple[Path, ...]:
 
 @cache
 def foreign_folders() -> tuple[Path, ...]:
-    """Folders whose files are no method's own: the harness, its data, Python and installed packages."""
+    """Folders whose files are no method's own: the harness, its data and cache, Python and installed packages."""
     ours = [PACKAGE_FOLDER, *(PACKAGE_FOLDER.parent / name for name in ("models", "scenarios"))]
+    ours += [folder for folder in [cache_folder()] if folder is not None]
     python = [Path(prefix) for prefix in (sys.prefix, sys.base_prefix)]
     return tuple(dict.fromkeys([*ours, *python, *(p.resolve() for p in (*ours, *python)), *library_folders()]))
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.body.mounts import DEFAULT_MOUNTS
 from harness.body.retargeting import retarget_to_own_body
+from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError
 from harness.mocap import synthetic
 from harness.reconstruct import registry
@@ -22,17 +23,18 @@ from harness.testing.contract_case import keep_positions, make_case, run_session
 _FRAMES = 8
 
 
-def compile_all() -> None:
+def compile_all(progress: ProgressCallback = lambda name, done, planned: None) -> None:
     """Run every registered method on a few frames; HarnessError when an estimate is not finite."""
-    for name in (*registry.methods(), "ik[align=true]"):
-        if ":" in name:  # a preset of the same code
-            continue
+    names = [name for name in (*registry.methods(), "ik[align=true]") if ":" not in name]  # a preset is the same code
+    for done, name in enumerate(names):
+        progress(name, done, len(names) + 1)
         case = make_case(registry.resolve(name))
         frames: list[TrackerFrame] = list(case.frames[:_FRAMES])
         for readings in (frames, [keep_positions(frame) for frame in frames]):
             estimates = run_session(case.reconstructor.begin(case.calibration), readings)
             if not all(np.isfinite(estimate.qpos).all() for estimate in estimates):
                 raise HarnessError(f"{name} returned an estimate that is not finite.")
+    progress("physical tracker", len(names), len(names) + 1)
     _simulate_physical_tracker()
 
 
@@ -44,5 +46,9 @@ def _simulate_physical_tracker() -> None:
     simulate_tracker(body, take, [DEFAULT_MOUNTS["right_hand"]], TrackerConfig(), noise, seed=1)
 
 
+def _print_step(name: str, done: int, planned: int) -> None:
+    print(f"  compiling {name} ({done + 1} of {planned})", flush=True)
+
+
 if __name__ == "__main__":
-    compile_all()
+    compile_all(_print_step)

@@ -20,6 +20,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.core.motion import BodyMotion, Clip
+from harness.core.progress import report_step
 from harness.core.skeleton import Skeleton
 from harness.errors import HarnessError
 from harness.mocap import synthetic
@@ -31,6 +32,7 @@ from harness.score.null_methods import score_null_methods
 from harness.score.score import Scores, score_estimate
 from harness.simulate import noise
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
+from harness.testing.compilation_check import check_compilation, describe_cache
 from harness.testing.device_checks import check_emulated_device, describe_serial_ports
 from harness.testing.results_checks import check_results
 
@@ -78,15 +80,26 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
 
     A missing optional part is listed and is not a failure. A named library that cannot be read is a failure.
     """
+    report_step("compilation")
+    compilation = _check_compilation()
+    report_step("scores")
     clips = [synthetic.generate(b, "p1", 1, seed=1, duration_s=6.0) for b in synthetic.BEHAVIOURS]
     takes = [retargeting.retarget_to_own_body(clip)[1] for clip in clips]
+    scores = check_scores(takes)
+    report_step("stream")
+    stream = _check_stream(clips[0])
+    report_step("results")
+    results = [InstallationCheck(*check) for check in check_results()]
+    report_step("device")
+    device = _check_device()
+    report_step("optional parts")
+    return [*compilation, *scores, stream, *results, *device, *_check_optional_parts(), _check_library(folder)]
+
+
+def _check_compilation() -> list[InstallationCheck]:
     return [
-        *check_scores(takes),
-        _check_stream(clips[0]),
-        *(InstallationCheck(*check) for check in check_results()),
-        *_check_device(),
-        *_check_optional_parts(),
-        _check_library(folder),
+        InstallationCheck("functions are compiled", *check_compilation()),
+        InstallationCheck("machine code", True, describe_cache()),
     ]
 
 
@@ -120,6 +133,9 @@ def _check_stream(clip: Clip) -> InstallationCheck:
 def _check_optional_parts() -> list[InstallationCheck]:
     missing = _rendering_problem()
     checks = [InstallationCheck("rendered pictures", True, f"missing: {missing}" if missing else "available")]
+    if renderer := os.environ.get("MUJOCO_GL"):
+        unused = f"MUJOCO_GL={renderer} has no effect: pictures are drawn by VTK"
+        checks.append(InstallationCheck("renderer of MuJoCo", True, unused))
     for module, purpose in OPTIONAL_PACKAGES.items():
         installed = importlib.util.find_spec(module) is not None
         detail = "available" if installed else f"missing: {module} is not installed"

@@ -8,7 +8,8 @@ uses the fixture.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 
     root, options = request.config.rootpath, request.config.option
     out = root / options.harness_out if options.harness_out else tmp_path_factory.getbasetemp() / "harness"
-    gate = RegressionGate(out, root / options.harness_baselines, command=f"pytest {request.node.nodeid}")
+    baselines = root / options.harness_baselines
 
     def gate_method(
         method: str,
@@ -53,12 +54,18 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
         __tracebackhide__ = True
         serve_folder(str(root))  # as on the command line, methods may lie there
         try:
-            if options.harness_save:
-                folder = gate.save_baseline(method, baseline, scenario=scenario)
-                pytest.skip(f"saved as baseline {folder}; nothing was compared")
-            result = gate.check(method, baseline, against=baseline_method, metrics=metrics)
+            with _gate_progress(request.config, method) as progress:
+                gate = RegressionGate(out, baselines, f"pytest {request.node.nodeid}", progress)
+                if options.harness_save:
+                    folder = gate.save_baseline(method, baseline, scenario=scenario)
+                else:
+                    result = gate.check(method, baseline, against=baseline_method, metrics=metrics)
         except HarnessError as error:
             raise pytest.fail.Exception(f"harness: {error}", pytrace=False) from None
+        if options.harness_save:
+            saved = f"{method} was saved as baseline {folder}; nothing was compared"
+            request.node.user_properties.append(("harness.saved", saved))
+            pytest.skip(saved)
         request.node.user_properties += result.properties()  # `record_property` would warn without need
         if not result.passed:
             pytest.fail(str(result), pytrace=False)
@@ -66,8 +73,38 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     return gate_method
 
 
+@contextmanager
+def _gate_progress(config: pytest.Config, method: str) -> Iterator[Callable[[str, int, int], None]]:
+    """Say that a gate runs, which takes minutes; yields what shows its progress where pytest prints to a terminal."""
+    from harness.core.progress import ProgressBar
+
+    plugin = config.pluginmanager.get_plugin
+    capture, terminal = plugin("capturemanager"), plugin("terminalreporter")
+    if capture is None or terminal is None:  # a worker of pytest-xdist prints nothing
+        yield lambda last, done, planned: None
+        return
+    bar = ProgressBar("cells")
+
+    def show(last: str, done: int, planned: int) -> None:
+        with capture.global_and_fixture_disabled():
+            bar(last, done, planned)
+
+    with capture.global_and_fixture_disabled():
+        terminal.ensure_newline()
+        terminal.write_line(f"harness: running {method}, which takes minutes")
+    try:
+        yield show
+    finally:
+        with capture.global_and_fixture_disabled():
+            bar.__exit__()
+
+
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """On GitHub, print the results of regression gates as annotations beside the tests."""
+    """Print which baselines were saved; on GitHub, print the results of regression gates beside the tests."""
+    for report in terminalreporter.getreports("skipped"):
+        for name, value in getattr(report, "user_properties", ()):
+            if name == "harness.saved":
+                terminalreporter.write_line(f"harness: {value}")
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):

@@ -14,6 +14,7 @@ from harness.compare.comparison import Comparison, compare_results
 from harness.compare.margins import GATED_METRICS, margin_of
 from harness.core.fields import build
 from harness.core.files import content_key
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
@@ -65,6 +66,8 @@ class RegressionGate:
     baselines: Path = BASELINES
     command: str = ""
     """The command that reproduces the run, for its manifest."""
+    progress: ProgressCallback = lambda cell, done, planned: None
+    """Called as cells end."""
 
     def check(
         self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] = GATED_METRICS
@@ -126,7 +129,7 @@ class RegressionGate:
     def _run(self, scenario: Scenario) -> Path:
         out = self.out / f"{scenario.name}-{content_key(repr(scenario))[:12]}"
         with _single_threaded():
-            engine.run(scenario, out, jobs=2, command=self.command)
+            engine.run(scenario, out, jobs=2, command=self.command, progress=self.progress)
         return out
 
 

@@ -50,7 +50,7 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     out = tmp_path / "run"
     outcome = engine.run(SMALL, out, progress=lambda cell, done, planned: seen.append((done, planned)))
     assert outcome is Outcome.PASS
-    assert seen == [(k, 4) for k in (1, 2, 3, 4)]
+    assert seen == [(k, 4) for k in (0, 1, 2, 3, 4)]
     found = {(row["method"], row["clip"]): row for row in rows(out)}
     assert set(found) == {(m, c) for m in SMALL.methods for c in SMALL.motion.test}
     for (method, _), row in found.items():

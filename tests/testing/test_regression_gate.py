@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from harness.compare import baseline
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
@@ -52,11 +53,12 @@ def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any
     return write_run(out, replace(sides, manifest=of_it))
 
 
-def run(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
+def run(scenario: Scenario, out: Path, *, jobs: int, command: str, progress: ProgressCallback) -> Outcome:
     """Instead of `engine.run`, in processes that have one thread each."""
     assert jobs > 1
     assert os.environ["OMP_NUM_THREADS"] == os.environ["OPENBLAS_NUM_THREADS"] == "1"
     measured(scenario, out, command=command)
+    progress("the last cell", 8, 8)
     return Outcome.PASS
 
 
@@ -105,7 +107,7 @@ def test_other_metrics_may_be_chosen(project: pytest.Pytester) -> None:
 
 
 def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    def otherwise(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
+    def otherwise(scenario: Scenario, out: Path, **_: Any) -> Outcome:
         measured(scenario, out, defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}})
         return Outcome.PASS
 
@@ -121,7 +123,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
 def test_cells_that_failed_are_told_with_their_traceback(
     project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def failing(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
+    def failing(scenario: Scenario, out: Path, **_: Any) -> Outcome:
         measured(scenario, out, failed=("mine:Mine on walk_09",))
         return Outcome.INCOMPLETE
 
@@ -149,9 +151,14 @@ def test_what_cannot_be_gated_fails_in_one_line(project: pytest.Pytester, call: 
 
 def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> None:
     source = ONE.format(", scenario='demo'").replace("'main'", "'fresh'")
-    result = gated(project, source, "--harness-save", "-rs")
+    result = gated(project, source, "--harness-save")
     result.assert_outcomes(skipped=1)
-    result.stdout.fnmatch_lines(["SKIPPED*saved as baseline *results/baselines/fresh; nothing was compared"])
+    result.stdout.fnmatch_lines(
+        [
+            "harness: running mine:Mine, which takes minutes",
+            "harness: mine:Mine was saved as baseline *results/baselines/fresh; nothing was compared",
+        ]
+    )
     kept = load_results(project.path / "results/baselines/fresh")
     assert {cell.method for cell in kept.cells} == {"mine:Mine"}
     assert kept.manifest.inputs["name"] == "demo"

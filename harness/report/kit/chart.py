@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.plain_import import plain_import
+from harness.core.progress import report_step
 from harness.report.kit.hover_chart import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 
@@ -49,6 +50,7 @@ def draw_chart(
     lines under the pointer and switches them off in the legend. `titles` are shown under the pointer too: gid of an
     element -> text.
     """
+    report_step(title)
     with plain_import():
         import matplotlib
     from matplotlib.figure import Figure

@@ -15,11 +15,26 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.core.files import TEMPORARY
+<<<<<<< HEAD
 from harness.core.progress import ProgressCallback
+=======
+from harness.core.interrupts import shield_children
+from harness.core.progress import ProgressCallback, report_step
+from harness.core.python_process import python_command, python_environment
+>>>>>>> h/install
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
 """Time allowed for the start, and for each picture [s]."""
+<<<<<<< HEAD
+=======
+_POLL_INTERVAL_S = 0.5
+_OPENGL_VARIABLES = (
+    *("DISPLAY", "EGL_PLATFORM", "GALLIUM_DRIVER", "LIBGL_DRIVERS_PATH", "MESA_LOADER_DRIVER_OVERRIDE"),
+    *("VTK_DEFAULT_OPENGL_WINDOW", "__EGL_VENDOR_LIBRARY_FILENAMES"),
+)
+"""Environment variables that decide how VTK finds OpenGL."""
+>>>>>>> h/install
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +83,7 @@ class RenderProcess:
         Pictures that were finished before a failure are kept.
         """
         if self._process is not None:
+            report_step("rendered pictures")
             frames = sum(len(job.truth_qpos) for job in self._jobs)
 
             def look() -> None:
@@ -129,9 +145,13 @@ def _missing_package(jobs: Sequence[RenderJob]) -> str:
 
 
 def describe_exit(code: int, stderr: str) -> str:
-    """Why the renderer ended, in one line: the signal, or the last line of its stderr."""
+    """Why the renderer ended, in one line: the signal, or the last line of its stderr, and settings of OpenGL."""
+    settings = " and ".join(f"{name}={os.environ[name]}" for name in _OPENGL_VARIABLES if os.environ.get(name))
+    where = f" where {settings} is set" if settings else ""
     if code < 0:
         name = signal.Signals(-code).name
-        return f"the renderer was killed by {name}; does this machine have OpenGL (EGL) for off-screen rendering?"
+        return (
+            f"the renderer was killed by {name}{where}; does this machine have OpenGL (EGL) for off-screen rendering?"
+        )
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    return f"the renderer failed ({lines[-1] if lines else f'exit code {code}'})"
+    return f"the renderer failed{where} ({lines[-1] if lines else f'exit code {code}'})"

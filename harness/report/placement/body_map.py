@@ -15,6 +15,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.plain_import import plain_import
+from harness.core.progress import report_step
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
@@ -79,6 +80,7 @@ def render_body(
     places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
+    report_step("rendered body")
     with plain_import():
         from matplotlib import colormaps
 
