@@ -57,8 +57,8 @@ from harness.study.placement.config import base_scenario, load_placement_study, 
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
-from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.c3d_bytes import c3d_bytes
+from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
 from tests.reconstruct.database.test_motion_database import make_take
 from tests.report import fabricate, fabricate_paper, fabricate_placement, fabricate_sweep
