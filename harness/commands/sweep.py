@@ -7,15 +7,9 @@ import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
-<<<<<<< HEAD
 from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, repeat_flags
 from harness.commands.isolation_flags import add_isolation_flags, read_isolation
-from harness.core.progress import ProgressBar
-=======
-from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, progress_note
-from harness.commands.isolation_flags import add_isolation_flags, isolation_words, read_isolation
 from harness.core.progress import ProgressBar, show_steps
->>>>>>> h/install
 from harness.errors import BadInput, Outcome
 
 _DEFAULT_CLUSTER_WORKERS = 64
@@ -70,15 +64,10 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     summary = read_summary_json(out)
     if args.cell in summary["failures"]:
         print(summary["failures"][args.cell], file=sys.stderr)
-<<<<<<< HEAD
-    page = write_sweep_page(out)
-    notes = [summary["line_loss"]] if "line_loss" in summary else []
-    files = (*notes, f"table: {out / 'summary.csv'}", f"report: {page}")
-=======
     with show_steps("parts of the report"):
         page = write_sweep_page(out)
-    files = (f"table: {out / 'summary.csv'}", f"report: {page}")
->>>>>>> h/install
+    notes = [summary["line_loss"]] if "line_loss" in summary else []
+    files = (*notes, f"table: {out / 'summary.csv'}", f"report: {page}")
     following = [] if outcome is Outcome.PASS else ["status", out]
     content = {**summary, "out": str(out), "report": str(page)}
     return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome, following=following)

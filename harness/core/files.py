@@ -1,13 +1,16 @@
 """JSON with the same text for the same content, atomic writers, and one reader each for JSON and TOML."""
 
+import glob
 import hashlib
 import json
 import math
 import os
+import socket
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +76,35 @@ def digest(*arrays: NDArray[Any]) -> str:
 
 def temporary_path(path: Path) -> Path:
     """The name under which this process writes a file or folder before it moves it to `path`."""
-    return path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+    return path.with_name(f"{TEMPORARY}{_host()}{os.getpid()}-{path.name}")
+
+
+@cache
+def _host() -> str:
+    """Short name of this computer, as the beginning of its temporary names."""
+    return hashlib.blake2b(socket.gethostname().encode(), digest_size=4).hexdigest() + "-"
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Remove what dead processes of this computer left behind when they wrote this file."""
+    for leftover in path.parent.glob(f"{TEMPORARY}{_host()}*-{glob.escape(path.name)}"):
+        process = leftover.name.removeprefix(TEMPORARY + _host()).removesuffix(f"-{path.name}")
+        if process.isdecimal() and not _is_alive(int(process)):
+            with suppress(OSError):
+                leftover.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process of this computer may still run; Windows cannot be asked without ending it."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def move_into_place(temporary: Path, path: Path, *, flush_name: bool = True) -> None:
@@ -111,6 +142,7 @@ def flush_together(paths: Iterable[Path]) -> None:
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary path to write a file to, which takes the place of `path` when the block ends without an error."""
     temporary = temporary_path(path)
+    _remove_leftovers(path)
     try:
         yield temporary
         move_into_place(temporary, path)

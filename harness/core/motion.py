@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from harness.core.arrays import Floats, freeze
 from harness.core.skeleton import Skeleton
+from harness.core.time_grid import require_rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class Clip:
     def __post_init__(self) -> None:
         freeze(self, root_m=("T", 3), world_from_root=("T", 4))
         freeze(self, angles_rad=(len(self.root_m), len(self.skeleton.axes)))
+        require_rate(self.rate_hz, len(self), self.name)
 
     def __len__(self) -> int:
         return len(self.root_m)

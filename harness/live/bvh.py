@@ -21,7 +21,8 @@ class BvhOutput:
     """An `Output` to a file with the joints, axes and units of `harness export --format bvh`.
 
     BVH has a constant rate and no times, so the last frame is repeated for dropped frames. After a gap of more than
-    10 s, or a reset of the device clock, no frame is repeated.
+    10 s, or a reset of the device clock, no frame is repeated. Frames are written before their count, so that a killed
+    process leaves a file with as many frames as announced, or a few more, which `harness.mocap.read.bvh` reads too.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton, rate_hz: float, *, force: bool = False) -> None:

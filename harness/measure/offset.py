@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
+from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
 
 
@@ -49,6 +50,7 @@ def angular_speed(time_s: Floats, quaternions: Floats, valid: Bools, period_s: f
     if not len(rows):
         raise BadInput("No pose has a time.", "Send time stamps with the records.")
     begin_s = float(time_s[rows].min())
+    count_steps(float(time_s[rows].max()) - begin_s, period_s, "Times of poses")
     place = np.round((time_s[rows] - begin_s) / period_s).astype(np.int64)
     turn, at_s = np.full((place.max() + 1, 4), np.nan), np.full(place.max() + 1, np.nan)
     turn[place], at_s[place] = quaternions[rows], time_s[rows]
@@ -71,6 +73,8 @@ def time_offset(
     if any(abs(series.period_s - period_s) > 1e-9 * period_s for series in (*first, *second)):
         raise BadInput("Angular speeds of different periods.", "Put all on one grid.")
     origin_a, origin_b = min(s.begin_s for s in first), min(s.begin_s for s in second)
+    for series, origin_s in ((first, origin_a), (second, origin_b)):
+        count_steps(max(s.begin_s for s in series) - origin_s, period_s, "Beginnings of the bodies' motion")
     lags: list[Floats] = []
     for a, b in zip(first, second, strict=True):
         lags.append(_sums(_padded(a, origin_a), _padded(b, origin_b)))

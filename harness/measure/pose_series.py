@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
+from harness.core.time_grid import require_seconds
 from harness.errors import BadInput
 
 _LONGEST_STEP = 4.0
@@ -51,6 +52,7 @@ class TruthPoses:
         freeze(self, position_m=(len(self.time_s), 3), world_from_body=(len(self.time_s), 4))
         if not np.all(np.diff(self.time_s) > 0.0):
             raise BadInput("Times of the reference do not rise.", "Sort its poses by time.")
+        require_seconds(self.time_s, "The reference")
 
 
 class TruthSpline:

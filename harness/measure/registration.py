@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
+from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.conventions import require_orientations, require_same_hand, require_scale
 from harness.measure.correlated_errors import ErrorProcess
@@ -227,6 +228,7 @@ def coarse_offset(
 
 def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
     """Angular speed of a reference, over steps of `period_s` as the device's."""
+    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
     grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
     return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
 

@@ -7,6 +7,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.runs import find_runs
+from harness.core.time_grid import count_steps
 from harness.stream.recording.station_readings import StationReadings
 
 MIN_REST_S = 5.0
@@ -108,6 +109,7 @@ def static_series(readings: StationReadings, rest: tuple[int, int], rate_hz: flo
     rows, place = rows[place >= 0], place[place >= 0]
     place, first = np.unique(place, return_index=True)
     rows = rows[first]
+    count_steps(float(place[-1]) / rate_hz, 1.0 / rate_hz, f"Stamps of {station}")
     count = int(place[-1]) + 1
     turn = readings.tracker_from_station[rows]
     valid = np.zeros(count, bool)

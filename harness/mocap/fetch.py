@@ -8,8 +8,11 @@ to crawl its site: name the subjects that are needed.
 
 import hashlib
 import re
+import secrets
+import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from http.client import HTTPException
 from importlib.resources import files
 from pathlib import Path
@@ -17,10 +20,13 @@ from urllib.error import HTTPError, URLError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
+from filelock import FileLock, Timeout
+
 from harness.core.csv_text import csv_line
 from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
+from harness.mocap.folder_scan import FETCHED
 from harness.mocap.index import INDEX_NAME, read_index
 from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
 
@@ -54,6 +60,7 @@ def fetch_cmu(
         names += _list_subject_files(subject.zfill(2), base_url)
     if not names:
         raise BadInput("No subject is named.", "For example: --subjects 13,14.")
+    _remove_leftovers(top)
     fetched = []
     for done, name in enumerate(names):
         progress(name, done, len(names))
@@ -138,15 +145,41 @@ def _fetch_file(name: str, top: Path, base_url: str) -> Path:
         raise BadInput(
             f"{path.parent} cannot be created ({error.strerror}).", "Name another folder with --out."
         ) from error
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".fetch-") as folder:
+    with _fetch_folder(path.parent) as folder:
         url = f"{base_url}/subjects/{name}"
         try:
-            new = _download(url, Path(folder) / path.name)
+            new = _download(url, folder / path.name)
         except _NotFound:
             raise BadInput(f"There is no {url}.", "Check that the site has the layout of CMU's.") from None
         _check_file(new, url, listed, path.parent)
         move_into_place(new, path)
     return path
+
+
+@contextmanager
+def _fetch_folder(parent: Path) -> Iterator[Path]:
+    """A folder for a file that is not checked yet. The lock beside it is held while this process lives."""
+    folder = parent / f"{FETCHED}{secrets.token_hex(8)}"
+    try:
+        with FileLock(f"{folder}.lock"):
+            folder.mkdir()
+            try:
+                yield folder
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        Path(f"{folder}.lock").unlink(missing_ok=True)
+
+
+def _remove_leftovers(top: Path) -> None:
+    """Remove the folders of fetches that were killed; those of a process that lives are locked."""
+    for folder in {path.with_name(path.name.removesuffix(".lock")) for path in top.glob(f"*/{FETCHED}*")}:
+        try:
+            with FileLock(f"{folder}.lock", timeout=0):
+                shutil.rmtree(folder, ignore_errors=True)
+        except Timeout:
+            continue
+        Path(f"{folder}.lock").unlink(missing_ok=True)
 
 
 def _check_file(new: Path, url: str, listed: str | None, folder: Path) -> None:

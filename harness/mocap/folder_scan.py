@@ -4,6 +4,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.core.files import TEMPORARY
+
+FETCHED = ".fetch-"
+"""Prefix of the names of folders of `harness mocap fetch`, which hold files before they are checked."""
+
 
 @dataclass(frozen=True)
 class FolderScan:
@@ -30,6 +35,8 @@ def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
             ignored.append(parent)
             continue
         for path in paths:
+            if path.name.startswith((TEMPORARY, FETCHED)):
+                continue  # a process writes there, or was killed while it did
             link = path.is_symlink()
             if link and not (path.exists() and path.resolve().is_relative_to(top)):
                 ignored.append(path)

@@ -18,11 +18,8 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
 
-<<<<<<< HEAD
-from harness.core.input_file import check_input_file
-=======
 from harness.core.cache_folder import cache_folder
->>>>>>> h/install
+from harness.core.input_file import check_input_file
 from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method

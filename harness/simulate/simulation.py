@@ -13,6 +13,7 @@ from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.hearing import hearing_key
 from harness.core.motion import BodyMotion
+from harness.core.time_grid import count_steps
 from harness.errors import BadInput
 from harness.simulate.filter_report import apply_device_settings
 from harness.simulate.link import TrackerConfig, transmit
@@ -111,6 +112,7 @@ def simulate_tracker(
 def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -> Floats:
     """(E, S) sampling times of each station in each frame of a take of this length [s]; BadInput if it has none."""
     slots_s = tracker.station_slot_s(stations) * np.arange(stations)
+    count_steps(duration_s * stations, 1.0 / tracker.rate_hz, "Records of the simulated take")
     count = int(np.floor((duration_s - slots_s[-1]) * tracker.rate_hz + 1e-9)) + 1
     if count < 1:
         raise BadInput(f"A take of {duration_s:.3f} s is shorter than one frame.", "Choose a longer one.")

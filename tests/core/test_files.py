@@ -1,6 +1,8 @@
 """Atomic writers and the readers of JSON and TOML."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,7 +44,33 @@ def test_a_file_and_its_folder_are_flushed_before_anybody_relies_on_them(
     path = tmp_path / "a.txt"
     monkeypatch.setattr(files, "flush", lambda flushed: seen.append((flushed.name, path.exists())))
     files.write_text(path, "text")
-    assert seen == [(f"{files.TEMPORARY}{os.getpid()}-a.txt", False), (tmp_path.name, True)]
+    assert seen == [(files.temporary_path(tmp_path / "a.txt").name, False), (tmp_path.name, True)]
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from harness.core.files import temporary_path
+temporary_path(Path(sys.argv[1])).write_text("half")
+print(flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.long
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot be asked whether a process lives")
+def test_a_writer_removes_what_dead_processes_left_and_nothing_of_living_ones(tmp_path: Path) -> None:
+    path = tmp_path / "a[1].txt"
+    (tmp_path / f"{files.TEMPORARY}other-a[1].txt").write_text("of nobody known")
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdin=pipe, stdout=pipe) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        files.write_text(path, "one")
+        assert len(list(tmp_path.iterdir())) == 3
+        process.kill()
+    files.write_text(path, "two")
+    assert {entry.name for entry in tmp_path.iterdir()} == {path.name, f"{files.TEMPORARY}other-a[1].txt"}
 
 
 def test_a_folder_moves_where_nothing_is(tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 """Files of a live session: equal to those of an export, and complete at any moment."""
 
 import csv
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from harness.errors import BadFile
 from harness.live.bvh import BvhOutput
 from harness.live.pose import LivePose
 from harness.live.pose_table import PoseTableOutput
+from harness.mocap.read.bvh import read_bvh_clip
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.posed_motion import PosedMotion
 from tests.live.posing import configuration, frame, live_pose
@@ -77,6 +80,66 @@ def test_a_bvh_that_was_never_closed_keeps_its_frames(tmp_path: Path, rng: np.ra
     assert count > 100 - RATE_HZ - 2  # it is saved every second
     assert len(lines) >= lines.index("MOTION") + 3 + count
     output.close()
+
+
+KILLED = """
+import os, sys
+import numpy as np
+from pathlib import Path
+from tests.live.test_incremental_file import BODY, RATE_HZ, walked, written
+written(Path(sys.argv[1]), walked(np.random.default_rng(1), 90), list(range(90)))
+os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.long
+def test_a_bvh_of_a_killed_process_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "live.bvh"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, capture_output=True)
+    assert done.returncode == -9, done.stderr
+    clip = read_bvh_clip(path)
+    assert len(clip) > 90 - RATE_HZ - 2  # it is saved every second
+    assert not any("killed" in note for note in clip.notes)
+    lines = path.read_text().split("\n")
+    assert lines[-1] == ""
+    assert len(lines) == lines.index("MOTION") + 3 + len(clip) + 1
+
+
+@pytest.mark.parametrize("cut", [0, 1, 40, 4000])
+@pytest.mark.parametrize("announced", [1, 7, 12])
+def test_a_bvh_whose_count_was_not_written_any_more_keeps_its_whole_frames(
+    tmp_path: Path, rng: np.random.Generator, announced: int, cut: int
+) -> None:
+    path = tmp_path / "live.bvh"
+    written(path, walked(rng, 12), list(range(12))).close()
+    text = path.read_text().replace(f"Frames: {12:>10}", f"Frames: {announced:>10}")
+    path.write_text(text[: len(text) - cut])
+    whole = text[: len(text) - cut].count("\n") - text[: text.index("MOTION")].count("\n") - 3
+    if whole < announced:
+        with pytest.raises(BadFile):
+            read_bvh_clip(path)
+        return
+    clip = read_bvh_clip(path)
+    assert len(clip) == whole
+    assert any(f"{announced} frames are announced, {whole} are whole" in note for note in clip.notes) == (
+        whole > announced or (cut > 0 and whole == announced)
+    )
+
+
+def test_frames_beyond_the_count_of_any_other_bvh_are_refused(tmp_path: Path, rng: np.random.Generator) -> None:
+    path = tmp_path / "export.bvh"
+    path.write_text(exported(walked(rng, 3), [0, 1, 2]).replace("Frames: 3", "Frames: 2"))
+    with pytest.raises(BadFile, match="3 frames"):
+        read_bvh_clip(path)
+
+
+def test_a_file_ends_with_a_whole_line_between_two_saves(tmp_path: Path, rng: np.random.Generator) -> None:
+    output, kinematics = PoseTableOutput(tmp_path / "poses.csv", BODY.skeleton, ("head",)), Kinematics(BODY)
+    for n, row in enumerate(walked(rng, 60)):
+        output.send(LivePose(n, frame(0.0), 0.0, 0.0, n / 40.0, Estimate(row, Status.SOLVED), kinematics))
+        assert (tmp_path / "poses.csv").read_bytes().endswith(b"\n")
+    output.close()
+    assert (tmp_path / "poses.csv").read_text().count("\n") == 61
 
 
 def test_a_long_break_is_one_frame(tmp_path: Path, rng: np.random.Generator) -> None:

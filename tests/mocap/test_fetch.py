@@ -2,6 +2,8 @@
 
 import csv
 import hashlib
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -68,6 +70,40 @@ def test_a_subject_is_fetched_and_can_be_loaded(site: Site, tmp_path: Path) -> N
     assert _names(out) == ["91/91.asf", "91/91_01.amc", "91/91_02.amc", "manifest.csv"]
     assert told == [("91/91.asf", 0, 3), ("91/91_01.amc", 1, 3), ("91/91_02.amc", 2, 3), ("", 3, 3)]
     assert len(MotionLibrary(out, rate_hz=120.0).load("91_02")) == 24
+
+
+KILLED_FETCH = """
+import sys
+from harness.mocap import fetch
+def stay(url, path):
+    path.write_bytes(b"half")
+    print(path, flush=True)
+    sys.stdin.read()
+fetch._list_subject_files = lambda subject, base_url: [f"{subject}/{subject}.asf"]
+fetch._download = stay
+fetch.fetch_cmu(["92"], sys.argv[1], base_url="http://localhost")
+"""
+
+
+def test_a_fetch_removes_what_dead_fetches_left_and_nothing_of_living_ones(site: Site, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    old = out / "90" / ".fetch-ab12cd"  # as the version before this rule left it
+    old.mkdir(parents=True)
+    (old / "90_01.amc").write_text("half")
+    command = [sys.executable, "-c", KILLED_FETCH, str(out)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        half = Path(process.stdout.readline().strip())
+        assert half.read_bytes() == b"half"
+        fetch_cmu(["91"], out, base_url=site.url)
+        assert half.is_file()
+        assert not old.exists()
+        assert MotionLibrary(out).names() == ("91_01", "91_02")
+        process.kill()
+    assert half.is_file()
+    fetch_cmu(["91"], out, base_url=site.url)
+    assert _names(out) == ["91/91.asf", "91/91_01.amc", "91/91_02.amc", "manifest.csv"]
+    assert not half.parent.exists()
 
 
 def test_what_is_there_is_not_fetched_again(site: Site, tmp_path: Path) -> None:

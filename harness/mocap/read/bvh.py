@@ -98,6 +98,7 @@ def read_bvh(path: Path | str, *, unit_m: float | None = None) -> JointClip:
         parent_from_joint=turned,
         unit_m=unit,
         unit_evidence=evidence,
+        notes=text.notes,
     )
 
 

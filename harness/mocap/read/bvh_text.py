@@ -1,5 +1,6 @@
 """Parser of the text of a BVH file: a tree of joints, then frames of numbers, checked line by line."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,8 @@ LIMIT_BYTES = 64 * 2**20
 MAX_JOINTS = 1000
 
 _FORMAT = "a BVH motion"
+_LIVE_COUNT = re.compile(r"Frames:  +\d+")
+"""The count of a live output, which is padded to be overwritten in place."""
 _ROTATIONS = {"Xrotation", "Yrotation", "Zrotation"}
 _POSITIONS = {"Xposition", "Yposition", "Zposition"}
 
@@ -36,6 +39,8 @@ class BvhText:
     frame_time_s: float
     frames: tuple[str, ...]
     """One line of numbers per frame."""
+    notes: tuple[str, ...] = ()
+    """What was left out, a sentence each."""
 
     def canonical(self) -> str:
         """The motion as simple BVH text: one keyword per line, plain names, no End Sites, no blank lines."""
@@ -57,19 +62,37 @@ class BvhText:
 
 
 def parse_bvh(path: Path) -> BvhText:
-    """Read and check a BVH file; BadFile with the line of the first error."""
-    lines = [
-        (line, text.split())
-        for line, text in enumerate(read_lines(path, _FORMAT, LIMIT_BYTES), start=1)
-        if text.strip()
-    ]
+    """Read and check a BVH file; BadFile with the line of the first error.
+
+    Of a live output whose process was killed (`harness.live.bvh`), the whole lines after the last save are frames too.
+    """
+    all_lines = read_lines(path, _FORMAT, LIMIT_BYTES)
+    lines = [(line, text.split()) for line, text in enumerate(all_lines, start=1) if text.strip()]
     motion = next((k for k, (_, words) in enumerate(lines) if words == ["MOTION"]), None)
     if motion is None:
         raise BadFile(path, "no line MOTION", _FORMAT, "Is the file complete, and BVH?")
     joints = _parse_joints(_TokenReader(path, lines[: motion + 1]))
-    frame_time_s, frames = _parse_frames(path, lines[motion + 1 :], sum(len(joint.channels) for joint in joints))
-    check_last_line(path)
-    return BvhText(joints, frame_time_s, frames)
+    in_motion, notes = lines[motion + 1 :], list[str]()
+    if in_motion and _LIVE_COUNT.fullmatch(all_lines[in_motion[0][0] - 1]) and in_motion[0][1][1].isdecimal():
+        in_motion, notes = _end_live_output(in_motion, cut=all_lines[-1] != "")
+    if not notes:
+        check_last_line(path)
+    frame_time_s, frames = _parse_frames(path, in_motion, sum(len(joint.channels) for joint in joints))
+    return BvhText(joints, frame_time_s, frames, tuple(notes))
+
+
+def _end_live_output(lines: list[tuple[int, list[str]]], *, cut: bool) -> tuple[list[tuple[int, list[str]]], list[str]]:
+    """The lines after MOTION with the number of frames that a killed process wrote, and a note if it was killed.
+
+    `cut` is whether the last line has no end; it is left out if it is not one of the announced frames.
+    """
+    announced = int(lines[0][1][1])
+    written = len(lines) - 2
+    if written <= announced:
+        return lines, []
+    frames = written - cut
+    note = f"the program that wrote the file was killed: {announced} frames are announced, {frames} are whole"
+    return [(lines[0][0], ["Frames:", str(frames)]), *lines[1 : 2 + frames]], [note]
 
 
 class _TokenReader:

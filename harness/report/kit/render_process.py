@@ -15,26 +15,16 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.core.files import TEMPORARY
-<<<<<<< HEAD
-from harness.core.progress import ProgressCallback
-=======
-from harness.core.interrupts import shield_children
 from harness.core.progress import ProgressCallback, report_step
-from harness.core.python_process import python_command, python_environment
->>>>>>> h/install
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
 """Time allowed for the start, and for each picture [s]."""
-<<<<<<< HEAD
-=======
-_POLL_INTERVAL_S = 0.5
 _OPENGL_VARIABLES = (
     *("DISPLAY", "EGL_PLATFORM", "GALLIUM_DRIVER", "LIBGL_DRIVERS_PATH", "MESA_LOADER_DRIVER_OVERRIDE"),
     *("VTK_DEFAULT_OPENGL_WINDOW", "__EGL_VENDOR_LIBRARY_FILENAMES"),
 )
 """Environment variables that decide how VTK finds OpenGL."""
->>>>>>> h/install
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.csv_text import unescape_formula
 from harness.core.input_file import MEGABYTE, read_input_file
-from harness.errors import BadFile, Outcome
+from harness.errors import BadFile, Outcome, name_file
 from harness.measure.pose_series import TruthPoses
 from harness.mocap.read.c3d import MarkerClip, read_c3d
 from harness.study.trust.truth_motion import TruthMotion, common_names
@@ -37,9 +37,10 @@ _LEAST_SPREAD_M = 0.005
 def read_truth_file(path: Path, stations: Sequence[str]) -> TruthMotion:
     """Read a reference for these stations; BadFile that names the place, BadInput for bodies that it lacks."""
     suffix = path.suffix.lower()
-    if suffix == ".c3d":
-        return truth_of_markers(path, read_c3d(path), stations)
-    bodies = read_tum(path, stations) if path.is_dir() or suffix == ".tum" else read_csv(path)
+    with name_file(path):
+        if suffix == ".c3d":
+            return truth_of_markers(path, read_c3d(path), stations)
+        bodies = read_tum(path, stations) if path.is_dir() or suffix == ".tum" else read_csv(path)
     return TruthMotion(f"the trajectories of {path.name}", bodies, common_names(stations, bodies))
 
 

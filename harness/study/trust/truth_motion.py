@@ -14,6 +14,7 @@ from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion, Clip
 from harness.core.skeleton import Skeleton
+from harness.core.time_grid import count_steps
 from harness.errors import BadFile, BadInput
 from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.experiment.playback import Playback
@@ -74,6 +75,7 @@ def truth_of_playback(
     if device_s is not None:
         motion = loop_motion(playback.body, playback.take, playback.mounts, playback.tracker)
         loop_s = playback.samples.loop_s
+        count_steps(device_s[1] - min(device_s[0], 0.0), 1.0 / playback.take.rate_hz, "Stamps of the capture")
         first, last = (math.floor(max(at_s, 0.0) / loop_s) for at_s in device_s)
         times_s = loop_s * np.arange(first, last + 1, dtype=np.float64)
     bodies = _bone_truths(playback.body.skeleton, motion, calibration.bones, times_s)
