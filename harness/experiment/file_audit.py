@@ -1,81 +1,133 @@
-"""Audit of the files that a method reads in its process: those below its own folder must be part of the cell's key.
+"""Audit of what a method reads in its process: files below its own folders, and environment variables.
 
-Python reports every file that it opens (PEP 578). Files that a library in C opens, and files of other processes, are
-not reported.
+They must be part of the cell's key. Python reports every file that it opens (PEP 578). Files that a library in C opens,
+and files of other processes, are not reported.
 """
 
+import errno
 import os
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from harness.errors import HarnessError
-from harness.reconstruct.source_files import SourceFiles, foreign_folders, is_below
+from harness.experiment.environment_audit import audit_environment
+from harness.reconstruct.source_files import CACHE_FOLDER, SourceFiles, foreign_folders, is_below, is_own
 
-_METADATA = (".dist-info", ".egg-info")
-"""Folders that an installer puts beside a method; Python reads its entry points there."""
+_EVENTS = ("open", "sqlite3.connect", "ctypes.dlopen", "import")
+_METADATA = ("METADATA", "PKG-INFO", "RECORD", "SOURCES.txt", "entry_points.txt", "requires.txt", "top_level.txt")
+"""Files that an installer puts beside a method, in folders of these suffixes; Python reads its entry points there."""
+_METADATA_FOLDERS = (".dist-info", ".egg-info")
+_MACHINE_CODE = (".pyc", ".nbi", ".nbc")
+"""Suffixes of code that Python and numba keep in `CACHE_FOLDER`. Size and time of the source tell whether it fits,
+which an edit may leave as they are."""
+_OPEN_FOLDERS = "/proc/self/fd"
+"""Links to open files and folders on Linux."""
 
 
-class UndeclaredFile(HarnessError):
-    """A method reads a file below its own folder that its key does not cover, or that has changed since."""
+class UndeclaredInput(HarnessError):
+    """A method reads a file or a variable that its key does not cover, or a file that has changed since."""
 
-    def __init__(self, path: str, reason: str) -> None:
-        super().__init__(path, reason)
-        self.path, self.reason = self.args
+    def __init__(self, what: str, reason: str) -> None:
+        super().__init__(what, reason)
+        self.what, self.reason = self.args
 
     def __str__(self) -> str:
-        return f"The method reads {self.path}, {self.reason}"
+        return f"The method reads {self.what}, {self.reason}"
 
 
 class FileAudit:
-    """Records the files that this process reads, and refuses undeclared ones once `cover` was called.
+    """Records what this process reads, and refuses undeclared files and variables once `cover` was called.
 
-    A refusal is kept in `violation`, so that a method that catches the exception is noticed all the same.
+    A refusal is kept in `violation`, so that a method that catches the exception is noticed all the same. Machine code
+    that was kept of a user's source is never read: it is as if it were not there.
     """
 
     def __init__(self) -> None:
-        self.violation: UndeclaredFile | None = None
+        self.violation: UndeclaredInput | None = None
         self._opened: dict[str, tuple[int, ...]] = {}
+        self._variables: dict[str, str] = {}
+        """Variable -> file of the code that read it."""
         self._folders: tuple[Path, ...] | None = None
         self._states: dict[str, tuple[int, ...]] = {}
+        self._declared: set[str] = set()
+        audit_environment(self._hear_variable)
         sys.addaudithook(self._hear)
 
-    def cover(self, source: SourceFiles) -> None:
+    def cover(self, source: SourceFiles, variables: set[str]) -> None:
         """Watch the folders of a method from now on, and look at what was read before."""
         self._states = {name: _file_state(name) for file in source.files for name in _names(str(file))}
         self._folders = tuple(Path(name) for folder in source.folders for name in _names(str(folder)))
-        for path, state in self._opened.items():
-            with suppress(UndeclaredFile):  # kept in `violation`: every cell fails and says so
+        self._declared = variables
+        with suppress(UndeclaredInput):  # kept in `violation`: every cell fails and says so
+            for path, state in self._opened.items():
                 self._check(path, state)
+            for name, file in self._variables.items():
+                self._hear_variable(name, file)
         self._opened.clear()
 
     def _hear(self, event: str, arguments: tuple[object, ...]) -> None:
-        if event not in ("open", "sqlite3.connect") or not isinstance(arguments[0], str | bytes | os.PathLike):
+        if event not in _EVENTS:
             return
-        path = os.path.abspath(os.fsdecode(arguments[0]))
-        if (event == "open" and not _reads(*arguments[1:3])) or not os.path.isfile(path):
-            return
+        for path in _paths_read(event, arguments):
+            if not os.path.isfile(path):
+                continue
+            if _is_machine_code(path) and path not in self._states and self._is_own(path, unknown=True):
+                raise FileNotFoundError(errno.ENOENT, "kept machine code is not used", path)
+            if self._folders is None:
+                self._opened.setdefault(path, _file_state(path))
+            else:
+                self._check(path, _file_state(path))
+
+    def _hear_variable(self, name: str, file: str) -> None:
         if self._folders is None:
-            self._opened.setdefault(path, _file_state(path))
-        else:
-            self._check(path, _file_state(path))
+            self._variables.setdefault(name, file)
+        elif name not in self._declared and os.path.isabs(file) and self._is_own(file):
+            advice = "which is not declared. Add it to the list `environment` of its class."
+            self._refuse(UndeclaredInput(f"the environment variable {name}", advice))
+
+    def _is_own(self, path: str, *, unknown: bool = False) -> bool:
+        """Whether a path belongs to the method; with `unknown`, also whether it is nobody else's as far as is known."""
+        names = [Path(name) for name in _names(path)]
+        if unknown and not any(is_below(name, foreign_folders()) for name in names):
+            return True
+        return any(is_own(name, self._folders or ()) for name in names)
 
     def _check(self, path: str, state: tuple[int, ...]) -> None:
-        if self._folders is None or any(part == "__pycache__" or part.endswith(_METADATA) for part in Path(path).parts):
+        if os.path.basename(path) in _METADATA and os.path.dirname(path).endswith(_METADATA_FOLDERS):
             return
-        names = [Path(name) for name in _names(path)]
-        if not any(is_below(name, self._folders) for name in names):
-            return
-        if any(is_below(name, foreign_folders()) for name in names):
-            return
-        known = [self._states[str(name)] for name in names if str(name) in self._states]
-        if not known:
+        known = [self._states[name] for name in _names(path) if name in self._states]
+        if not known and self._is_own(path):
             advice = "which is not declared. Add it to the list `files` of its class, or move it elsewhere."
-            self.violation = UndeclaredFile(path, advice)
-            raise self.violation
-        if state not in known:
-            self.violation = UndeclaredFile(path, "which has changed since the run began. Run again.")
-            raise self.violation
+            self._refuse(UndeclaredInput(path, advice))
+        if known and state not in known:
+            self._refuse(UndeclaredInput(path, "which has changed since the run began. Run again."))
+
+    def _refuse(self, violation: UndeclaredInput) -> None:
+        self.violation = violation
+        raise violation
+
+
+def _paths_read(event: str, arguments: tuple[object, ...]) -> Iterator[str]:
+    """Absolute paths of the files that may be read in an event."""
+    given = arguments[1 if event == "import" else 0]  # of an extension module; None for others
+    if not isinstance(given, str | bytes | os.PathLike) or (event == "open" and not _reads(*arguments[1:3])):
+        return
+    name = os.fsdecode(given)
+    yield os.path.abspath(name)
+    if event == "sqlite3.connect" and name.startswith("file:"):
+        yield os.path.abspath(unquote(urlsplit(name).path))
+    if event == "open" and arguments[1] is None and not os.path.isabs(name):  # `os.open`, perhaps with `dir_fd`
+        with suppress(OSError):
+            for number in os.listdir(_OPEN_FOLDERS):
+                with suppress(OSError):
+                    yield os.path.abspath(os.path.join(os.readlink(f"{_OPEN_FOLDERS}/{number}"), name))
+
+
+def _is_machine_code(path: str) -> bool:
+    return path.endswith(_MACHINE_CODE) and CACHE_FOLDER in Path(path).parts
 
 
 def _reads(mode: object, flags: object) -> bool:
@@ -93,9 +145,12 @@ def _names(path: str) -> tuple[str, ...]:
 
 
 def _file_state(path: str) -> tuple[int, ...]:
-    """Time, size and place on the disk of a file: another state means another content."""
+    """Times, size and place on the disk of a file: another state means another content.
+
+    The time of the last change cannot be set by a program, unlike that of the last write.
+    """
     try:
         found = os.stat(path)
     except OSError:
         return ()
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino

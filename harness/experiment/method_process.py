@@ -10,12 +10,12 @@ from threading import Lock, Timer
 from harness import errors
 from harness.core.messages import MessageError, read_message, write_message
 from harness.errors import HarnessError, Outcome, SystemFault
-from harness.experiment.file_audit import UndeclaredFile
+from harness.experiment.file_audit import UndeclaredInput
 from harness.experiment.isolation import Isolation
 from harness.experiment.method_messages import MAX_TEXT, Arrays, Header, Message
 from harness.experiment.worker_process import WorkerProcess, start_worker
 
-_TAINTED = UndeclaredFile.__name__
+_TAINTED = UndeclaredInput.__name__
 _EXIT_S = 5.0
 """Time that a process has to end after its answers ended [s]; then it is killed."""
 _START_S = 120.0

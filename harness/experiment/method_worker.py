@@ -33,7 +33,7 @@ from harness.experiment.method_messages import (
 from harness.experiment.method_run import run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
-from harness.reconstruct.source_files import source_files, source_hash
+from harness.reconstruct.source_files import declared_environment, source_files, source_hash
 
 _KEPT_FITS = 2
 """Number of trained methods that are kept: those of the last two sets of examples."""
@@ -80,14 +80,14 @@ class MethodWorker:
             serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
         method = registry.resolve(header["name"])
-        files = source_files(method, tuple(sys.modules.values()))
-        self._audit.cover(files)
+        modules = tuple(sys.modules.values())
+        self._audit.cover(source_files(method, modules), declared_environment(method))
         self.method = method
         return {
             "summary": str(method.summary),
             "needs_examples": bool(method.needs_examples),
             "options": _stable_options(method, header["name"]),
-            "source_hash": source_hash(method),
+            "source_hash": source_hash(method, modules),
         }, {}
 
     def _fit(self, header: Header, arrays: Arrays) -> Message:

@@ -1,7 +1,8 @@
-"""Files that determine what a method computes: its code, and the data files that it declares.
+"""Files and environment variables that determine what a method computes.
 
-Their hash is part of a cell's key. The code of a method is every module that it imports from its own package or folder.
-Its data files are those of its attribute `files`, relative to the file that defines the attribute.
+Their hash is part of a cell's key. The code of a method is every module that it imports from its own package or folder,
+and from other folders that hold no installed packages. Its data files are those of its attribute `files`, relative to
+the file that defines the attribute. Its environment variables are those of its attribute `environment`.
 """
 
 import ast
@@ -11,12 +12,13 @@ import os
 import site
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from harness.core.cache_folder import cache_folder
 from harness.core.input_file import check_input_file
@@ -24,7 +26,9 @@ from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
 
-_MODULE_SUFFIXES = (".py", *EXTENSION_SUFFIXES)
+MODULE_SUFFIXES = (".py", ".pyc", *EXTENSION_SUFFIXES)
+CACHE_FOLDER = "__pycache__"
+"""Folders of compiled code, which is made again from its source."""
 _IMPORTERS = ("import_module", "__import__")
 
 
@@ -40,53 +44,87 @@ class SourceFiles:
     def digest(self) -> str:
         """Hash of the names and contents of all files; BadInput when one cannot be read."""
         state = hashlib.blake2b(digest_size=16)
+        entries = []
         for file in self.files:
             near = next((folder for folder in self.folders if file.is_relative_to(folder)), file.parent)
-            state.update(f"{file.relative_to(near).as_posix()}\0".encode())
             try:
                 with open(file, "rb") as content:
-                    state.update(hashlib.file_digest(content, "blake2b").digest())
+                    entries.append(
+                        (file.relative_to(near).as_posix(), hashlib.file_digest(content, "blake2b").digest())
+                    )
             except OSError as error:
                 raise BadInput(
                     f"{file} cannot be read ({error.strerror}).", "A cell's key covers its content."
                 ) from error
+        for name, content_hash in sorted(entries):
+            state.update(f"{name}\0".encode() + content_hash)
         return state.hexdigest()
 
 
-def source_hash(method: Method) -> str:
-    """Hash of a method's class, of the classes that it wraps, and of their files; BadInput when a file is missing."""
+def source_hash(method: Method, modules: Iterable[ModuleType] = ()) -> str:
+    """Hash of a method's class, of the classes that it wraps, of their files and of their environment variables.
+
+    `modules` as for `source_files`. BadInput when a file is missing.
+    """
     state = hashlib.blake2b(digest_size=16)
     for part in _wrapped(method):
-        state.update(f"{type(part).__module__}:{type(part).__qualname__}\0{source_files(part).digest()}\0".encode())
+        state.update(f"{type(part).__module__}:{type(part).__qualname__}\0".encode())
+    state.update(source_files(method, modules).digest().encode())
+    for name in sorted(declared_environment(method)):
+        state.update(f"{name}\0{os.environ.get(name)!r}\0".encode())
     return state.hexdigest()
 
 
 def source_files(method: object, modules: Iterable[ModuleType] = ()) -> SourceFiles:
     """Files of a method and of the methods that it wraps; BadInput when one does not exist.
 
-    `modules` adds loaded modules that lie in its own folders, which a search of its source may not find.
+    `modules` are those that the method's process has loaded. Their files count, whatever way they were imported, unless
+    they belong to the harness, to Python or to another installed package.
     """
-    folders: dict[Path, None] = {}
-    files: set[Path] = set()
-    for part in _wrapped(method):
-        file = _defining_file(type(part))
+    folders, roots, starts = dict[Path, None](), dict[Path, bool](), list[Path]()
+    files = {file for part in _wrapped(method) for file in _declared_files(part)}
+
+    def add(module: str, file: Path) -> None:
         if is_below(file, [PACKAGE_FOLDER]):
-            continue
-        package = _top_package(type(part).__module__, file)
+            return
+        package = _top_package(module, file)
         root = package.parent if package else file.parent
         installed = is_below(root, library_folders())
-        own = (package or file) if installed else root
-        folders[own] = None
-        files |= {file, *_code_below(package)} if package else {file}
-        files |= _imported_files(file, root, packages=not installed) | set(_declared_files(part))
-        places = (Path(os.path.abspath(path)) for m in modules if (path := getattr(m, "__file__", None)))
-        files |= {place for place in places if is_below(place, [own]) and not is_below(place, foreign_folders())}
-    return SourceFiles(tuple(folders), tuple(sorted(files)))
+        folders[(package or file) if installed else root] = None
+        roots[root] = not installed
+        starts.append(file)
+        files.update([file, *_code_below(package)] if package else [file])
+
+    for part in _wrapped(method):
+        add(type(part).__module__, _defining_file(type(part)))
+    own = tuple(folders)
+    for module in modules:
+        file = _existing_file(getattr(module, "__file__", None))
+        if file is not None and file not in files and (is_own(file, own) or not is_below(file, foreign_folders())):
+            add(module.__name__, file)
+    entries = [Path(os.path.abspath(entry)) for entry in sys.path] if any(roots.values()) else []
+    entries = [path for path in entries if path.is_dir() and not is_below(path, foreign_folders())]
+    roots |= {path: True for path in entries if is_below(path, roots)}
+    return SourceFiles(tuple(folders), tuple(sorted(files | _imported_files(starts, roots, entries))))
+
+
+def declared_environment(method: object) -> set[str]:
+    """Names of the environment variables that a method and those that it wraps read; BadInput unless they are texts."""
+    return {name for part in _wrapped(method) for name in _declared(part, "environment", (str,), '["GAIN"]')}
 
 
 def is_below(path: Path, folders: Iterable[Path]) -> bool:
     """Whether a path is one of the folders or lies below one."""
     return any(path.is_relative_to(folder) for folder in folders)
+
+
+def is_own(path: Path, folders: Iterable[Path]) -> bool:
+    """Whether a path lies below one of a method's own folders, and not below a foreign folder inside that."""
+
+    def depth(around: Iterable[Path]) -> int:
+        return max((len(folder.parts) for folder in around if path.is_relative_to(folder)), default=0)
+
+    return 0 < depth(folders) >= depth(foreign_folders())
 
 
 @cache
@@ -130,27 +168,44 @@ def _top_package(module: str, file: Path) -> Path | None:
     return next((place for place in places if file.is_relative_to(place)), None)
 
 
+def _existing_file(path: str | None) -> Path | None:
+    """The file of a module, or the archive that holds it; None for a module without either."""
+    if path is None:
+        return None
+    place = Path(os.path.abspath(path))
+    return next((around for around in (place, *place.parents) if around.is_file()), None)
+
+
 def _code_below(folder: Path) -> set[Path]:
-    return {file for suffix in _MODULE_SUFFIXES for file in folder.rglob(f"*{suffix}") if file.is_file()}
+    found = (file for suffix in MODULE_SUFFIXES for file in folder.rglob(f"*{suffix}"))
+    return {file for file in found if CACHE_FOLDER not in file.parts and file.is_file()}
 
 
-def _imported_files(file: Path, root: Path, *, packages: bool) -> set[Path]:
-    """The module files that a file imports from the folders of `sys.path` in its own folder, recursively.
+def _imported_files(starts: Iterable[Path], roots: Mapping[Path, bool], others: Sequence[Path]) -> set[Path]:
+    """The files of the modules that files import from some folders, recursively.
 
-    Without `packages`, as among installed packages, only modules next to the file count.
+    A value of `roots` tells whether packages in that folder count: among installed ones, only modules in it do. What
+    lies in none of the roots is looked for in `others`, and the first one that has it counts.
     """
-    paths = [Path(os.path.abspath(entry)) for entry in sys.path] if packages else []
-    roots = dict.fromkeys([root, *(path for path in paths if is_below(path, [root]) and path.is_dir())])
-    found, waiting = set[Path](), [file]
+    found, waiting = set[Path](), list(starts)
     while waiting:
         current = waiting.pop()
-        if current in found or is_below(current, foreign_folders() if packages else [PACKAGE_FOLDER]):
+        if current in found:
             continue
         found.add(current)
-        if current.suffix == ".py":
-            for name in _imported_names(current, root):
-                waiting += [part for place in roots for part in _module_files(place, name, packages)]
+        if current.suffix != ".py":
+            continue
+        for name in {name for root in (*roots, *others) for name in _imported_names(current, root)}:
+            parts = [file for place, deep in roots.items() for file in _module_files(place, name, deep)]
+            elsewhere = (files for place in others if (files := list(_module_files(place, name, packages=True))))
+            waiting += [part for part in parts or next(elsewhere, []) if _is_followed(part, roots)]
     return found
+
+
+def _is_followed(file: Path, roots: Mapping[Path, bool]) -> bool:
+    if is_below(file, [PACKAGE_FOLDER]):
+        return False
+    return is_own(file, roots) or not is_below(file, foreign_folders())
 
 
 def _imported_names(file: Path, root: Path) -> Iterator[str]:
@@ -176,18 +231,15 @@ def _module_files(root: Path, name: str, packages: bool) -> Iterator[Path]:
     parts = [part for part in name.split(".") if part.isidentifier()]
     for count in range(1, len(parts) + 1 if packages else min(len(parts), 1) + 1):
         place = root.joinpath(*parts[:count])
-        inside = place / "__init__.py"
-        candidates = [place.with_name(place.name + suffix) for suffix in _MODULE_SUFFIXES]
-        yield from (file for file in (*candidates, *([inside] if packages else [])) if file.is_file())
+        for stem in (place, *([place / "__init__"] if packages else [])):
+            candidates = (stem.with_name(stem.name + suffix) for suffix in MODULE_SUFFIXES)
+            yield from (file for file in candidates if file.is_file())
 
 
 def _declared_files(method: object) -> Iterator[Path]:
     """The files of a method's attribute `files`; a folder stands for all files below it."""
-    declared = getattr(method, "files", ())
-    if isinstance(declared, str) or not all(isinstance(name, str | Path) for name in declared):
-        raise BadInput(f"{type(method).__name__}.files is {declared!r}.", 'Write a list of paths: files = ["a.npz"].')
     owner = next((kind for kind in type(method).__mro__ if "files" in vars(kind)), type(method))
-    for name in declared:
+    for name in _declared(method, "files", (str, Path), '["a.npz"]'):
         path = Path(os.path.abspath(_defining_file(owner).parent / name))
         if not path.exists():
             raise BadInput(f"{type(method).__name__} declares {path}, which does not exist.", "Correct `files`.")
@@ -195,3 +247,15 @@ def _declared_files(method: object) -> Iterator[Path]:
             if file.exists() and not file.is_dir():
                 check_input_file(file, f"a data file of {type(method).__name__}", sys.maxsize, "Correct `files`.")
                 yield file
+
+
+
+def _declared(method: object, attribute: str, kinds: tuple[type, ...], example: str) -> Sequence[Any]:
+    """A list that a method declares in an attribute; BadInput for anything else."""
+    declared = getattr(method, attribute, ())
+    if not isinstance(declared, list | tuple) or not all(isinstance(name, kinds) for name in declared):
+        what = "paths" if attribute == "files" else "names"
+        raise BadInput(
+            f"{type(method).__name__}.{attribute} is {declared!r}.", f"Write a list of {what}: {attribute} = {example}."
+        )
+    return declared

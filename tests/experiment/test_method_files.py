@@ -1,7 +1,10 @@
 """Files of a user's method: an edit leads to new cells, and a file that the key does not cover fails the cell."""
 
+import os
+import py_compile
 import shutil
-from collections.abc import Iterator, Mapping
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ import pytest
 from harness.body.humanoid import build_body
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
-from harness.experiment import engine
+from harness.experiment import engine, remote_method
 from harness.experiment.isolation import Isolation
 from harness.experiment.method_process import MethodFailure
 from harness.experiment.remote_method import RemoteMethod, close_methods, hash_method, resolve_method
@@ -53,7 +56,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "methods").mkdir()
     monkeypatch.syspath_prepend(tmp_path / "methods")
     yield tmp_path / "methods"
-    close_methods()
+    end_methods()
+
+
+def end_methods() -> None:
+    """End the processes of methods, but not the server that forks them."""
+    while remote_method._remote_methods:
+        remote_method._remote_methods.popitem()[1].process.close()
 
 
 def fit(name: str = "mine:Mine", isolation: Isolation | None = None) -> RemoteMethod:
@@ -102,6 +111,21 @@ def test_an_edit_never_meets_cells_of_before(
         ("angle = float(np.load(HERE / 'inner' / 'weights.npy'))", "inner/weights.npy"),
         ("angle = import_module(''.join(['hid', 'den'])).ANGLE", "hidden.py"),
         ("angle = len(__import__('sqlite3').connect(HERE / 'a.db').execute('select 1').fetchall())", "a.db"),
+        ("angle = __import__('sqlite3').connect(f'file:{HERE}/a%2edb?mode=ro', uri=True)", "a.db"),
+        ("angle = __import__('sqlite3').connect('file:a.db?mode=ro', uri=True)", "a.db"),
+        (
+            "import os; angle = os.open('a.bin', os.O_RDONLY, dir_fd=os.open(HERE / 'inner', os.O_RDONLY))",
+            "inner/a.bin",
+        ),
+        ("import os; angle = os.open('methods/a.bin', os.O_RDONLY, dir_fd=os.open(HERE.parent, 0))", "a.bin"),
+        ("import os; os.chdir('/'); angle = open(HERE / 'a.bin', 'rb').read()", "a.bin"),
+        ("angle = (HERE / '__pycache__' / 'a.bin').read_bytes()", "__pycache__/a.bin"),
+        ("angle = (HERE / 'own.dist-info' / 'a.json').read_bytes()", "own.dist-info/a.json"),
+        ("import ctypes; angle = ctypes.CDLL(HERE / 'a.so')", "a.so"),
+        ("import pkgutil; angle = pkgutil.get_data('upright', 'a.bin')", "a.bin"),
+        ("import sys; sys.path.append(str(HERE / 'a.zip')); import hid_den", "a.zip"),
+        ("angle = np.fromfile(HERE / 'a.bin')", "a.bin"),
+        ("angle = np.memmap(HERE / 'a.bin', mode='r')", "a.bin"),
     ],
 )
 def test_an_undeclared_file_below_its_folder_fails_the_cell(
@@ -128,6 +152,8 @@ def test_a_file_that_is_read_while_the_module_is_imported_counts(folder: Path) -
         "angle = 0.0; open(HERE / 'log.txt', 'a').write('x')",
         "angle = 0.0 if not (HERE / 'absent.json').exists() else 1.0",
         "import decimal, numpy.polynomial, upright; angle = 0.0",
+        "import os, tempfile; os.environ['GAIN'] = '1'; Path.home(); tempfile.gettempdir(); angle = 0.0",
+        "import os; angle = 0.0; os.close(os.open('.', os.O_RDONLY))",
     ],
 )
 def test_what_does_not_bear_on_results_is_allowed(folder: Path, training: str) -> None:
@@ -209,7 +235,7 @@ def test_options_are_those_of_another_process(folder: Path) -> None:
     texts = []
     for _ in range(2):
         texts.append(fit("plain:Plain").options)
-        close_methods()
+        end_methods()
     assert texts[0] == texts[1]
     assert texts[0].startswith("plain.Plain(angle=0.1, gain=plain.Plain.__init__.<locals>.<lambda>(")
 
@@ -226,3 +252,182 @@ def test_a_method_whose_cells_could_not_be_found_again_is_refused(folder: Path, 
     write_plain(folder, 0.1, more)
     with pytest.raises(BadInput, match=message):
         resolve_method("plain:Plain", Isolation())
+
+
+def write_unnoticed(path: Path, text: str) -> None:
+    """Write a file whose size and times tell of no edit; compiled code of it, if there is any, is that of before."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    os.utime(path, (1e9, 1e9))
+
+
+GAINS = "ANGLE = {}\n"
+IMPORTS = {
+    "by name": "import gains",
+    "by a computed name": "gains = import_module('gai' + 'ns')",
+    "by the function of the statement": "gains = __import__('gai' + 'ns')",
+    "by a text": "exec('im' + 'port gains')",
+    "by its path": (
+        "import importlib.util as u; spec = u.spec_from_file_location('g', HERE / 'gains.py'); "
+        "gains = u.module_from_spec(spec); spec.loader.exec_module(gains)"
+    ),
+}
+
+
+@pytest.mark.parametrize("statement", IMPORTS.values(), ids=IMPORTS)
+def test_an_edit_that_leaves_size_and_time_is_another_method(folder: Path, statement: str) -> None:
+    """Python would run the compiled code of before: it believes size and time of the source."""
+    found = []
+    for angle in (0.1, 0.5):
+        write_method(folder, "angle = 0.0", "summary = str(gains.ANGLE)")
+        (folder / "mine.py").write_text((folder / "mine.py").read_text().replace("class", f"{statement}\nclass", 1))
+        write_unnoticed(folder / "gains.py", GAINS.format(angle))
+        for file in ("gains.py", "mine.py"):
+            if not found:
+                py_compile.compile(str(folder / file), doraise=True)
+        method = fit()
+        found.append((method.summary, method.source_hash))
+        end_methods()
+    assert [summary for summary, _ in found] == ["0.1", "0.5"]
+    assert found[0][1] != found[1][1]
+
+
+def write_byte_code(folder: Path, angle: float) -> None:
+    write_unnoticed(folder / "source" / "gains.py", GAINS.format(angle))
+    py_compile.compile(str(folder / "source" / "gains.py"), str(folder / "methods" / "gains.pyc"), doraise=True)
+
+
+def write_archive(folder: Path, angle: float) -> None:
+    with zipfile.ZipFile(folder / "methods" / "code.zip", "w") as archive:
+        archive.writestr(zipfile.ZipInfo("gains.py"), GAINS.format(angle))
+
+
+def write_elsewhere(folder: Path, angle: float) -> None:
+    write_unnoticed(folder / "elsewhere" / "gains.py", GAINS.format(angle))
+
+
+PLACES: dict[str, tuple[Callable[[Path, float], None], str]] = {
+    "byte code without source": (write_byte_code, ""),
+    "an archive": (write_archive, "methods/code.zip"),
+    "another folder of the import path": (write_elsewhere, "elsewhere"),
+}
+
+
+@pytest.mark.parametrize("statement", ["import gains", "gains = import_module('gai' + 'ns')"])
+@pytest.mark.parametrize(("write", "entry"), PLACES.values(), ids=PLACES)
+def test_code_counts_wherever_it_lies(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    write: Callable[[Path, float], None],
+    entry: str,
+    statement: str,
+) -> None:
+    write_method(folder, "angle = 0.0", "summary = str(gains.ANGLE)")
+    (folder / "mine.py").write_text((folder / "mine.py").read_text().replace("class", f"{statement}\nclass", 1))
+    monkeypatch.syspath_prepend(folder.parent / entry)
+    found = []
+    for angle in (0.1, 0.5):
+        write(folder.parent, angle)
+        method = fit()
+        found.append((method.summary, method.source_hash))
+        end_methods()
+    assert [summary for summary, _ in found] == ["0.1", "0.5"]
+    assert found[0][1] != found[1][1]
+
+
+def test_the_code_that_makes_a_method_of_the_package_counts(folder: Path) -> None:
+    found = []
+    for scale in (0.5, 0.25):
+        (folder / "maker.py").write_text(
+            "from harness.reconstruct.methods.ik import Ik\n\n\ndef make():\n    return Ik()\n\n\nSCALE = {scale}\n"
+        )
+        write_unnoticed(folder / "maker.py", (folder / "maker.py").read_text().format(scale=scale))
+        found.append(resolve_method("maker:make", Isolation()))
+        assert isinstance(found[-1], RemoteMethod)
+        found[-1] = hash_method(found[-1])
+        end_methods()
+    assert found[0] != found[1]
+
+
+COMPILED = """
+import numba
+import gains
+from upright import Upright
+
+
+@numba.njit(cache=True)
+def angle():
+    return gains.ANGLE
+
+
+class Mine(Upright):
+    summary = str(angle())
+"""
+
+
+@pytest.mark.long
+def test_machine_code_that_numba_keeps_is_not_that_of_before(folder: Path) -> None:
+    """A constant of another module is compiled in, and numba looks at the time of its own source alone."""
+    shutil.copy(UPRIGHT, folder)
+    write_unnoticed(folder / "mine.py", COMPILED)
+    found = []
+    for angle in (0.1, 0.5):
+        write_unnoticed(folder / "gains.py", GAINS.format(angle))
+        found.append(fit().summary)
+        end_methods()
+    assert found == ["0.1", "0.5"]
+
+
+def test_data_that_is_rewritten_with_its_size_and_time_fails_the_cell(folder: Path) -> None:
+    write_method(folder, *EDITS["a declared file"][:2])
+    write_unnoticed(folder / "weights.json", "0.1")
+    method = fit()
+    write_unnoticed(folder / "weights.json", "0.5")
+    with pytest.raises(MethodFailure, match="changed since the run began"):
+        method.fit(build_body(), [], generator(1, "fit"))
+
+
+VARIABLE = "HARNESS_TEST_GAIN"
+
+
+@pytest.mark.parametrize(
+    "read", [f"os.environ['{VARIABLE}']", f"os.getenv('{VARIABLE}', '0')", f"os.environ.get('{VARIABLE}', '0')"]
+)
+def test_a_declared_variable_is_part_of_the_key(folder: Path, monkeypatch: pytest.MonkeyPatch, read: str) -> None:
+    write_method(folder, f"import os; angle = float({read})", f"environment = ['{VARIABLE}']")
+    hashes = []
+    for value in ("0.1", "0.5", "0.1"):
+        close_methods()  # the server too: it has the environment of its start, as a run has
+        monkeypatch.setenv(VARIABLE, value)
+        hashes.append(hash_method(fit()))
+    assert hashes[0] == hashes[2] != hashes[1]
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        f"os.environ.get('{VARIABLE}')",
+        f"os.getenv('{VARIABLE}')",
+        f"'{VARIABLE}' in os.environ",
+        f"os.environ.setdefault('{VARIABLE}', '1')",
+        f"os.environb.get(b'{VARIABLE}')",
+        "dict(os.environ)",
+    ],
+)
+def test_an_undeclared_variable_fails_the_cell(folder: Path, monkeypatch: pytest.MonkeyPatch, read: str) -> None:
+    monkeypatch.setenv(VARIABLE, "1")
+    write_method(folder, f"import os; {read}; angle = 0.0")
+    with pytest.raises(MethodFailure, match=r"the environment variable \w+, which is not declared"):
+        fit()
+
+
+def test_a_variable_that_is_read_while_the_module_is_imported_counts(folder: Path) -> None:
+    write_method(folder, "angle = 0.0", f"import os; gain = os.environ.get('{VARIABLE}')")
+    with pytest.raises(MethodFailure, match=f"the environment variable {VARIABLE}, which is not declared"):
+        resolve_method("mine:Mine", Isolation())
+
+
+def test_a_declaration_of_variables_is_a_list_of_names(folder: Path) -> None:
+    write_method(folder, "angle = 0.0", f"environment = '{VARIABLE}'")
+    with pytest.raises(BadInput, match="Write a list of names"):
+        resolve_method("mine:Mine", Isolation())
