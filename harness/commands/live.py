@@ -16,6 +16,7 @@ from harness.commands.common import (
     line_options,
     parse_stations,
     positive_float,
+    print_caveat,
     print_result,
     print_status,
     show_progress,
@@ -105,7 +106,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
-        playback = playback.with_calibration(read_calibration(args.calibration))
+        calibration = read_calibration(args.calibration)
+        print_caveat(args.calibration, calibration.caveat)
+        playback = playback.with_calibration(calibration)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":

@@ -7,7 +7,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.common import Verbs, add_verb, print_caveat, print_result
 from harness.commands.ending import print_data
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -118,7 +118,9 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     }
     playback = score_recording.find_playback(stream, **options, folder=args.mocap)
     if args.calibration is not None:
-        playback = playback.with_calibration(read_calibration(args.calibration))
+        calibration = read_calibration(args.calibration)
+        print_caveat(args.calibration, calibration.caveat)
+        playback = playback.with_calibration(calibration)
     methods = playback.scenario.methods
     if args.methods is not None:
         methods = tuple(
