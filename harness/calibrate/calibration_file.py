@@ -1,7 +1,8 @@
 """Calibration files: human-readable TOML that reads back bit for bit.
 
 Keys hold metres and unit quaternions (w, x, y, z). There is a table for each station, in the order of the stream's
-rows. The table `[diagnostics]` is information for people; the harness does not use it.
+rows. The table `[diagnostics]` is information for people. The first line is a digest of all others
+(`core.toml_digest`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,14 +14,13 @@ import numpy as np
 
 from harness.core.calibration import Calibration
 from harness.core.fields import build
-from harness.core.files import read_toml
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.output_file import write_output
 from harness.core.skeleton import Skeleton
+from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
 from harness.core.toml_text import format_toml_key, format_toml_value, toml_table_lines
 from harness.errors import BadFile, BadInput, HarnessError
 
-SCHEMA = 1
 EXPECTED = "a calibration"
 _ADVICE = "`harness calibrate` writes one; docs/calibration.md has the format."
 _UNIT_TOLERANCE = 1e-6
@@ -45,6 +45,8 @@ class CalibrationFile:
     """The performer's skeleton, with the standard body's hinges; None leaves the body to the scenario."""
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
     """Quality figures of the calibration: strings, numbers, booleans, and lists and mappings of them."""
+    caveat: str = ""
+    """What cannot be verified of the file that it was read from; "" if its digest fits."""
 
     def difference(self, stations: Sequence[str]) -> str:
         """Both lists, where the worn stations are not the calibrated ones in the same order; else nothing."""
@@ -102,22 +104,38 @@ class _FileContent:
 
 def write_calibration(path: Path, content: CalibrationFile, *, force: bool = False) -> None:
     """Write a calibration file atomically; BadFile as `require_writable`, BadInput for a skeleton of other joints."""
-    write_output(path, "\n".join(_lines(content)) + "\n", EXPECTED, force=force)
+    write_output(path, insert_toml_digest("\n".join(_lines(content)) + "\n"), EXPECTED, force=force)
 
 
 def read_calibration(path: Path | str) -> CalibrationFile:
-    """Read a calibration file; BadFile for anything else, for another schema, and for impossible values."""
+    """Read a calibration file.
+
+    BadFile for anything else, for another schema, for a file that is cut, damaged or edited, and for impossible values.
+    """
     path = Path(path)
-    content = read_toml(path, EXPECTED, _ADVICE)
-    schema = content.get("schema")
-    if schema != SCHEMA:
-        advice = "This version of the harness reads no other."
-        raise BadFile(path, "no schema" if schema is None else f"schema {schema!r}", f"schema {SCHEMA}", advice)
+    content, caveat = read_digested_toml(path, EXPECTED, _ADVICE)
     try:
         tables = build(_FileContent, content, "calibration")
-        return CalibrationFile(_calibration(tables), _skeleton(tables), tables.diagnostics)
+        found = CalibrationFile(_calibration(tables), _skeleton(tables), tables.diagnostics, caveat)
     except (TypeError, ValueError, HarnessError) as error:
         raise BadFile(path, str(error).rstrip("."), EXPECTED, _ADVICE) from error
+    if tables.schema == EARLIER_SCHEMA:
+        _require_all(path, tables)
+    return found
+
+
+def _require_all(path: Path, content: _FileContent) -> None:
+    """BadFile when a file without a digest lacks what `harness calibrate` always wrote: it was cut or lost lines."""
+    listed = content.diagnostics.get("stations")
+    lost = [f"[station.{name}]" for name in listed if name not in content.station] if isinstance(listed, dict) else []
+    if content.bone_m is None and content.kind == "poses":
+        lost.append("[bone_m]")
+    if not content.diagnostics:
+        lost.append("[diagnostics], with which such a file ends")
+    if lost:
+        raise BadFile(
+            path, f"damaged: no {lost[0]}", "a whole calibration", "Restore it from a copy, or calibrate again."
+        )
 
 
 def _calibration(content: _FileContent) -> Calibration:

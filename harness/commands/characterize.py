@@ -13,6 +13,7 @@ from harness.commands.common import (
     line_options,
     parse_device_names,
     positive_float,
+    print_caveat,
     print_result,
     print_status,
     show_progress,
@@ -63,6 +64,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     if args.out is not None:
         require_writable(args.out, UNIT_FILE, force=args.force)
     expected = None if args.expect is None else read_unit_file(args.expect)
+    print_caveat(args.expect, expected.caveat if expected else "")
     pair = _parse_pair(args.rigid)
     capture = _capture_of(args)
     with ProgressBar("parts") as progress:

@@ -236,6 +236,12 @@ def print_status(line: str) -> None:
     print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
 
 
+def print_caveat(path: object, caveat: str) -> None:
+    """Print what cannot be verified of a file, if there is anything."""
+    if caveat:
+        print_status(f"note: {path}: {caveat}")
+
+
 def show_progress(line: str) -> None:
     """Replace the last line of stderr, if stderr is a terminal; what is too long for a line is cut."""
     if sys.stderr.isatty():

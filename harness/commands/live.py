@@ -18,6 +18,7 @@ from harness.commands.common import (
     line_options,
     parse_stations,
     positive_float,
+    print_caveat,
     print_result,
     print_status,
     repeat_flags,
@@ -109,7 +110,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
         named = args.stations is not None and not is_whole_number(args.stations)
-        playback = playback.with_calibration(read_calibration(args.calibration), named=named, say=print_status)
+        calibration = read_calibration(args.calibration)
+        print_caveat(args.calibration, calibration.caveat)
+        playback = playback.with_calibration(calibration, named=named, say=print_status)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":

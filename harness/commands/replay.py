@@ -7,7 +7,15 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import Verbs, add_verb, parse_names, print_result, print_status, repeat_flags
+from harness.commands.common import (
+    Verbs,
+    add_verb,
+    parse_names,
+    print_caveat,
+    print_result,
+    print_status,
+    repeat_flags,
+)
 from harness.commands.ending import print_data
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -123,6 +131,7 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     playback = score_recording.find_playback(stream, **options, folder=args.mocap)
     if args.calibration is not None:
         kept = read_calibration(args.calibration)
+        print_caveat(args.calibration, kept.caveat)
         named = args.stations is not None or score_recording.has_station_names(stream, playback.scenario)
         playback = playback.with_calibration(kept, named=named, say=print_status)
     methods = playback.scenario.methods

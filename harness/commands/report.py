@@ -43,11 +43,13 @@ def run_report(args: argparse.Namespace) -> Outcome:
 
 def _report_sweep(args: argparse.Namespace) -> Outcome:
     from harness.report.sweep.page import write_sweep_page
+    from harness.results.integrity import check_cells
 
     if args.movie:
         raise BadInput(
             f"--movie with {args.run}, a sweep.", "Movies show cells of a run: name the folder of `harness run`."
         )
+    check_cells(args.run)
     with show_steps("parts of the report"):
         page = write_sweep_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}")

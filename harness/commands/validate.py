@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, this_command
+from harness.commands.common import Verbs, add_verb, print_caveat, print_result, this_command
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
@@ -43,6 +43,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     if args.out is not None:
         require_writable(args.out, UNIT_FILE, force=args.force)
     expected = None if args.expect is None else read_unit_file(args.expect)
+    print_caveat(args.expect, expected.caveat if expected else "")
     truth = load_truth(args.capture, args.truth, scenario=args.scenario, folder=args.mocap)
     methods = split_outside_brackets(args.methods, ",") if args.methods else []
     if methods and truth.playback is None:

@@ -206,7 +206,11 @@ def read_toml(path: Path, expected: str, advice: str) -> dict[str, Any]:
 
     `expected` and `advice` complete the message: what the file should be, and what to try.
     """
-    data = read_input_file(path, expected, MAX_TOML_BYTES, advice)
+    return parse_toml(path, read_input_file(path, expected, MAX_TOML_BYTES, advice), expected, advice)
+
+
+def parse_toml(path: Path, data: bytes, expected: str, advice: str) -> dict[str, Any]:
+    """The content of a TOML file; BadFile, in one line, when it is no TOML."""
     try:
         return parsing.parse_toml(data.decode("utf-8").replace("\r\n", "\n"))
     except ValueError as error:

@@ -1,12 +1,14 @@
 """The errors, clock and tracker of a measured unit in a scenario: the key `fitted`."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from harness.core.fields import build, replace_fields
+from harness.core.toml_digest import EARLIER_SCHEMA
 from harness.errors import BadFile, BadInput, HarnessError
-from harness.measure.unit_file import UNIT_FILE, UnitFile, read_unit_file
+from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import noise_preset
 
@@ -17,8 +19,16 @@ FITTED_PRESET = "default"
 def read_fitted_unit(path: Path) -> UnitFile:
     """Read a unit file and check its values as those of a scenario; BadFile."""
     unit = read_unit_file(path)
+    preset = noise_preset(FITTED_PRESET)
+    if unit.schema == EARLIER_SCHEMA:
+        for name, component in asdict(preset).items():
+            for field in component or {}:
+                if unit.components.get(name, {}).get(field) is None:
+                    raise BadFile(
+                        path, f"damaged: no components.{name}.{field}", f"the whole of {UNIT_FILE}", CUT_ADVICE
+                    )
     try:
-        replace_fields(noise_preset(FITTED_PRESET), unit.components, "components")
+        replace_fields(preset, unit.components, "components")
         build(TrackerConfig, unit.tracker, "tracker")
     except (TypeError, ValueError, HarnessError) as error:
         advice = "Each key is one of a scenario's [components] or [tracker]; the message names the wrong one."

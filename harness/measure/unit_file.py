@@ -2,7 +2,8 @@
 
 A scenario names the file with the key `fitted`. The tables `[components]` and `[tracker]` hold the values that a
 scenario takes over. `[measured]` holds value, interval and count of each measured key. `[not_measured]` says why a key
-kept its default. `[session]` holds what a reference showed of the session, such as latency and scale.
+kept its default. `[session]` holds what a reference showed of the session, such as latency and scale. The first line
+is a digest of all others (`core.toml_digest`).
 """
 
 import math
@@ -12,15 +13,15 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from harness.core.fields import build
-from harness.core.files import read_toml
 from harness.core.output_file import write_output
+from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
 from harness.core.toml_text import format_toml_value, toml_table_lines
 from harness.errors import BadFile, HarnessError
 from harness.measure.conventions import require_scale
 from harness.measure.measured import Measured
 
-UNIT_SCHEMA = 1
 UNIT_FILE = "a unit file"
+CUT_ADVICE = "Restore it from a copy, or measure the unit again."
 _ADVICE = "`harness characterize` writes one; docs/hil.md has the format."
 _HEAD = """\
 # Errors, clock and tracker of one device, written by `harness characterize`. A scenario names it: fitted = "FILE".
@@ -45,6 +46,10 @@ class UnitFile:
     """What a reference showed of the session: name -> measured number."""
     capture: Mapping[str, Any] = field(default_factory=dict)
     """Origin of the measurement: file, digest, duration and more; information for people."""
+    schema: int = SCHEMA
+    """Schema of the file that it was read from."""
+    caveat: str = ""
+    """What cannot be verified of that file; "" if its digest fits."""
 
 
 @dataclass(frozen=True)
@@ -66,22 +71,20 @@ class _UnitTables:
 
 def write_unit_file(path: Path, unit: UnitFile, *, force: bool = False) -> None:
     """Write a unit file atomically; BadFile when it exists without `force`, or cannot be written."""
-    write_output(path, "\n".join(_lines(unit)) + "\n", UNIT_FILE, force=force)
+    write_output(path, insert_toml_digest("\n".join(_lines(unit)) + "\n"), UNIT_FILE, force=force)
 
 
 def read_unit_file(path: Path | str) -> UnitFile:
-    """Read a unit file; BadFile for anything else, unknown tables, numbers that contradict each other, and a session's
-    scale that is no tracker's.
+    """Read a unit file.
 
+    BadFile for anything else, for one that is cut, damaged or edited, unknown tables, contradicting numbers, and a
+    session's scale that is no tracker's.
     The values of `components` and `tracker` are checked where a scenario takes them over.
     """
     path = Path(path)
-    content = read_toml(path, UNIT_FILE, _ADVICE)
+    content, caveat = read_digested_toml(path, UNIT_FILE, _ADVICE)
     if content.get("kind") != "unit":
         raise BadFile(path, f"kind {content.get('kind')!r}", 'a unit file with kind = "unit"', _ADVICE)
-    if content.get("schema") != UNIT_SCHEMA:
-        advice = "This version of the harness reads no other."
-        raise BadFile(path, f"schema {content.get('schema')!r}", f"schema {UNIT_SCHEMA}", advice)
     try:
         tables = build(_UnitTables, content, "unit")
         for name, value in tables.components.items():
@@ -94,13 +97,32 @@ def read_unit_file(path: Path | str) -> UnitFile:
             require_scale(1.0 + session["scale"].value)
     except (TypeError, ValueError, HarnessError) as error:
         raise BadFile(path, str(error).rstrip("."), UNIT_FILE, _ADVICE) from error
-    return UnitFile(
-        tables.name, tables.components, tables.tracker, measured, tables.not_measured, session, tables.capture
-    )
+    numbers = (measured, tables.not_measured, session, tables.capture)
+    unit = UnitFile(tables.name, tables.components, tables.tracker, *numbers, tables.schema, caveat)
+    if unit.schema == EARLIER_SCHEMA:
+        _require_all(path, unit, content)
+    return unit
+
+
+def _require_all(path: Path, unit: UnitFile, content: Mapping[str, Any]) -> None:
+    """BadFile when a file without a digest lacks what was always written: it was cut or lost lines.
+
+    `experiment.fitted_unit` also looks for every field of each component.
+    """
+    lost = [key for key in (*unit.measured, *unit.not_measured) if _find_value(unit, key) is None]
+    lost += [f"tracker.{key}" for key in ("rate_hz", "items") if key not in unit.tracker]
+    lost += [f"[{table}]" for table in ("measured", "not_measured", "capture") if table not in content]
+    if lost:
+        raise BadFile(path, f"damaged: no {lost[0]}", f"the whole of {UNIT_FILE}", CUT_ADVICE)
 
 
 def unit_value(unit: UnitFile, key: str) -> float | None:
     """The value of a dotted key of [components] or [tracker]; None where it is not there or no number."""
+    value = _find_value(unit, key)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _find_value(unit: UnitFile, key: str) -> Any:
     value: Any = {"components": unit.components, "tracker": unit.tracker}
     for part in key.split("."):
         if isinstance(value, Mapping):
@@ -109,11 +131,11 @@ def unit_value(unit: UnitFile, key: str) -> float | None:
             value = value[int(part)]
         else:
             return None
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+    return value
 
 
 def _lines(unit: UnitFile) -> Iterator[str]:
-    yield from (_HEAD, f"schema = {UNIT_SCHEMA}", 'kind = "unit"', f"name = {format_toml_value(unit.name)}", "")
+    yield from (_HEAD, f"schema = {SCHEMA}", 'kind = "unit"', f"name = {format_toml_value(unit.name)}", "")
     for name, component in unit.components.items():
         yield from (*toml_table_lines(f"components.{name}", component), "")
     yield from (*toml_table_lines("tracker", unit.tracker), "")

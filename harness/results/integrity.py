@@ -4,13 +4,13 @@ The index has the digests of manifest.json, summary.json and summary.csv. Cells 
 (`cell.read_content`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from harness.core.files import MAX_JSON_BYTES
 from harness.errors import BadFile
-from harness.results.cell import OPTIONAL_COLUMNS, cell_folder
+from harness.results.cell import OPTIONAL_COLUMNS, cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, file_digest, read_result_json
 from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
@@ -31,6 +31,19 @@ def check_folder(out: Path) -> None:
     """
     Manifest.read(out / "manifest.json")
     check_index(out)
+
+
+def check_cells(out: Path, rows: Iterable[Mapping[str, Any]] | None = None) -> None:
+    """Check each cell of a run or sweep against its digests and its row.
+
+    `rows` are those of summary.json, by default those of the index. BadFile names the first file that is missing,
+    damaged, edited or contradicts another one.
+    """
+    with CellIndex(out, read_only=True) as index:
+        path = index.path if rows is None else out / SUMMARY
+        for row in index.rows() if rows is None else rows:
+            folder = cell_folder(out, row["key"])
+            check_row(path, row, row_of_content(folder, read_content(folder)))
 
 
 def check_index(out: Path) -> None:

@@ -1,6 +1,7 @@
 """Calibration files: every digit is read back, and impossible content is refused."""
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from harness.calibrate.calibration_file import CalibrationFile, read_calibration
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
+from tests.core.digested_toml import as_earlier_version, declare_edited
 
 
 def kept(
@@ -139,9 +141,10 @@ def line(key: str, value: str) -> Callable[[str], str]:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (line("schema", "2"), "schema 2; expected schema 1"),
-        (line("schema", '"1"'), "schema '1'; expected schema 1"),
-        (without("schema"), "no schema; expected schema 1"),
+        (line("schema", "3"), "schema 3; expected schema 2"),
+        (line("schema", '"1"'), "schema '1'; expected schema 2"),
+        (line("schema", "true"), "schema True; expected schema 2"),
+        (without("schema"), "no schema; expected schema 2"),
         (lambda text: text + "[", "not TOML"),
         (lambda text: text.replace("mount_m", "mont_m"), "Did you mean 'mount_m'"),
         (lambda text: text.replace("[room]", "[rom]"), "Did you mean 'room'"),
@@ -168,7 +171,7 @@ def test_what_cannot_be_true_is_refused(
 ) -> None:
     path = tmp_path / "a.toml"
     write_calibration(path, kept(rng))
-    before = path.read_text(encoding="utf-8")
+    before = declare_edited(path.read_text(encoding="utf-8"))
     path.write_text(change(before), encoding="utf-8")
     assert path.read_text(encoding="utf-8") != before
     with pytest.raises(BadFile) as caught:
@@ -176,6 +179,61 @@ def test_what_cannot_be_true_is_refused(
     assert says in str(caught.value)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_every_lost_line_and_every_cut_is_noticed(tmp_path: Path, rng: np.random.Generator) -> None:
+    path = tmp_path / "a.toml"
+    write_calibration(path, kept(rng, made="today", stations_sd={"head": 1.0}))
+    whole = path.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    changed = [b"".join(lines[:n] + lines[n + 1 :]) for n in range(len(lines))]
+    changed += [b"".join(lines[:n]) for n in range(len(lines))] + [
+        whole[:-2],
+        whole + b"\n",
+        whole.replace(b"0.", b"1.", 1),
+    ]
+    assert len(changed) > 80
+    for content in changed:
+        path.write_bytes(content)
+        with pytest.raises(BadFile) as caught:
+            read_calibration(path)
+        assert "\n" not in str(caught.value)
+    path.write_bytes(whole.replace(b"\n", b"\r\n"))
+    assert read_calibration(path).caveat == ""  # as a checkout on Windows has it
+
+
+def test_an_edit_that_is_declared_is_read_with_a_caveat(tmp_path: Path, rng: np.random.Generator) -> None:
+    path = tmp_path / "a.toml"
+    write_calibration(path, kept(rng))
+    change = line("ltibia", "[0.0, 0.0, -0.4]")
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(BadFile, match=r'does not fit its digest.*its first line is sha256 = "edited"'):
+        read_calibration(path)
+    path.write_text(declare_edited(path.read_text(encoding="utf-8")), encoding="utf-8")
+    found = read_calibration(path)
+    assert found.skeleton is not None
+    assert found.skeleton.bone_m[BONES.index("ltibia"), 2] == -0.4
+    assert "edited by hand" in found.caveat
+
+
+def test_a_file_of_an_earlier_version_has_to_be_whole(tmp_path: Path, rng: np.random.Generator) -> None:
+    path = tmp_path / "a.toml"
+    listed = {"stations": {"head": {"sd_m": 0.01}, "left wrist": {"sd_m": 0.01}}}
+    write_calibration(path, replace(kept(rng), diagnostics=listed))
+    text = as_earlier_version(path)
+    path.write_text(text, encoding="utf-8")
+    assert "without a digest" in read_calibration(path).caveat
+    without_head = text[: text.index("[station.head]")] + text[text.index('[station."left wrist"]') :]
+    without_bones = text[: text.index("[bone_m]")] + text[text.index("[diagnostics]") :]
+    for content, lost in (
+        (text[: text.index("[bone_m]")], "[bone_m]"),
+        (text[: text.index("[diagnostics]")], "[diagnostics]"),
+        (without_head, "[station.head]"),
+        (without_bones, "[bone_m]"),
+    ):
+        path.write_text(content, encoding="utf-8")
+        with pytest.raises(BadFile, match=f"damaged: no {re.escape(lost)}"):
+            read_calibration(path)
 
 
 def test_stations_are_found_by_name(rng: np.random.Generator) -> None:

@@ -8,9 +8,11 @@ import pytest
 
 from harness.errors import BadFile, BadInput
 from harness.experiment.clip_evaluation import noise_of
+from harness.experiment.fitted_unit import read_fitted_unit
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.simulate.noise import noise_preset
+from tests.core.digested_toml import as_earlier_version
 
 SCENARIO = """
 schema = 1
@@ -50,6 +52,21 @@ def test_a_scenario_takes_over_the_unit(tmp_path: Path) -> None:
     assert noise.excursion == noise_preset("default").excursion
     assert scenario.tracker.rate_hz == 60.0
     assert scenario.noise_label == "unit 7"
+
+
+def test_a_unit_file_of_an_earlier_version_has_every_field(tmp_path: Path) -> None:
+    """A field that a line was lost of would silently be that of the preset."""
+    path = tmp_path / "unit.toml"
+    write_unit_file(path, replace(unit(), tracker={"rate_hz": 60.0, "items": [40, 2, 11, 21, 1]}))
+    text = as_earlier_version(path)
+    path.write_text(text)
+    assert read_fitted_unit(path).components["white"]["position_m"] == 0.002
+    white = text[text.index("[components.white]") : text.index("[components.excursion]")]
+    for lost, field in (("position_m = 0.002\n", "white.position_m"), (white, "white.position_m")):
+        assert lost in text
+        path.write_text(text.replace(lost, "", 1))
+        with pytest.raises(BadFile, match=f"damaged: no components.{field}"):
+            read_fitted_unit(path)
 
 
 def test_the_scenarios_own_tables_take_precedence(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ behaviours = ["boxing"]
 test = ["boxing_p1_01"]
 longest_s = 2.0
 """
-CAVE = (data_folder("models") / "constellations" / "cave.mcf").read_text(encoding="utf-8").splitlines()
+CAVE = (data_folder("models") / "constellations" / "cave.mcf").read_text(encoding="utf-8").splitlines()[1:]
 SLIP = '[components]\nmount_slip = [{ station = "head", along_m = 0.01, over_s = 0.0 }]'
 
 

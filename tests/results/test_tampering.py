@@ -16,10 +16,12 @@ from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
 from harness.experiment.status import read_status
-from harness.report.run.data import read_run
+from harness.report.figures.conditions import read_conditions
+from harness.report.run.data import read_run, read_summary_only
 from harness.results.cell import read_row
 from harness.results.digests import file_digest
 from harness.results.index import INDEX_FILE, CellIndex
+from harness.results.integrity import check_cells, check_folder
 from harness.results.loaded_run import load_run
 from harness.results.reader import load_results
 from harness.results.storage import read_cells
@@ -181,12 +183,23 @@ OF_FOLDER: dict[str, tuple[Change, str]] = {
         "manifest.json",
     ),
 }
+
+
+def check_sweep(out: Path) -> None:
+    """What `harness report` does before it reads a sweep."""
+    check_folder(out)
+    check_cells(out)
+
+
 READERS: dict[str, Callable[[Path], object]] = {
     "load": load_run,
     "compare": lambda out: compare_runs(out, out),
     "report": read_run,
     "baseline": lambda out: write_baseline(out, "kept"),
     "export": lambda out: list(read_cells(out)),
+    "table and plot": read_conditions,
+    "view": read_summary_only,
+    "report of a sweep": check_sweep,
 }
 
 
@@ -219,6 +232,8 @@ def test_tampering_is_refused_by_every_reader(run: Path, name: str) -> None:
         ("baseline", "save", "mine", "run"),
         ("status", "run"),
         ("export", "run", "--format", "csv"),
+        ("table", "run"),
+        ("plot", "run"),
     ],
 )
 def test_commands_refuse_in_one_line(run: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
@@ -229,6 +244,20 @@ def test_commands_refuse_in_one_line(run: Path, words: tuple[str, ...], capsys: 
     assert len(lines) == 1 or lines[1:] == [Outcome.REFUSED.word], lines
     assert lines[0].startswith("harness: run/summary.json: damaged or edited")
     assert "Give the command of the run again" in lines[0]
+
+
+@pytest.mark.parametrize("words", [("table", "run"), ("plot", "run", "--out", "a.pdf"), ("view", "run")])
+@pytest.mark.parametrize("file", ["cell.json", "frames.npz"])
+def test_no_number_of_a_run_with_a_damaged_cell_is_printed(
+    run: Path, words: tuple[str, ...], file: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = cells(run)[-1] / file
+    path.write_bytes(path.read_bytes()[:-1])
+    assert main(words) == Outcome.REFUSED.exit_code
+    said = capsys.readouterr()
+    assert said.out.strip() in ("", Outcome.REFUSED.word)
+    assert f"{file}: " in said.err
+    assert not Path("a.pdf").exists()
 
 
 @pytest.mark.parametrize(

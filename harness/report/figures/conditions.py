@@ -13,7 +13,7 @@ from harness.report.kit.text import list_first
 from harness.report.run.data import Row, lag_of, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
 from harness.results.cell import varied_text
-from harness.results.integrity import check_folder
+from harness.results.integrity import check_cells, check_folder
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary
 from harness.score.metrics import DEFINITIONS
@@ -110,6 +110,7 @@ def read_conditions(folder: Path) -> ConditionSet:
     check_folder(folder)
     summary = read_summary(folder)
     cells: Sequence[Row] = summary["cells"]
+    check_cells(folder, cells)
     if all(row[PRIMARY_METRIC] is None for row in cells):
         raise NothingMeasured(folder, len(summary["failures"]))
     keys = list[tuple[Mapping[str, Any], RankingGroup]]()

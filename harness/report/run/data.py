@@ -13,7 +13,7 @@ from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.style import STYLES
 from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, varied_text
-from harness.results.integrity import SUMMARY, check_folder, check_row
+from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.results.summary import GROUP_KEYS
@@ -141,9 +141,10 @@ def read_run(out: Path) -> RunData:
 
 
 def read_summary_only(out: Path) -> RunData:
-    """Read the run in `out` without its traces; BadFile as `read_run`, except that no cell is read."""
+    """Read the run in `out` without its traces, after a check of all its cells; BadFile as `read_run`."""
     check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
+    check_cells(out, summary["cells"])
     return RunData(out, manifest, last_varied(summary), (), summary)
 
 

@@ -21,6 +21,7 @@ from harness.experiment.cells import clear_caches
 from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
 from harness.experiment.scenario import Scenario, load_scenario
+from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import write_result_json
 from harness.results.trust_findings import (
@@ -105,6 +106,7 @@ def run_trust_study(
             raise OtherPlan(str(capture), found, digest)
     scenario = load_scenario(scenario_file(plan, path))
     unit = unit_file(plan, path)
+    fitted = None if unit is None else read_fitted_unit(unit)
     task = CaptureTask(
         capture=Path(),
         clip="",
@@ -113,7 +115,7 @@ def run_trust_study(
         parameters=plan.parameters,
         metrics=tuple(plan.margins),
         seeds=plan.seeds,
-        unit=None if unit is None else _unit_keys(unit),
+        unit=None if fitted is None else _unit_keys(fitted),
         out=out,
         folder=folder,
     )
@@ -143,6 +145,7 @@ def run_trust_study(
                 for capture, found, result in zip(captures, carried, results, strict=True)
             ),
             arms=tuple(map(str, task.arms)),
+            notes=(f"{plan.unit}: {fitted.caveat}.",) if fitted and fitted.caveat else (),
         )
         findings = judge_study(head, plan, task.arms, results)
         write_result_json(out / FINDINGS_FILE, {**asdict(findings), "outcome": findings.outcome.word})
@@ -188,7 +191,7 @@ def judge_study(
         for cell in (*result.device.values(), *(each for seeds in result.simulated.values() for each in seeds))
         for value in cell.values()
     )
-    notes = [note for result in results for note in result.notes]
+    notes = [*head.notes, *(note for result in results for note in result.notes)]
     if unmeasured:
         notes.append(f"{unmeasured} errors were not measured: too few frames have an estimate.")
     return replace(
@@ -304,9 +307,8 @@ def _carried_plans(path: Path) -> tuple[str, ...]:
     return capture.noted_values(PLAN)
 
 
-def _unit_keys(path: Path) -> dict[str, Any]:
-    """Scenario keys that a fitted unit replaces; BadFile."""
-    unit = read_fitted_unit(path)
+def _unit_keys(unit: UnitFile) -> dict[str, Any]:
+    """Scenario keys that a fitted unit replaces."""
     return {"noise": FITTED_PRESET, "profile": unit.name, "components": unit.components, "tracker": unit.tracker}
 
 

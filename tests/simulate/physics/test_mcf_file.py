@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from harness.core.package_data import data_folder
 from harness.errors import BadFile
 from harness.simulate.physics.mcf_file import MAX_MCF_BYTES, read_mcf, write_mcf
 from harness.stream.codec.replies import Emitter
@@ -88,6 +89,39 @@ def test_a_damaged_line_is_named(third: bytes, said: str, tmp_path: Path) -> Non
     assert caught.value.line == 4
     assert said in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+FOURTH = b"31F      4    0.0000    0.0000    0.0000   0.00   0.00   1.00   5004\r\n"
+FOUR = [LINE, *OTHERS, FOURTH]
+
+
+@pytest.mark.parametrize("lost", range(4))
+def test_a_lost_line_is_noticed(tmp_path: Path, lost: int) -> None:
+    """The first line says how many there are; without it the number of an emitter is missed, but for the last one."""
+    rest = [line for place, line in enumerate(FOUR) if place != lost]
+    with pytest.raises(BadFile, match="4 emitters announced and 3 listed"):
+        read_mcf(write(tmp_path, b"# 4 emitters\r\n", *rest))
+    if lost < 3:
+        with pytest.raises(BadFile, match=f"no emitter {lost + 1}, though there are later ones"):
+            read_mcf(write(tmp_path, *rest))
+    assert len(read_mcf(write(tmp_path, b"# 3 emitters\n", *rest))) == 3  # a gap that is meant
+    assert len(read_mcf(write(tmp_path, *FOUR))) == 4
+
+
+@pytest.mark.parametrize("head", [b"", b"# 4 emitters\r\n"])
+def test_a_last_line_that_was_cut_is_noticed(tmp_path: Path, head: bytes) -> None:
+    """Two digits of the identity are lost: the rest is still a line."""
+    whole = head + b"".join(FOUR)
+    with pytest.raises(BadFile, match="shorter than others and has no end"):
+        read_mcf(write(tmp_path, whole[:-4]))
+    assert read_mcf(write(tmp_path, whole[:-2]))[-1].identity == 5004  # the line end alone
+
+
+@pytest.mark.parametrize(("name", "count"), [("cave", 9), ("hall", 36)])
+def test_shipped_constellations_announce_their_number(name: str, count: int) -> None:
+    path = data_folder("models") / "constellations" / f"{name}.mcf"
+    assert path.read_bytes().startswith(b"# %d emitters\r\n" % count)
+    assert len(read_mcf(path)) == count
 
 
 @pytest.mark.parametrize("lines", [[], [b"\r\n \r\n"], [LINE], [LINE, OTHERS[0]]])
