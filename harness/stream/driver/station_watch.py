@@ -47,29 +47,30 @@ class StationWatch:
         self._missing, self._others = dict.fromkeys(self._missing, 0), {}
         self._unexpected = set(expected)
 
-    def silent(self, now_s: float) -> list[str]:
-        """Return the stations of the session that have sent nothing for `stalled_s` and were not reported."""
-        return self._unreported(now_s, self._timing.stalled_s)
-
-    def hears(self, now_s: float) -> bool:
-        """Whether any station of the session has sent something within `stalled_s`."""
-        return any(now_s - heard_s <= self._timing.stalled_s for heard_s in self._heard_s.values())
+    @property
+    def silent(self) -> list[str]:
+        """Stations that sent nothing for `stalled_s` while others did, and were not reported."""
+        return self._behind(self._timing.stalled_s)
 
     def update(self, totals: Mapping[str, int], now_s: float) -> list[StationEvent]:
         """Return what changed; `totals` are the records of every station since the start, by its character."""
         new = {c: total for c, total in totals.items() if total > self._totals.get(c, 0)}
         self._totals |= new
-        if new and not self.hears(now_s):  # after a silence of all, each gets its time anew
-            self._heard_s = dict.fromkeys(self._heard_s, now_s)
+        if now_s - max(self._heard_s.values()) > self._timing.stalled_s and new.keys() & self._labels.keys():
+            self._heard_s = dict.fromkeys(self._heard_s, now_s)  # after a silence of all, each gets its time anew
         self._heard_s |= {c: now_s for c in new if c in self._labels}
         back = [c for c in new if c in self._missing and new[c] - self._missing[c] >= _CERTAIN]
         for c in back:
             del self._missing[c]
         events = [StationEvent("present", f"station {self._labels[c]} sends records again", c) for c in back]
-        if self.hears(now_s):
-            long_s = max(self._timing.silent_s, _SILENT_PERIODS * self._period_s)
-            events += self.report_missing(self._unreported(now_s, long_s), f"sends no record for {long_s:.1f} s")
+        long_s = max(self._timing.silent_s, _SILENT_PERIODS * self._period_s)
+        events += self.report_missing(self._behind(long_s), f"sends no record for {long_s:.1f} s")
         return events + [event for c in new if c not in self._labels for event in self._add_other(c, new[c], now_s)]
+
+    def report_off(self, active: Collection[str], now_s: float) -> list[StationEvent]:
+        """Return an event for each station that the device tells as off, and that has sent nothing for `stalled_s`."""
+        quiet = (c for c, heard_s in self._heard_s.items() if now_s - heard_s > self._timing.stalled_s)
+        return self.report_missing([c for c in quiet if c not in active], "is switched off")
 
     def report_missing(self, stations: Collection[str], what: str) -> list[StationEvent]:
         """Return an event for each of these stations of the session that was not reported."""
@@ -78,8 +79,10 @@ class StationWatch:
         text = "its rows are invalid until it comes back"
         return [StationEvent("missing", f"station {self._labels[c]} {what}: {text}", c) for c in new]
 
-    def _unreported(self, now_s: float, silent_s: float) -> list[str]:
-        return [c for c, heard_s in self._heard_s.items() if now_s - heard_s > silent_s and c not in self._missing]
+    def _behind(self, silent_s: float) -> list[str]:
+        """Return the stations whose last record is so much older than the last one of all, and were not reported."""
+        last_s = max(self._heard_s.values())
+        return [c for c, heard_s in self._heard_s.items() if last_s - heard_s > silent_s and c not in self._missing]
 
     def _add_other(self, station: str, total: int, now_s: float) -> list[StationEvent]:
         """Count records of a station outside the session; an event when they cannot be damage."""
