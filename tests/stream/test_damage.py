@@ -225,7 +225,9 @@ def _lost_far_from_damage(name: str, seed: int, rounds: int) -> int:
     decoded = decoded_records([*events, *decoder.finish()], capture)
     near = np.convolve(damaged, np.ones(2 * BESIDE + 1), "same") > 0
     return sum(
-        message[:1] == b"0" and not decoded[message] for message, beside in zip(messages, near, strict=True) if not beside
+        message[:1] == b"0" and not decoded[message]
+        for message, beside in zip(messages, near, strict=True)
+        if not beside
     )
 
 

@@ -43,8 +43,9 @@ class DriverConfig:
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
     keep_settings: bool = False
-    """Whether the device keeps what other programs have set: tip offsets, alignments, boresight reference angles, filters
-    and boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
+    """Whether the device keeps what other programs have set: tip offsets, alignments, boresight reference angles,
+    filters and boresight. Otherwise they are at their defaults during the session. At its end they are put back, except
+    boresight.
     """
     reach_m: float | None = None
     """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
@@ -83,7 +84,9 @@ class DriverConfig:
     @property
     def settings(self) -> RecordFormat:
         """Number format that the device will be configured for."""
-        return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6, stylus_bytes=self.stylus_bytes)
+        return RecordFormat(
+            0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6, stylus_bytes=self.stylus_bytes
+        )
 
     def alignment_of(self, station: str) -> Alignment | None:
         """Return the reporting frame of the station with this name, or None."""

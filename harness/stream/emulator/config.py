@@ -79,6 +79,7 @@ class EmulatorConfig:
         characters = self.characters or known[:stations]
         if len(characters) != stations or "".join(c for c in known if c in characters) != characters:
             raise BadInput(
-                f"characters = {characters!r} do not fit {stations} stations.", f"Give one of {known} for each, ascending."
+                f"characters = {characters!r} do not fit {stations} stations.",
+                f"Give one of {known} for each, ascending.",
             )
         return characters

@@ -59,7 +59,9 @@ def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: floa
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
     )
-    ranges = [device.rounds.ranges(now_s, name, device.settings) if name in quality else (0, 0) for name in STATION_NAMES]
+    ranges = [
+        device.rounds.ranges(now_s, name, device.settings) if name in quality else (0, 0) for name in STATION_NAMES
+    ]
     received, rejected = zip(*ranges, strict=True)
     device.reply(now_s, TrackingStatus(states, received, rejected, device.samples.rate_hz))
 

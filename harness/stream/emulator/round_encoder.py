@@ -40,7 +40,11 @@ class RoundEncoder:
         """Return the quality of the station's latest reading, 0 to 1."""
         row = self.plugged.index(station)
         instant = self.player.instant_of(self.player.latest(now_s, row))
-        return 0.0 if self._is_lost(station, settings) else float(np.clip(self.player.samples.quality[instant, row], 0.0, 1.0))
+        return (
+            0.0
+            if self._is_lost(station, settings)
+            else float(np.clip(self.player.samples.quality[instant, row], 0.0, 1.0))
+        )
 
     def orientation(self, now_s: float, station: str, settings: DeviceSettings) -> Floats:
         """Return the quaternion (4,) of the station's latest reading, before its geometry is applied."""
