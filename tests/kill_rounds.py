@@ -239,13 +239,15 @@ def kill_round(work: Work, kind: str, out: str, draw: random.Random, whole_s: fl
     result.faults += [f"left: {path}" for path in work.folder.rglob("*") if TEMPORARY in path.name]
     if kind == "emulate" and os.path.lexists(work.folder / out):
         result.faults.append(f"left: the link {out}")
+    if kind == "record" and result.code == 0 and not (work.folder / out).exists():
+        result.faults.append("pass without a file")
     _judge(result, said)
     return result
 
 
 def _judge(result: Round, said: str) -> None:
     """Add what is wrong with the exit code and the text."""
-    expected = {0} if result.finished or result.kind in KINDS_ENDLESS else {0, 130}  # 0: the result was there already
+    expected = {0} if result.finished else {0, 130}  # 0: the result was there already, or Ctrl-C is the normal end
     if result.early:
         expected |= {-number for number in SIGNALS} | {0, 1, 130}
     if result.code not in expected:
@@ -255,7 +257,7 @@ def _judge(result: Round, said: str) -> None:
         last = said.strip().splitlines()[-1:] or [""]
         if last[0] not in ("pass", "interrupted"):
             result.faults.append(f"the last lines are {said[-500:]!r}")
-        if result.code == 130 and "harness: stopped" not in said:
+        if result.code == 130 and "stopped" not in said:
             result.faults.append("no summary")
 
 

@@ -107,10 +107,10 @@ def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("verb", "expected"), [("emulate demo --pty link", 0), ("live --port none --scenario demo", 0), ("run demo", 130)]
+    "verb", ["emulate demo --pty link", "live --port none --scenario demo", "record sim:demo a.rec", "run demo"]
 )
-def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
-    verb: str, expected: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+def test_ctrl_c_while_a_verb_starts_is_an_interrupt_also_where_it_is_the_normal_end(
+    verb: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
@@ -118,7 +118,7 @@ def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
     monkeypatch.chdir(tmp_path)
     for where in ("harness.experiment.playback.prepare_playback", "harness.experiment.engine.run"):
         monkeypatch.setattr(where, interrupted)
-    assert main(verb.split()) == expected
+    assert main(verb.split()) == 130
     said = capsys.readouterr()
     assert "stopped" in said.out + said.err
 

@@ -120,7 +120,9 @@ def test_a_recording_is_good_from_its_first_record_on(
     assert last_words(capsys)[0] == ("pass" if records else "interrupted")
 
 
-@pytest.mark.parametrize("words", [["emulate", "demo", "--tcp", "127.0.0.1:0"], ["live", "--port", "x", "--scenario", "demo"]])
+@pytest.mark.parametrize(
+    "words", [["emulate", "demo", "--tcp", "127.0.0.1:0"], ["live", "--port", "x", "--scenario", "demo"]]
+)
 def test_emulate_and_live_that_are_stopped_while_they_prepare(
     words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

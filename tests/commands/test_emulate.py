@@ -18,7 +18,10 @@ from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario, find_scenario, load_scenario, variants
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct.methods.ik import PREVIOUS
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver.transport import open_transport
+from harness.stream.emulator import server
+from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import FaultKind
 from tests.interrupts import heeding_interrupts
 
@@ -140,3 +143,25 @@ def test_faults_cannot_be_varied() -> None:
     scenario = replace(load_scenario("emulator_faults"), vary={"fault": [[], []]})
     with pytest.raises(BadInput, match="cannot be varied"):
         variants(scenario)
+
+
+def test_stations_have_the_numbers_that_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A unit whose devices share receivers, with item 16 as two programs expect it."""
+    played: list[tuple[tuple[str, ...], EmulatorConfig]] = []
+
+    def play(samples: DeviceSamples, config: EmulatorConfig, *_: object) -> dict[str, float]:
+        played.append((samples.stations, config))
+        return {}
+
+    monkeypatch.setattr(server, "play_samples", play)
+    words = ["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--stylus-bytes", "2"]
+    assert main([*words, "--stations", "head=9,left_hand=2"]) == 0
+    talk = capsys.readouterr().err
+    assert "stations 2 left_hand, 9 head\n" in talk
+    assert "--stations left_hand,head" in talk
+    ((stations, config),) = played
+    assert (stations, config.characters, config.stylus_bytes) == (("left_hand", "head"), "29", 2)
+    assert main([*words, "--stations", "head=0"]) == 2
+    assert "'0' is no station of a device" in capsys.readouterr().err

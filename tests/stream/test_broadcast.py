@@ -187,7 +187,12 @@ def test_stations_of_a_broadcast_that_come_and_go_are_told_by_name() -> None:
         with Is900Broadcast(port, config, on_event=events.append, timing=timing) as tracker:
             assert tracker.station_list == "1 head, 3 hand"
             frames = iter(tracker)
-            for command, kind in ((b"", "connected"), (b"l3,0\r", "missing"), (b"l3,1\r", "present"), (b"lB,1\r", "unexpected")):
+            for command, kind in (
+                (b"", "connected"),
+                (b"l3,0\r", "missing"),
+                (b"l3,1\r", "present"),
+                (b"lB,1\r", "unexpected"),
+            ):
                 client.write(command)
                 began_s = time.monotonic()
                 while kind not in {event.kind for event in events} and time.monotonic() - began_s < TIMEOUT_S:

@@ -4,6 +4,7 @@
 """
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from tests.stream.damage import (
     Fate,
     Kind,
     count_lost,
+    damage,
     decoded_records,
     fate_of_damage,
     fate_of_wrong_station,
@@ -189,3 +191,54 @@ def test_mutations_of_every_format(min_mutations: int) -> None:
             intact[name] += expected
             arrived[name] += arrived_count
     assert {name: share for name in LISTS if (share := arrived[name] / intact[name]) < 0.9} == {}
+
+
+REPLIES = (
+    b"21S3FB         4.2301 IS900VET" + b" " * 23 + b"\r\n",  # "01 " in it looks like the head of a record
+    b"21O40 21121 1\r\n",
+    b"21l1111" + b"0" * 28 + b"\r\n",
+    b"31PTC0TC0TC0TC0X00X00X00X00X00X00X00X00   40  \r\n",
+)
+BESIDE = 2
+"""Messages on each side of a damaged one that its damage may cost."""
+
+
+def _lost_far_from_damage(name: str, seed: int, rounds: int) -> int:
+    """Return how many undamaged records do not arrive although no message near them is damaged.
+
+    Replies come between the records; one message in a hundred is damaged, and the bytes are read in random pieces.
+    """
+    rng, capture = np.random.default_rng([seed, 5]), make_capture(name, seed % 7, rounds)
+    messages = list(capture.records)
+    for at in np.sort(rng.integers(0, len(messages), len(messages) // 50))[::-1].tolist():
+        messages.insert(at, REPLIES[at % len(REPLIES)])
+    damaged = rng.random(len(messages)) < 0.01
+    sent = [
+        damage(message, KINDS[int(rng.integers(4))], int(rng.integers(len(message))), rng) if hit else message
+        for message, hit in zip(messages, damaged.tolist(), strict=True)
+    ]
+    data, decoder, events = b"".join(sent), capture.decoder(), list[DecoderEvent]()
+    pieces = int(rng.choice([20, 200, 2000]))
+    cuts = [0, *sorted(rng.integers(1, len(data), len(data) // pieces).tolist()), len(data)]
+    for start, stop in pairwise(cuts):
+        events += decoder.feed(data[start:stop])
+    decoded = decoded_records([*events, *decoder.finish()], capture)
+    near = np.convolve(damaged, np.ones(2 * BESIDE + 1), "same") > 0
+    return sum(
+        message[:1] == b"0" and not decoded[message]
+        for message, beside in zip(messages, near, strict=True)
+        if not beside
+    )
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_damage_costs_nothing_that_is_not_beside_it(name: str) -> None:
+    assert sum(_lost_far_from_damage(name, seed, 100) for seed in range(3)) == 0
+
+
+@pytest.mark.slow
+def test_millions_of_records_arrive_whatever_happens_elsewhere() -> None:
+    for name in LISTS:
+        lost = sum(_lost_far_from_damage(name, seed, 2000) for seed in range(40))
+        print(f"{name:16} {40 * 2000 * 4} records, {lost} lost far from damage", flush=True)
+        assert lost == 0, name

@@ -4,6 +4,7 @@ The faults are those of `scenarios/emulator_faults.toml`, drawn at random. HARNE
 """
 
 import os
+import sys
 from bisect import bisect_left
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -17,13 +18,15 @@ from harness.experiment.playback import prepare_playback
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_type
 from harness.stream.codec.records import RecordFormat
 from harness.stream.driver import DriverConfig, Is900, LineEvent
+from harness.stream.driver.transport import LineLost, open_transport
 from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
+from harness.stream.emulator.pty_port import PtyPort
 from harness.stream.frame import TrackerFrame
 
 RECONFIGURING_EVENTS = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
 """After these events the driver configures the device again, and data that arrive meanwhile are ignored."""
 CLOSING_S, MAX_DELAY_S = 0.25, 2.0
-"""Data in a pipe that is closed within this time are lost; other data arrive within `MAX_DELAY_S` [s]."""
+"""The driver begins to configure this long before its event; other data arrive within `MAX_DELAY_S` [s]."""
 
 NEIGHBOURS = 2
 """Number of messages before and after, counted in sequence, since a busy machine delays neighbours by any time."""
@@ -40,24 +43,36 @@ class SoakResult:
     events: list[LineEvent] = field(default_factory=list)
     received: dict[Reading, list[float]] = field(default_factory=lambda: defaultdict(list))
     """When each reading was received [s]."""
-    frames: int = 0
+    frames_s: list[float] = field(default_factory=list)
+    """When each frame was received [s]."""
+
+    @property
+    def frames(self) -> int:
+        return len(self.frames_s)
 
     def add_frame(self, frame: TrackerFrame) -> None:
-        self.frames += 1
+        self.frames_s.append(frame.received_s)
         for row in np.flatnonzero(frame.position_valid).tolist():
             self.received[row, frame.position_m[row].tobytes()].append(frame.received_s)
 
     def reconfiguring(self, at_s: float) -> bool:
-        """Whether the driver was configuring the device at this time, or about to."""
+        """Whether the driver was configuring the device at this time, or about to.
+
+        What the driver has not read when a line is unplugged is lost with the line, however late the driver is to
+        notice: the operating system discards it.
+        """
         began_s = None
         for event in self.events:
             if event.kind in RECONFIGURING_EVENTS and began_s is None:
-                began_s = event.monotonic_s
+                began_s = event.monotonic_s - CLOSING_S
+                if event.kind == "unplugged":
+                    read = bisect_left(self.frames_s, event.monotonic_s)
+                    began_s = min(began_s, self.frames_s[read - 1]) if read else began_s
             elif event.kind == "connected" and began_s is not None:
-                if began_s - CLOSING_S <= at_s <= event.monotonic_s + CLOSING_S:
+                if began_s <= at_s <= event.monotonic_s + CLOSING_S:
                     return True
                 began_s = None
-        return began_s is not None and at_s >= began_s - CLOSING_S
+        return began_s is not None and at_s >= began_s
 
     def arrived(self, reading: Reading, written_s: float) -> bool:
         times_s = self.received.get(reading, [])
@@ -128,6 +143,29 @@ def check_result(result: SoakResult, capsys: pytest.CaptureFixture[str]) -> None
         "the driver did not reconnect each time"
     )
     assert not result.reconfiguring(result.sent[-1].written_s), "the driver did not reconnect in the end"
+
+
+def test_what_the_driver_had_not_read_is_lost_with_the_line() -> None:
+    """A driver that the system does not schedule for 0.4 s while the line goes loses what waits for it, and no more."""
+    soak = SoakResult(frames_s=[10.0, 10.025, 10.05, 12.0])
+    for kind, at_s in (("connected", 9.0), ("unplugged", 10.45), ("connected", 12.0)):
+        soak.events.append(LineEvent(kind, at_s, at_s, ""))  # type: ignore[arg-type]  # each is a kind of event
+    assert [soak.reconfiguring(at_s) for at_s in (10.04, 10.055, 10.4, 12.1, 12.3)] == [False, True, True, True, False]
+    soak.events[1] = LineEvent("stalled", 10.45, 10.45, "")
+    assert not soak.reconfiguring(10.055), "a line that only stalls keeps what waits"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pty")
+def test_the_system_discards_what_waits_in_a_line_that_is_unplugged(tmp_path: Path) -> None:
+    port = PtyPort(tmp_path / "tracker")
+    line = open_transport(port.name)
+    assert port.write(b"01 waits")
+    assert line.read(2.0) == b"01 waits"
+    assert port.write(b"02 waits")
+    port.unplug()
+    with pytest.raises(LineLost):
+        line.read(2.0)
+    line.close()
 
 
 @pytest.mark.long

@@ -60,7 +60,7 @@ class Garbage:
     offset: int
     size: int
     station: int = 0
-    """Code of the station, of which no list is known, whose record these bytes seem to be; 0 for none."""
+    """Code of the station, of which no list is known, whose record seems to begin in step here; 0 for none."""
 
 
 DecoderEvent = RecordRun | Reply | Garbage
@@ -163,10 +163,10 @@ class Decoder:
             size = (self._size_of_record if head[0] == RECORD_HEAD else _size_of_reply)(buffer, offset, at_end)
         if size is None:
             return 0
-        self._in_step = size > 0
+        was_in_step, self._in_step = self._in_step, size > 0
         if size == 0:
             size = self._next_head(buffer, offset + 1) - offset
-            events.append(Garbage(self._offset + offset, size, self._other_station(head)))
+            events.append(Garbage(self._offset + offset, size, self._other_station(head) if was_in_step else 0))
         elif head[0] == RECORD_HEAD:
             layout = self._layouts[head[1]]
             events.append(RecordRun(self._offset + offset, layout.items, layout.table(buffer, offset, 1), layout.size))

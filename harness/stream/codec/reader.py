@@ -166,8 +166,7 @@ class FrameReader:
         last_byte = run.offset + run.size * np.arange(1, count + 1)
         self._deferred.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
         self.records += count
-        for code in run.table["station"].tolist():
-            self.station_records[chr(code)] += 1
+        self.station_records.update(map(chr, run.table["station"].tolist()))
         previous_row, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
         return count > 1 or self._row <= previous_row or self._row == len(self.wire.stations) - 1
 

@@ -252,7 +252,9 @@ class Is900Broadcast:
         rate_hz = estimate_rate_hz(np.array([packet.time_s for packet in own], float)) if has_time else None
         rate_hz = rate_hz or len(own) / self._timing.measure_s
         if len(own) < MIN_RECORDS:
-            raise BadInput(f"Port {self.port}: too few packets of station {_character(own[0])} arrived.", "Give the rate.")
+            raise BadInput(
+                f"Port {self.port}: too few packets of station {_character(own[0])} arrived.", "Give the rate."
+            )
         return rate_hz
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, position_range_m, record_type
+from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, STATION_CHARACTERS, position_range_m, record_type
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.records import RecordFormat
 
@@ -28,7 +28,7 @@ class DriverConfig:
     """Whether times on the wire are in milliseconds; False is microseconds. Frames are in seconds either way."""
     stations: tuple[str, ...] | None = None
     """Station names: the first is the first active station of the device, and so on. None takes all, named by their
-    characters.
+    characters. Names that are characters, such as "1" and "3", mean these stations.
     """
     characters: str | None = None
     """Characters of the device's stations that these names belong to, ascending, such as "13". None takes the first
@@ -43,8 +43,9 @@ class DriverConfig:
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
     keep_settings: bool = False
-    """Whether the device keeps what other programs have set: tip offsets, alignments, boresight reference angles, filters
-    and boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
+    """Whether the device keeps what other programs have set: tip offsets, alignments, boresight reference angles,
+    filters and boresight. Otherwise they are at their defaults during the session. At its end they are put back, except
+    boresight.
     """
     reach_m: float | None = None
     """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
@@ -76,7 +77,10 @@ class DriverConfig:
             raise BadInput(f"{self.baud} baud is not possible.", f"An IS-900 uses {_join_commas(BAUD_RATES)}.")
         if self.stations is not None and len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {_join_commas(self.stations)}: a name occurs twice.", "Give each its own name.")
-
+        if self.characters is None and self.stations and _are_characters(self.stations):
+            ascending = sorted(self.stations, key=STATION_CHARACTERS.decode().index)
+            object.__setattr__(self, "stations", tuple(ascending))
+            object.__setattr__(self, "characters", "".join(ascending))
         if self.characters is not None:
             WireFormat(self.stations or (), 1.0, self.items, characters=self.characters.encode("ascii", "replace"))
 
@@ -124,6 +128,11 @@ class DriverTiming:
     """Longest single wait, so that closing is prompt. After this long without a byte an overdue frame is closed. It
     exceeds the 0.016 s for which USB adapters hold bytes back, so that late bytes do not split a frame.
     """
+
+
+def _are_characters(names: tuple[str, ...]) -> bool:
+    """Whether these are characters of stations; letters alone may as well be names."""
+    return set(names) <= set(STATION_CHARACTERS.decode()) and any(name.isdigit() for name in names)
 
 
 def _join_commas(values: tuple[object, ...]) -> str:

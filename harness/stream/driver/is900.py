@@ -257,7 +257,8 @@ class Is900:
         text = diagnosis.text
         if station := diagnosis.unexpected:
             text += "; it is switched off until the session ends, since it would load the line"
-            self._stations = replace(self._stations, others=self._stations.others + station)
+            others = "".join(sorted({*self._stations.others, station}))
+            self._stations = replace(self._stations, others=others)
             self._line.send(commands.switch_station(station, False))
         if diagnosis.kind is not None:
             self._report(diagnosis.kind, text)

@@ -137,8 +137,7 @@ class Watchdog:
     def _check_stations(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
         """Report stations that come and go; ask the device about one that is silent."""
         diagnoses = _station_diagnoses(self._stations.update(reader.station_records, now_s))
-        late = now_s - self._asked_s > self._timing.stalled_s
-        if late and self._stations.hears(now_s) and self._stations.silent(now_s):
+        if self._stations.silent and now_s - self._asked_s > self._timing.stalled_s:
             diagnoses.append(self._ask(now_s))
         return diagnoses
 
@@ -180,8 +179,7 @@ class Watchdog:
         A difference counts when it soon occurs twice, since one may be damage.
         """
         if (active := _active_stations(reply)) is not None:
-            off = [station for station in self._stations.silent(now_s) if station not in active]
-            return _station_diagnoses(self._stations.report_missing(off, "is switched off"))
+            return _station_diagnoses(self._stations.report_off(active, now_s))
         recent_s = now_s - self._timing.silent_s
         self._complaints = {text: since_s for text, since_s in self._complaints.items() if since_s > recent_s}
         kind, complaint = diagnose_reply(wire, reply)

@@ -120,8 +120,9 @@ class EmulatorServer:
             self.port.plug()
 
     def _write(self, sent: SentMessage) -> None:
+        written_s = time.monotonic()  # before the client can have read it
         accepted = self.port.write(self._distort(sent.data))
-        sent = replace(sent, written_s=time.monotonic(), unread=not accepted)
+        sent = replace(sent, written_s=written_s, unread=not accepted)
         self.counts.add(sent)
         if self._on_sent is not None:
             self._on_sent(sent)

@@ -26,8 +26,9 @@ def record_port(
     """Let a device stream until Ctrl-C, or for `seconds`, and record everything that passes over its line.
 
     `log` receives the messages that deserve a line of their own, `progress` the text of the progress line. Returns the
-    counts of the driver, and 1 as `interrupted` if a signal ended it; there are no counts before the device was set up. Raises BadInput when there is no device, and
-    BadFile when the recording cannot be written; blocks written before are kept.
+    counts of the driver, and 1 as `interrupted` if a signal ended it; there are none before the device was set up.
+    Raises BadInput when there is no device, and BadFile when the recording cannot be written; blocks written before are
+    kept.
     """
 
     counts: dict[str, int] = {}

@@ -32,7 +32,8 @@ EXAMPLES = {
     "MQ{st},n": "MQ1,3", "MH{st},0|1|2": "MH1,0", "Mh": "Mh1", "MT": "MT", "Mt": "Mt", "MZ": "MZ", "MBI": "MBI",
     "MBF": "MBF", "MG": "MG", "MG<state>,<rate>": "MG1,60", "MGP": "MGP1", "MGS": "MGS1", "MP": "MP", "MU": "MU20",
     "Mg": "Mg1", "MCF": "MCF", "MCF{n}": "MCF1", "MCF{n},x,y,z,nx,ny,nz,id": "MCF1,0,0,0,0,0,1,5001",
-    "MCf{n}[,id]": "MCf1,5001", "MCC": "MCC", "MCe": "MCe", "MCx": "MCx", "MCI{st}[,n]": "MCI1", "MCi": "MCi1", "MCM": "MCM",
+    "MCf{n}[,id]": "MCf1,5001", "MCC": "MCC", "MCe": "MCe", "MCx": "MCx", "MCI{st}[,n]": "MCI1", "MCi": "MCi1",
+    "MCM": "MCM",
     "MCm": "MCm", "MCc": "MCc", "ML0": "ML0", "ML1": "ML1", "MLB{n}": "MLB50", "ME": "ME", "MEC": "MEC",
     "ME0|1": "ME1", "MLogOpen/Close/Clear/State/Send": "MLogSend", "MSchAlg1|2": "MSchAlg1",
     "MConfigLockMode0|1|2": "MConfigLockMode1", "MEthIp": "MEthIp", "MEthUdp": "MEthUdp",
@@ -41,8 +42,8 @@ EXAMPLES = {
 }  # fmt: skip
 """An example of each command, by how the tables of docs/is900.md 4 write it."""
 NEED_PERMISSION = {
-    "W", "^K", "^Y", "o...", "T", "e...", "t", "Y", "MCF{n},x,y,z,nx,ny,nz,id", "MCf{n}[,id]", "MCC", "MCe", "MCx", "MCi",
-    "MCM", "MCm", "MCc", "MEC", "MConfigLockMode0|1|2", "MSystemTest1", "MSystemTest2",
+    "W", "^K", "^Y", "o...", "T", "e...", "t", "Y", "MCF{n},x,y,z,nx,ny,nz,id", "MCf{n}[,id]", "MCC", "MCe", "MCx",
+    "MCi", "MCM", "MCm", "MCc", "MEC", "MConfigLockMode0|1|2", "MSystemTest1", "MSystemTest2",
 }  # fmt: skip
 """Those that write the device's memory, restart or reset it, erase, change the line, or are of other products."""
 SENT_BY_THE_DRIVER = {
@@ -88,7 +89,8 @@ def test_the_emulator_executes_all_but_the_commands_of_other_products(written: s
     [
         ("MLogClear", "erases"), ("MLogOpen", "erases"), ("MLogState", ""), ("ME", ""), ("ME0", ""),
         ("MEthIp", ""), ("MEthIp10.0.0.7", "network"), ("MEthUdp1", "network"), ("MEthUdpPort5002", "network"),
-        ("MCI1,2", "other product|another product"), ("MConfigLockMode", ""), ("MCF1,2", "constellation"), ("MCf1", "constellation"),
+        ("MCI1,2", "other product|another product"), ("MConfigLockMode", ""), ("MCF1,2", "constellation"),
+        ("MCf1", "constellation"),
         ("MCf1,5001", "constellation"), ("MCC,", "constellation"), ("MEC,", "erases"), ("MLogClear,1", "erases"),
         ("Q", "in no source"), ("MTx", "in no source"), ("*reset", "in no source"), ("Oz", "in no source"),
     ],

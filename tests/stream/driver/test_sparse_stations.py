@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.errors import BadInput
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.emulator.config import EmulatorConfig
@@ -60,6 +61,17 @@ def test_some_stations_are_read_by_number_or_in_the_order_of_the_device(characte
         device = bench.device
         assert isinstance(device, EmulatedDevice)
         assert device.emulator.device.active == characters, "the others are switched on again"
+
+
+def test_names_that_are_numbers_mean_these_stations() -> None:
+    for names, rows in ((("9",), [1]), (("9", "2"), [0, 1])):
+        bench, samples = make_unit("29")
+        with bench.driver(DriverConfig(stations=names)) as driver:
+            assert driver.stations == tuple(sorted(names))
+            check_frames(frames_for(driver, bench, 1.0), samples, rows)
+    bench, _ = make_unit("29")
+    with pytest.raises(BadInput, match=r"no station 1 \(1\); it has 2, 9"):
+        bench.driver(DriverConfig(stations=("1",)))
 
 
 def test_a_recording_of_such_a_unit_replays_the_same_frames(tmp_path: Path) -> None:

@@ -72,9 +72,10 @@ def test_a_station_outside_the_session_is_told_by_name_and_is_no_garbage(items: 
         assert all(frame.position_valid.all() for frame in frames[:-1])
         assert len(frames) >= 115
         assert device_of(bench).active == "124", "it is off while the session needs the line"
-        bench.sleep(5.0)
         switch(bench, b"lA,1\r")()
-        frames_for(stream, bench, 2.0)
+        frames_for(stream, bench, 3.0)
+        assert [kind for kind, _ in texts(bench)] == ["unexpected", "unexpected"], "told each time"
+        assert device_of(bench).active == "124"
     assert device_of(bench).active == "124A", "as the one who switched it on left it"
 
 
@@ -110,6 +111,9 @@ def test_one_damaged_station_character_is_no_news() -> None:
         totals["2"] += 1
         totals["5"] += k % 50 == 49  # one in 1.25 s
         assert watch.update(totals, now_s) == []
+    totals["5"] += 1
+    now_s += 2.0
+    assert watch.update(totals, now_s) == []
     events = []
     for _ in range(3):
         totals["5"] += 1

@@ -1,6 +1,7 @@
 """Replay: the frames of a recording, whatever the speed and the split of the bytes."""
 
 import io
+import json
 import threading
 import time
 from collections.abc import Sequence
@@ -13,9 +14,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import FILE_HEADER, RECEIVED
+from harness.stream.codec.blocks import ANSWERED, CONFIGURED, FILE_HEADER, RECEIVED, SENT, RecordingBlock, encode_block
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
 from harness.stream.recording.replay import RecordingStream, ReplaySpeed, parse_speed, wait_for_enter
@@ -223,3 +225,47 @@ def test_speeds(text: str, speed: ReplaySpeed) -> None:
 def test_an_impossible_speed_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="`step`, `max`, or a positive number"):
         parse_speed(text)
+
+
+def test_a_recording_of_an_earlier_version_replays_as_before(tmp_path: Path) -> None:
+    """It has item 16 of two bytes, and another meaning of `G` and `H` in its exchanges."""
+    items, settings = (2, 11, 16, 21, 1), RecordFormat(stylus_bytes=2)
+    stamp_s = STAMPS_S
+    values = decode_frames(in_chunks(DATA, STAMPS_S))
+    position_m = np.concatenate([frame.position_m for frame in values])
+    quaternion = np.concatenate([frame.tracker_from_station for frame in values])
+    table = encode_records(
+        items,
+        np.frombuffer(b"1234" * ROUNDS, np.uint8),
+        RecordValues(stamp_s, position_m, quaternion, np.ones(len(stamp_s))),
+        settings,
+    )
+    size = table.dtype.itemsize
+    wire = {
+        "stations": ["head", "torso", "left_wrist", "right_wrist"],
+        "rate_hz": RATE_HZ,
+        "items": list(items),
+        "settings": {"metres_per_unit": 0.01, "seconds_per_tick": 0.001, "binary": True, "stylus_bytes": 2},
+        "characters": "1234",
+    }
+    answer = {
+        "command": "H1", "sent": "48 31 0d 0a", "received": "32 31 48",
+        "answers": [{"kind": "GeometryReply", "station": "1", "letter": "H", "values": [10.0, 20.0, 30.0]}],
+    }  # fmt: skip
+    blocks = [
+        RecordingBlock(SENT, 99.0, 1e9, b"G1\r\nH1\r\nH1,0.000,0.000,0.000\r\n"),
+        RecordingBlock(RECEIVED, 99.1, 1e9, b"21G   0.00   0.00   0.00\r\n21H  10.00  20.00  30.00\r\n"),
+        RecordingBlock(ANSWERED, 99.2, 1e9, json.dumps(answer).encode()),
+        RecordingBlock(CONFIGURED, 99.9, 1e9, json.dumps(wire).encode()),
+    ]
+    data = table.tobytes()
+    for i, at_s in enumerate((stamp_s - stamp_s[0] + 100.0).tolist()):
+        blocks.append(RecordingBlock(RECEIVED, at_s, 1e9, data[i * size : (i + 1) * size]))
+    path = tmp_path / "old.rec"
+    path.write_bytes(FILE_HEADER + b"".join(map(encode_block, blocks)))
+    stream = RecordingStream(path)
+    frames = list(stream)
+    assert len(frames) == ROUNDS
+    assert stream.counts["garbage_bytes"] == 0
+    np.testing.assert_allclose([frame.position_m for frame in frames], position_m.reshape(ROUNDS, 4, 3), atol=1e-6)
+    assert read_recording(path).answers[0]["answers"][0]["letter"] == "H"
