@@ -20,10 +20,9 @@ The public names, which are imported when they are first used:
 
 from typing import TYPE_CHECKING
 
-from harness.core.package_data import VERSION as __version__
-
 if TYPE_CHECKING:
     from harness.compare.comparison import compare_runs
+    from harness.core.package_data import VERSION as __version__
     from harness.errors import HarnessError
     from harness.experiment.clip_simulation import simulate_clip
     from harness.experiment.engine import run
@@ -40,6 +39,7 @@ else:
         "Emulator": "harness.stream.emulator.emulator",
         "HarnessError": "harness.errors",
         "Is900": "harness.stream.driver.is900",
+        "__version__": "harness.core.package_data",
         "compare_runs": "harness.compare.comparison",
         "load": "harness.results.loaded_run",
         "load_scenario": "harness.experiment.scenario",
@@ -58,7 +58,7 @@ else:
             raise AttributeError(f"module 'harness' has no attribute {name!r}")
         from importlib import import_module
 
-        attribute = "load_run" if name == "load" else name
+        attribute = {"load": "load_run", "__version__": "VERSION"}.get(name, name)
         globals()[name] = getattr(import_module(_MODULES[name]), attribute)
         return globals()[name]
 

@@ -1,13 +1,10 @@
 """`python -m harness` is the command `harness`. `python -P -m harness` never looks into the working folder."""
 
 import os
+import signal
 import sys
 import time
 from threading import Thread
-
-from harness.core.interrupts import hold_interrupts, ignore_interrupts
-from harness.core.python_process import leave_working_folder_out
-from harness.core.standard_streams import repair_streams
 
 END_S = 60.0
 """Time within which the program ends after its last line, although a thread of a method may hang [s, choice]."""
@@ -15,6 +12,11 @@ END_S = 60.0
 
 def main() -> int:
     """Run the command line. Signals are handled from here on, also while the program starts and while it ends."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # the next imports take a while, and Ctrl-C needs no traceback
+    from harness.core.interrupts import hold_interrupts, ignore_interrupts
+    from harness.core.standard_streams import repair_streams
+
     with hold_interrupts():
         repair_streams()
         try:
@@ -43,5 +45,7 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
+    from harness.core.python_process import leave_working_folder_out
+
     leave_working_folder_out()
     sys.exit(main())
