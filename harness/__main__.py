@@ -6,13 +6,9 @@ if __name__ == "__main__":  # modules that are imported from here on do not come
     working_folder = "" if sys.flags.safe_path else sys.path.pop(0)
 
 import os
+import signal
 import time
 from threading import Thread
-
-from harness.core.interrupts import hold_interrupts, ignore_interrupts
-from harness.core.python_process import leave_working_folder_out
-from harness.core.standard_streams import repair_streams
-from harness.core.working_folder import leave_relative_folders_out
 
 END_S = 60.0
 """Time within which the program ends after its last line, although a thread of a method may hang [s, choice]."""
@@ -20,6 +16,12 @@ END_S = 60.0
 
 def main() -> int:
     """Run the command line. Signals are handled from here on, also while the program starts and while it ends."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # the next imports take a while, and Ctrl-C needs no traceback
+    from harness.core.interrupts import hold_interrupts, ignore_interrupts
+    from harness.core.standard_streams import repair_streams
+    from harness.core.working_folder import leave_relative_folders_out
+
     with hold_interrupts():
         repair_streams()
         leave_relative_folders_out()
@@ -49,5 +51,7 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
+    from harness.core.python_process import leave_working_folder_out
+
     leave_working_folder_out(working_folder)
     sys.exit(main())

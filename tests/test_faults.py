@@ -5,6 +5,7 @@ import os
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,7 @@ import pytest
 from harness.cli import main
 from harness.commands import ending
 from harness.errors import Outcome
+from tests.interrupts import heeding_interrupts
 from tests.report.fabricate import Plan, fabricate
 from tests.short_demo import short_demo
 
@@ -309,3 +311,22 @@ def test_a_broken_installation_is_a_fault(tmp_path: Path) -> None:
     )
     assert_failed(ended, "a defect of the program (ModuleNotFoundError")
     assert ended.stdout == "failed\n"
+
+
+def test_ctrl_c_while_the_program_loads_prints_nothing(tmp_path: Path) -> None:
+    """It was a traceback of the imports until the signals were handled."""
+    code = (
+        "import os, signal, sys\n"
+        "import harness.__main__ as program\n"
+        "class Interrupted:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'harness.core.interrupts':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupted())\n"
+        "sys.argv = ['harness', 'list']\n"
+        "sys.exit(program.main())\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, preexec_fn=heeding_interrupts
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")

@@ -1,10 +1,10 @@
 """The body's skeleton in numbers: 24 bones and 48 hinges of Liu et al. 2011 (docs/papers.md A2), in CMU's convention.
 
 Bone vectors are the mean over 20 skeletons of the CMU motion capture library, mirrored left to right. Hinge axes
-are common to all of them. Limits are the envelope of 146 CMU clips, none of them a test clip, plus 10 deg (the
-files' own limits are broken by most recorded frames); angles were taken in principal form: each wrapped to
-+-180 deg, the middle one of three within +-90 deg. The data was obtained from mocap.cs.cmu.edu, created with
-funding from NSF EIA-0196217.
+are common to all of them. Limits are the envelope of 146 CMU clips plus 10 deg (the files' own limits are broken by
+most recorded frames). The scenarios boxing, walking and jumping test none of these clips; others do. Angles were taken
+in principal form: each wrapped to +-180 deg, the middle one of three within +-90 deg. The data was obtained from
+mocap.cs.cmu.edu, created with funding from NSF EIA-0196217.
 
 A configuration `qpos` is MuJoCo's: root position, root quaternion, then the hinges of each bone outermost first,
 because MuJoCo composes the joints of a body in the order listed; the skeleton (and an AMC row) names them innermost

@@ -177,7 +177,7 @@ class ExpertMapSession(HistorySession):
         self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
         self._contact = FloorContact(fitted.body, self.residuals, fitted.floor_m, fitted.windows.database.rate_hz)
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
-        self._loss_scale = LossScale(loss.position_scale_m)
+        self._loss_scale = LossScale(loss.position_scale_m, fitted.windows.database.rate_hz)
         self._prior: Subspace | None = None
         """Prior of the pose that was solved last; None when inverse kinematics answered."""
         self._angle_sigma_rad: Floats = np.full(48, POSTURE_PRIOR_SIGMA_RAD)

@@ -17,16 +17,17 @@ _MULTIPLE = 6.0
 """The scale over the usual median distance."""
 _MIN_SCALE_M = 0.005
 """Lower limit of the scale [m]; the loss gives the upper one."""
-_RATE = 0.05
-"""Weight of a frame in the running mean: a time constant of 0.5 s at 40 Hz."""
+_MEAN_S = 0.5
+"""Time constant of the running mean [s]."""
 
 
 class LossScale:
     """The scale of one session. It starts at its upper limit."""
 
-    def __init__(self, position_scale_m: float) -> None:
-        """`position_scale_m` is the loss's scale, the upper limit [m]."""
+    def __init__(self, position_scale_m: float, rate_hz: float) -> None:
+        """`position_scale_m` is the loss's scale, the upper limit [m]; `rate_hz` is that of the frames."""
         self._max_m, self._usual_m = position_scale_m, position_scale_m / _MULTIPLE
+        self._weight = min(1.0, 1.0 / (_MEAN_S * rate_hz))
 
     @property
     def position_m(self) -> float:
@@ -37,7 +38,7 @@ class LossScale:
         """Take the residuals of one frame's answer; nothing changes when no position was measured."""
         distance_m = median_distance(targets, state)
         if distance_m >= 0.0:
-            self._usual_m += _RATE * (min(distance_m, self._max_m) - self._usual_m)
+            self._usual_m += self._weight * (min(distance_m, self._max_m) - self._usual_m)
 
 
 @compiled

@@ -20,7 +20,7 @@ from tests.reconstruct.conftest import Scene
 @pytest.fixture(autouse=True)
 def planted_constants(monkeypatch: pytest.MonkeyPatch) -> None:
     """Constants for these tests, whatever validation clips choose."""
-    for name, value in {"_MULTIPLE": 6.0, "_MIN_SCALE_M": 0.005, "_RATE": 0.05}.items():
+    for name, value in {"_MULTIPLE": 6.0, "_MIN_SCALE_M": 0.005, "_MEAN_S": 0.5}.items():
         monkeypatch.setattr(loss_scale, name, value)
 
 
@@ -34,7 +34,7 @@ def residuals_at(scene: Scene, offset_m: Floats) -> Residuals:
 
 
 def scale_after(scene: Scene, offset_m: Floats, frames: int) -> float:
-    residuals, scale = residuals_at(scene, offset_m), LossScale(0.03)
+    residuals, scale = residuals_at(scene, offset_m), LossScale(0.03, 40.0)
     for _ in range(frames):
         scale.update(residuals.targets, residuals.state)
     return scale.position_m
@@ -55,9 +55,23 @@ def test_the_median_is_of_measured_positions(walk: Scene, offset_m: list[float],
 
 
 def test_the_scale_starts_at_its_upper_limit_and_falls_slowly(walk: Scene) -> None:
-    assert LossScale(0.03).position_m == pytest.approx(0.03)
+    assert LossScale(0.03, 40.0).position_m == pytest.approx(0.03)
     assert scale_after(walk, np.full(6, 0.002), 1) == pytest.approx(6.0 * (0.005 - 0.05 * 0.003), rel=1e-3)
     assert scale_after(walk, np.full(6, 0.002), 400) == pytest.approx(0.012, rel=1e-3)
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 40.0, 60.0, 120.0])
+def test_the_mean_takes_half_a_second_at_every_rate(walk: Scene, rate_hz: float) -> None:
+    """At 120 Hz it took a sixth of that: a weight was given to each frame."""
+    residuals, scale = residuals_at(walk, np.full(6, 0.002)), LossScale(0.03, rate_hz)
+    for _ in range(round(0.5 * rate_hz)):
+        scale.update(residuals.targets, residuals.state)
+    left = (scale.position_m / 6.0 - 0.002) / (0.005 - 0.002)
+    assert left == pytest.approx(np.exp(-1.0), abs=0.015)
+
+
+def test_the_weight_at_40_hz_is_that_of_published_figures() -> None:
+    assert LossScale(0.03, 40.0)._weight == 0.05
 
 
 @pytest.mark.parametrize(("offset_m", "scale_m"), [(0.0, 0.005), (0.01, 0.03), (5.0, 0.03)])
@@ -70,7 +84,7 @@ def test_two_stations_that_are_off_do_not_widen_it(walk: Scene) -> None:
 
 
 def test_it_narrows_again_soon_after_large_residuals(walk: Scene) -> None:
-    scale = LossScale(0.03)
+    scale = LossScale(0.03, 40.0)
     for offset_m in (5.0, 0.0):
         residuals = residuals_at(walk, np.full(6, offset_m))
         for _ in range(100):
