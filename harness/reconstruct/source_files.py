@@ -249,7 +249,6 @@ def _declared_files(method: object) -> Iterator[Path]:
                 yield file
 
 
-
 def _declared(method: object, attribute: str, kinds: tuple[type, ...], example: str) -> Sequence[Any]:
     """A list that a method declares in an attribute; BadInput for anything else."""
     declared = getattr(method, attribute, ())
