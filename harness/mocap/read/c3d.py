@@ -104,7 +104,7 @@ def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
         timeout_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
-        with PythonProcess(ezc3d_process.__name__, str(path.absolute()), str(out), folder=folder) as process:
+        with PythonProcess(ezc3d_process.__name__, str(path.absolute()), str(out), cwd=folder) as process:
             ended = process.finish(timeout_s)
         if ended is None:
             raise BadFile(path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN)
