@@ -17,12 +17,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import wait
 from threading import Lock, Thread
-from typing import IO, Any
+from typing import Any
 
 from harness.core.interrupts import SIGNALS, defer_interrupts, shield_children
 from harness.core.python_process import python_command, python_environment
@@ -31,54 +31,39 @@ from harness.errors import SystemFault
 SPAWN = get_context("spawn")
 """What shared memory for a `FunctionProcess` is made with."""
 _START = "from harness.core.child_process import run_module; run_module()"
-_START_UNWATCHED = "import sys, importlib; importlib.import_module(sys.argv[1]).main(*sys.argv[2:])"
+_START_UNWATCHED = "-Buc", "import sys, importlib; importlib.import_module(sys.argv[1]).main(*sys.argv[2:])"
+_PREFIX = "harness-child-"
 _POLL_INTERVAL_S = 0.5
 _TOO_MANY = "The system allows no further process: end some programs, or use fewer --jobs."
 _END_S = 2.0
 """Time within which a process whose pipe has ended does so too [s]."""
-Stream = int | IO[Any] | None
+
+
+@contextmanager
+def _named_fault() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise SystemFault(f"A process cannot be started ({error.strerror or error}).", _TOO_MANY) from error
 
 
 class PythonProcess(subprocess.Popen[str]):
     """This Python, running a module as a program. A context manager, which ends the process and its group."""
 
-    def __init__(
-        self,
-        module: str,
-        *arguments: str,
-        stdin: Stream = subprocess.DEVNULL,
-        stdout: Stream = subprocess.DEVNULL,
-        stderr: Stream = subprocess.PIPE,
-        environment: Mapping[str, str] | None = None,
-        folder: str | None = None,
-        passed: tuple[int, ...] = (),
-        watched: bool = True,
-        shielded: bool = True,
-    ) -> None:
-        """Start the process; SystemFault when the system refuses.
+    def __init__(self, module: str, *words: str, watched: bool = True, shielded: bool = True, **options: Any) -> None:
+        """Start the process with words of its command line; SystemFault when the system refuses.
 
-        `environment` has variables to set, `folder` is the working folder, and `passed` are descriptors to inherit.
-        The process watches this one from a thread. One that forks has to do so itself: not `watched`, it calls `main`
-        of the module with the arguments. `shielded`, it sees no signal: one ends this process, which ends the child.
+        `options` are those of Popen: by default stderr is a pipe, and the other streams are closed; `env` has variables
+        to add. The process watches this one from a thread. One that forks has to do so itself: not `watched`, it calls
+        `main` of the module with the words. `shielded`, it sees no signal: one ends this process, which ends the child.
         """
         with shield_children() if shielded else defer_interrupts():
-            self._temporary = tempfile.TemporaryDirectory(prefix="harness-child-", ignore_cleanup_errors=True)
-            given = {**python_environment(), "TMPDIR": self._temporary.name, **(environment or {})}
-            start = ("-c", _START, str(os.getpid()), self._temporary.name)
-            try:
-                super().__init__(
-                    python_command(*(start if watched else ("-B", "-u", "-c", _START_UNWATCHED)), module, *arguments),
-                    env=given,
-                    stdin=stdin,
-                    stdout=stdout,
-                    stderr=stderr,
-                    cwd=folder,
-                    pass_fds=passed,
-                    text=True,
-                    start_new_session=True,
-                )
-            except OSError as error:
-                raise SystemFault(f"A process cannot be started ({error.strerror or error}).", _TOO_MANY) from error
+            self._temporary = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
+            options = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, **options}
+            options["env"] = {**python_environment(), "TMPDIR": self._temporary.name, **options.get("env", {})}
+            start = ("-c", _START, str(os.getpid()), self._temporary.name) if watched else _START_UNWATCHED
+            with _named_fault():
+                super().__init__(python_command(*start, module, *words), text=True, start_new_session=True, **options)
 
     def finish(self, limit_s: float, look: Callable[[], object] = lambda: None) -> tuple[str, str] | None:
         """What the process has written to stdout and stderr when it has ended, "" for a stream that is no pipe.
@@ -122,12 +107,12 @@ class PythonProcess(subprocess.Popen[str]):
         self.close()
 
 
-def run_python(module: str, *arguments: str) -> str:
+def run_python(module: str, *words: str) -> str:
     """What a module, run as a program, has written to stdout; RuntimeError with the end of its stderr if it fails."""
-    with PythonProcess(module, *arguments, stdout=subprocess.PIPE) as process:
+    with PythonProcess(module, *words, stdout=subprocess.PIPE) as process:
         out, err = process.finish(float("inf")) or ("", "")
     if process.returncode:
-        raise RuntimeError(f"{' '.join([module, *arguments])}: {err.strip()[-2000:]}")
+        raise RuntimeError(f"{' '.join([module, *words])}: {err.strip()[-2000:]}")
     return out
 
 
@@ -141,17 +126,13 @@ class FunctionProcess:
     def __init__(self, function: Callable[..., None], *arguments: Any) -> None:
         """Start the process; SystemFault when the system refuses."""
         with shield_children():
-            self._temporary = tempfile.TemporaryDirectory(prefix="harness-child-", ignore_cleanup_errors=True)
+            self._temporary = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
             self.pipe, other_end = SPAWN.Pipe()
             self._owner, self._closing = os.getpid(), Lock()
             given = self._owner, self._temporary.name, function, other_end, arguments
             self._process = SPAWN.Process(target=_call_function, args=given)
-            try:
+            with other_end, _named_fault():
                 self._process.start()
-            except OSError as error:
-                raise SystemFault(f"A process cannot be started ({error.strerror or error}).", _TOO_MANY) from error
-            finally:
-                other_end.close()
             self._descriptors = process_descriptors(self.pid)
             self._ended = (self._descriptors or [self._process.sentinel])[0]
             atexit.register(self.close)  # earlier than multiprocessing, which would wait for the process

@@ -14,7 +14,7 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
-from typing import Any, BinaryIO, Protocol, cast
+from typing import Any, BinaryIO, cast
 
 from harness.core.child_process import PythonProcess
 from harness.errors import SystemFault
@@ -23,38 +23,8 @@ _POLL_INTERVAL_S = 0.01
 _END_S = 5.0
 
 
-class WorkerProcess(Protocol):
-    """A process that runs `main` of a module."""
-
-    requests: BinaryIO
-    answers: BinaryIO
-
-    def wait(self, timeout_s: float) -> int | None:
-        """The exit code, negative for a signal, of a process that ends within a time, else None."""
-        ...
-
-    def kill(self) -> None:
-        """Kill the process and those that it started, and end its streams."""
-        ...
-
-    def close(self) -> None:
-        """Kill the process and those that it started, and release its streams."""
-        ...
-
-
-def start_worker(module: str) -> WorkerProcess:
-    """Start a process that calls `main` of a module with the descriptors of its requests and answers; SystemFault."""
-    if sys.platform != "linux":
-        return _SpawnedWorker(module)
-    for _ in range(2):
-        with suppress(OSError):
-            return _fork_server().fork(module)
-        close_fork_server()  # somebody has ended it
-    raise SystemFault("No process can be started for a method.", "Is the machine out of memory or of processes?")
-
-
 class _SpawnedWorker:
-    """A worker in a new interpreter."""
+    """A worker in a new interpreter, see `_ForkedWorker`."""
 
     def __init__(self, module: str) -> None:
         pipe = subprocess.PIPE
@@ -86,16 +56,19 @@ class _ForkedWorker:
     _code: int | None = None
 
     def wait(self, timeout_s: float) -> int | None:
+        """The exit code, negative for a signal, of a process that ends within a time, else None."""
         if self._code is None and wait([self.control], timeout_s):
             self._code = int(self.control.recv(16) or -signal.SIGKILL)  # a keeper that was killed sends nothing
         return self._code
 
     def kill(self) -> None:
+        """Kill the process and those that it started, and end its streams."""
         for end, how in ((self.control, socket.SHUT_WR), (self.stream, socket.SHUT_RDWR)):
             with suppress(OSError):
                 end.shutdown(how)
 
     def close(self) -> None:
+        """Kill the process and those that it started, and release its streams."""
         self.kill()
         self.wait(_END_S)
         for end in (self.requests, self.answers, self.stream, self.control):
@@ -111,7 +84,7 @@ class _ForkServer:
         with theirs:
             number = theirs.fileno()
             self._process = PythonProcess(
-                "harness.experiment.fork_server", str(number), stdout=2, stderr=None, passed=(number,), watched=False
+                "harness.experiment.fork_server", str(number), stdout=2, stderr=None, pass_fds=(number,), watched=False
             )
 
     def fork(self, module: str) -> _ForkedWorker:
@@ -131,6 +104,20 @@ class _ForkServer:
     def close(self) -> None:
         self._socket.close()
         self._process.close()
+
+
+WorkerProcess = _ForkedWorker | _SpawnedWorker
+
+
+def start_worker(module: str) -> WorkerProcess:
+    """Start a process that calls `main` of a module with the descriptors of its requests and answers; SystemFault."""
+    if sys.platform != "linux":
+        return _SpawnedWorker(module)
+    for _ in range(2):
+        with suppress(OSError):
+            return _fork_server().fork(module)
+        close_fork_server()  # somebody has ended it
+    raise SystemFault("No process can be started for a method.", "Is the machine out of memory or of processes?")
 
 
 _servers: list[_ForkServer] = []

@@ -115,7 +115,7 @@ def start_renderer(module: str, arguments: Sequence[str]) -> PythonProcess:
     variable, environment = "VTK_DEFAULT_OPENGL_WINDOW", dict[str, str]()
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
         environment[variable] = os.environ.get(variable, "vtkEGLRenderWindow")
-    return PythonProcess(module, *arguments, environment=environment)
+    return PythonProcess(module, *arguments, env=environment)
 
 
 def finish_renderer(process: PythonProcess, limit_s: float, look: Callable[[], object] = lambda: None) -> str:
