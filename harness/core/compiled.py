@@ -32,7 +32,6 @@ from harness.core.cache_folder import cache_folder, keep_newest
 from harness.core.plain_import import plain_import
 
 with plain_import():
-    import llvmlite
     import numba
     from numba.core import caching, config
     from numba.core.dispatcher import Dispatcher
@@ -40,6 +39,7 @@ with plain_import():
 F = TypeVar("F", bound=Callable[..., Any])
 _FunctionCache: Any = caching.FunctionCache  # numba has no types
 _CacheImpl: Any = caching.CompileResultCacheImpl
+_IndexFile: Any = caching.IndexDataCacheFile
 _config: Any = config
 _config._config_fname = os.devnull  # numba reads its settings again before each compilation: none of a folder
 
@@ -58,9 +58,9 @@ def compiled(function: F) -> F:
     It releases the interpreter lock, so a thread that reads a tracker does not wait for one that solves. Without a
     private folder or a source file, every process compiles anew. NUMBA_DISABLE_JIT leaves the function as it is.
     """
-    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    if not isinstance(dispatcher, Dispatcher):
+    if _config.DISABLE_JIT:
         return function
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
     with suppress(OSError):  # no source file
         module = function.__module__
         if module not in _source_hashes:
@@ -156,7 +156,7 @@ class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: nu
                 self._cache_path.mkdir(parents=True)
                 keep_newest(self._cache_path.parent, _KEPT_KEYS)
             name = f"{self._py_func.__qualname__}-{code.co_firstlineno}".replace("<", "").replace(">", "")
-            self._cache_file = caching.IndexDataCacheFile(self._cache_path, name, key)
+            self._cache_file = _IndexFile(self._cache_path, name, key)
             return True
         return False
 
@@ -186,7 +186,7 @@ class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: nu
 def _machine_key(stamp: str, target: Any) -> str:
     """Name for the machine code of a module: its stamp, versions of Python and compiler, settings, the processor."""
     settings = sorted((k, v) for k, v in os.environ.items() if k.startswith("NUMBA_") and "CACHE" not in k)
-    versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
+    versions = sys.implementation.cache_tag, numba.__version__, np.__version__
     return hashlib.sha256(repr((stamp, versions, settings, target)).encode()).hexdigest()[:32]
 
 

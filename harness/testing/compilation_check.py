@@ -8,6 +8,7 @@ import multiprocessing
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from harness.core.cache_folder import cache_folder, folder_bytes
 from harness.core.compiled import compiled
@@ -64,7 +65,8 @@ def _hits() -> None:
 
 def main() -> None:
     kind = "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
-    context, codes = multiprocessing.get_context(kind), []
+    context: Any = multiprocessing.get_context(kind)
+    codes = []
     for target in (_call, _hits):
         process = context.Process(target=target)
         process.start()

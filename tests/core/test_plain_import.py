@@ -16,7 +16,7 @@ PLAIN = {"mink", "mujoco", "numba", "pyvista"}
 DRAW = """
 import json
 from harness.report.kit.chart import draw_chart
-chart = draw_chart(lambda figure: figure.subplots().set_xlabel("a_b$"), "name", "title", "caption", "alt", 3.0)
+chart = draw_chart("name", "title", "caption", "alt", lambda figure: figure.subplots().set_xlabel("a_b$"), 3.0)
 import matplotlib, mujoco, os
 from harness.body.humanoid import tpose
 from numba.core import config

@@ -36,5 +36,5 @@ def test_a_chart_is_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
 
     steps: list[str] = []
     monkeypatch.setattr("harness.report.kit.chart.report_step", steps.append)
-    draw_chart(lambda figure: None, "name", "Errors over time", "caption", "alt", 1.0)
+    draw_chart("name", "Errors over time", "caption", "alt", lambda figure: None, 1.0)
     assert steps == ["Errors over time"]
