@@ -6,7 +6,15 @@ from contextlib import redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
+from harness.commands.common import (
+    Verbs,
+    add_verb,
+    positive_int,
+    print_result,
+    process_count,
+    progress_note,
+    this_command,
+)
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
@@ -41,7 +49,7 @@ def add_bench(verbs: Verbs) -> None:
         help="number of seeds: accuracy (default 5), --truth of physics (20) and lab (100)",
     )
     text = "accuracy, --truth of lab: clips or captures computed at the same time (default 1)"
-    verb.add_argument("--jobs", type=positive_int, metavar="N", help=text)
+    verb.add_argument("--jobs", type=process_count, metavar="N", help=text)
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
     verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")

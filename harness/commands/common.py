@@ -15,6 +15,8 @@ from harness.core.interrupts import refuse_interrupts
 from harness.errors import BadInput, Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
+MOST_PROCESSES = 1024
+"""Most worker processes on one computer [choice]."""
 DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
@@ -39,7 +41,7 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     if "jobs" in flags:
         text = "clips computed at the same time (default 1, of the demo 2)"
-        verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
+        verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
     if "mocap" in flags:
         add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
     return verb
@@ -124,6 +126,14 @@ def positive_int(text: str) -> int:
     if not is_whole_number(text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number")
     return int(text)
+
+
+def process_count(text: str) -> int:
+    """A number of worker processes, for argparse."""
+    count = positive_int(text)
+    if count > MOST_PROCESSES:
+        raise argparse.ArgumentTypeError(f"{text!r} processes; at most {MOST_PROCESSES:,} are started")
+    return count
 
 
 def positive_float(text: str) -> float:

@@ -9,8 +9,8 @@ from harness.commands.common import (
     Verbs,
     add_mocap_flag,
     add_verb,
-    positive_int,
     print_result,
+    process_count,
     progress_note,
     this_command,
     this_words,
@@ -31,7 +31,7 @@ def add_paper(verbs: Verbs) -> None:
     verb.add_argument("--only", action="append", metavar="EXPERIMENT", help=text)
     verb.add_argument("--seed", type=int, default=1, help="seed of all runs (default 1)")
     text = "clips computed at the same time (default 2)"
-    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
+    verb.add_argument("--jobs", type=process_count, default=2, metavar="N", help=text)
 
 
 def run_paper(args: argparse.Namespace) -> Outcome:

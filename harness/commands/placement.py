@@ -15,6 +15,7 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
+    process_count,
     progress_note,
     this_command,
     this_words,
@@ -36,7 +37,7 @@ def add_placement(verbs: Verbs) -> None:
     text = "a TOML file, or the name of a shipped study, such as walking; without one, the options below ask a question"
     verb.add_argument("study", nargs="?", help=text)
     text = "clips computed at the same time (default 2)"
-    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
+    verb.add_argument("--jobs", type=process_count, default=2, metavar="N", help=text)
     question = verb.add_argument_group("question", f"instead of a study, such as `{_EXAMPLE}`")
     text = "number of stations, such as 3 or 2-4 (default 3)"
     question.add_argument("--stations", type=parse_sizes, metavar="N", help=text)

@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, repeat_flags
+from harness.commands.common import Verbs, add_verb, print_result, process_count, progress_note, repeat_flags
 from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
@@ -21,7 +21,7 @@ def add_sweep(verbs: Verbs) -> None:
     verb = add_verb(verbs, "sweep", text, run_sweep, "out", "mocap")
     verb.add_argument("sweep", help="a TOML file, or the name of a shipped one (see `harness list`)")
     verb.add_argument("--seed", type=int, help="one seed instead of the sweep's")
-    verb.add_argument("--jobs", type=positive_int, metavar="N", help="worker processes (default 1)")
+    verb.add_argument("--jobs", type=process_count, metavar="N", help="worker processes (default 1)")
     text = "run on the workers of the Dask scheduler at ADDRESS, or on a local cluster: `local`"
     verb.add_argument("--dask", metavar="ADDRESS", help=text)
     add_isolation_flags(verb)

@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
+from harness.commands.common import Verbs, add_verb, print_result, process_count, progress_note, this_command
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
@@ -21,7 +21,7 @@ def add_trust(verbs: Verbs) -> None:
     text = "also use captures of another plan, or of none; the result then confirms nothing"
     verb.add_argument("--exploratory", action="store_true", help=text)
     text = "captures computed at the same time (default 1)"
-    verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
+    verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
 
 
 def run_trust(args: argparse.Namespace) -> Outcome:

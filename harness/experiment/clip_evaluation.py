@@ -21,6 +21,7 @@ from harness.core.motion import BodyMotion, Clip
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_frames, refuse_leak, select_examples
+from harness.core.time_grid import count_steps
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.remote_method import method_identity
@@ -502,5 +503,6 @@ def thin_takes(takes: Sequence[BodyMotion], count: int) -> list[BodyMotion]:
 def _resample(body: humanoid.Body, take: BodyMotion, rate_hz: float) -> BodyMotion:
     """The take at the tracker's rate, on the same smooth trajectory that the simulation samples."""
     trajectory = Trajectory(body, take)
+    count_steps(trajectory.duration_s, 1.0 / rate_hz, take.name)
     time_s = np.arange(0.0, trajectory.duration_s, 1.0 / rate_hz)
     return BodyMotion(take.name, take.subject, take.source, take.behaviour, rate_hz, trajectory.qpos(time_s))

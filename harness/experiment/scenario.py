@@ -31,6 +31,8 @@ from harness.simulate.physics.settings import Physics
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
+MOST_VARIANTS = 1_000_000
+"""Most combinations of varied values [choice]."""
 _STATION_SETS_FILE = "stations.toml"
 _NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault", "fitted")
 
@@ -310,6 +312,7 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
             )
         if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
             raise BadInput(f"vary: {key} = {values!r} is not a list of different values.", "Write it as [0.0, 0.05].")
+    count_variants(scenario)
     found = []
     for place, combination in enumerate(itertools.product(*choices.values())):
         if chosen and place not in chosen:
@@ -346,8 +349,11 @@ def change_scenario(scenario: Scenario, content: Mapping[str, Any], where: str) 
 
 
 def count_variants(scenario: Scenario) -> int:
-    """Number of combinations of varied values, as `variants` lists them."""
-    return math.prod(len(values) for _, values in dotted_keys(scenario.vary))
+    """Number of combinations of varied values, as `variants` lists them; BadInput for more than `MOST_VARIANTS`."""
+    count = math.prod(len(values) for _, values in dotted_keys(scenario.vary))
+    if count > MOST_VARIANTS:
+        raise BadInput(f"vary: {count:,} combinations.", f"At most {MOST_VARIANTS:,}: vary fewer keys at a time.")
+    return count
 
 
 def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

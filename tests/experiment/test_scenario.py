@@ -310,6 +310,13 @@ def test_patterns_in_clip_lists_stand_for_the_clips_that_match(tmp_path: Path) -
     assert expand_clips(load_scenario("demo"), None) == load_scenario("demo")
 
 
+def test_too_many_combinations_are_refused_before_they_are_listed(tmp_path: Path) -> None:
+    keys = ("tracker.latency_s", "tracker.baud", "tracker.queue_records", "seed", "tracker.rate_hz")
+    table = "".join(f'"{key}" = {list(range(10, 40))}\n' for key in keys)
+    with pytest.raises(HarnessError, match="24,300,000 combinations"):
+        variants(load_scenario(written(tmp_path, f"{MINIMAL}[vary]\n{table}")))
+
+
 def test_a_pattern_matches_clips_that_are_named_by_their_path(tmp_path: Path) -> None:
     for name, frames in (("Anna/take_001", 3), ("Bert/take_001", 4), ("Bert/take_002", 3)):
         (tmp_path / name).parent.mkdir(exist_ok=True)

@@ -20,6 +20,9 @@ from harness.stream.codec.records import RecordFormat, Table
 from harness.stream.codec.replies import ParsedReply, TrackingStatus, parse_reply
 from harness.stream.frame import TrackerFrame
 
+LEAST_RATE_HZ, MOST_RATE_HZ = 1e-3, 1e4
+"""Limits of the records per second of a station [choice]."""
+
 
 @dataclass(frozen=True)
 class WireFormat:
@@ -45,6 +48,11 @@ class WireFormat:
         if not 1 <= len(self.stations) <= len(STATION_CHARACTERS):
             raise BadInput(
                 f"{len(self.stations)} stations are not possible.", f"An IS-900 has 1 to {len(STATION_CHARACTERS)}."
+            )
+        if not LEAST_RATE_HZ <= self.rate_hz <= MOST_RATE_HZ:
+            raise BadInput(
+                f"{self.rate_hz:g} records per second of each station.",
+                f"A device sends {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}; an IS-900 up to 180.",
             )
         if len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {', '.join(self.stations)}: a name occurs twice.", "Give each its own name.")

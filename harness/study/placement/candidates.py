@@ -36,6 +36,8 @@ CandidateGroup = tuple[StationPlacement, ...]
 StationSet = tuple[StationPlacement, ...]
 """A set of places, in the order of the candidates."""
 _OPPOSITE_SIDE: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
+MOST_PLACES = 10_000
+"""Most places of a grid [choice]."""
 _SIDE_BY_PREFIX: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right"}
 
 
@@ -87,6 +89,9 @@ class CandidateGrid:
 
     def groups(self) -> tuple[CandidateGroup, ...]:
         """The groups of places of all combinations."""
+        count = len(self.bones) * len(self.along) * len(self.around_deg)
+        if count > MOST_PLACES:
+            raise BadInput(f"A grid of {count:,} places.", f"At most {MOST_PLACES:,}: choose coarser steps.")
         places = itertools.product(self.bones, self.along, self.around_deg)
         groups = [Candidate(self._name(*place), *place, self.stand_off_m, self.pair).groups() for place in places]
         return tuple(itertools.chain.from_iterable(groups))

@@ -260,3 +260,28 @@ def test_a_damaged_file_is_read_or_refused(
         assert np.all(np.diff(body.time_s) > 0.0)
         length = np.linalg.norm(body.world_from_body, axis=1)
         np.testing.assert_allclose(length[np.isfinite(length)], 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("factor", "shift", "cause"),
+    [
+        (1e9, 0.0, "nanoseconds"),
+        (1e6, 0.0, "microseconds"),
+        (1e3, 0.0, "milliseconds"),
+        (1.0, 1.7e9, "a stray time"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".csv", ".tum"])
+def test_times_that_are_no_seconds_are_refused_before_any_array_is_made(
+    tmp_path: Path, factor: float, shift: float, cause: str, suffix: str
+) -> None:
+    times_s = np.concatenate([[0.0], shift + np.arange(1, 400) / 40.0]) * factor
+    path = tmp_path / f"truth{suffix}"
+    lines = [f"{at_s!r},bar,0,0,0,1,0,0,0" for at_s in times_s.tolist()]
+    text = "\n".join(["time_s,station,x_m,y_m,z_m,qw,qx,qy,qz", *lines])
+    if suffix == ".tum":
+        text = "\n".join(f"{at_s!r} 0 0 0 0 0 0 1" for at_s in times_s.tolist())
+    path.write_text(text + "\n")
+    with pytest.raises(BadInput, match=cause) as refused:
+        read_truth_file(path, ["bar"])
+    assert str(refused.value).startswith(str(path))
