@@ -35,17 +35,17 @@ class PaperStudy:
     library: LibraryFolders | None = None
     """Folder of the motion library; None for synthetic motion."""
     failures: Mapping[str, str] = field(default_factory=dict)
-    """"run: cell" -> traceback or message of its failure."""
+    """"run: cell", or the name of a run that was refused as a whole -> traceback or message of its failure."""
     quick: bool = False
     """Whether this is the quick form (see `quick_form`)."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
-        """Rows of the summary for finished cells of a run; [] where nothing ran.
+        """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
 
         `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer, clip, varied.
         """
         summary, wanted = self.out / run / "summary.json", to_json_types(where)
-        if run not in self.runs or not summary.is_file():
+        if run not in self.runs or run in self.failures or not summary.is_file():
             return []
         rows = _summary_rows(summary.parent, summary.stat().st_mtime_ns)
         return [row for row in rows if all(row[name] == value for name, value in wanted.items())]

@@ -243,6 +243,17 @@ def test_cells_are_counted_over_clips_methods_inputs_and_variants() -> None:
     assert count_cells({"walks": varied, "bouts": BOUTS}) == 2 * 2 * 2 * 3 + 1 * 2
 
 
+def test_no_number_comes_from_a_folder_that_holds_another_run(tmp_path: Path) -> None:
+    """The run is refused, and its folder is not read."""
+    (tmp_path / "walks").mkdir()
+    (tmp_path / "walks" / "thesis.tex").write_text("years of work")
+    (tmp_path / "walks" / "summary.json").write_text("of another run")
+    failures = run_scenarios({"walks": WALKS}, tmp_path)
+    assert "files that are no run" in failures["walks"]
+    study = PaperStudy(tmp_path, "builtin", 1, {"walks": WALKS}, failures=failures)
+    assert (study.rows("walks"), list(study.cells("walks"))) == ([], [])
+
+
 def test_a_measurement_in_the_place_of_another_is_refused(tmp_path: Path) -> None:
     study = PaperStudy(tmp_path, "builtin", 1, TINY.plan("builtin", 1))
     assert study.cached_measurement("golf", lambda: (1.0, float("nan"))) == [1.0, None]
