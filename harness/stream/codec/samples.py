@@ -17,7 +17,7 @@ class DeviceSamples:
     """
 
     stations: tuple[str, ...]
-    """Station names; the first is station `1` of the device, and so on."""
+    """Station names, in the order of the device's stations; by default the first is station `1`, and so on."""
     rate_hz: float
     """Readings per second of each station."""
     take_frames: int
