@@ -117,8 +117,8 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether a text consists of digits 0 to 9; `str.isdigit` alone accepts `²` too."""
-    return text.isascii() and text.isdecimal()
+    """Whether a text consists of at most nine digits 0 to 9; `str.isdigit` accepts `²`, and `int` limits their number."""
+    return text.isascii() and text.isdecimal() and len(text) < 10
 
 
 def positive_int(text: str) -> int:

@@ -98,3 +98,10 @@ def test_a_named_station_that_is_off_is_on_for_the_session(tmp_path: Path, capsy
         assert device.settings.station("1").active
     (frame, *_) = RecordingStream(tmp_path / "x.rec")
     assert frame.position_m[0, 2] == pytest.approx(0.2, abs=1e-5)
+
+
+def test_a_number_of_thousands_of_digits_is_no_defect(capsys: pytest.CaptureFixture[str]) -> None:
+    """`int` refuses more than 4,300 digits with a ValueError."""
+    words = ["--port", "no_such_port", "--scenario", "demo", "--stations", "9" * 5000]
+    assert main(["live", *words]) == 2
+    assert "no station called '999" in capsys.readouterr().err

@@ -297,6 +297,15 @@ def test_the_scale_of_the_loss_follows_the_residuals(walk: Scene, fitted: Fitted
     assert found_m[-1] < 0.5 * found_m[0]
 
 
+def test_the_scale_of_the_loss_knows_the_rate_of_the_frames(walk: Scene, fitted: FittedExpertMap) -> None:
+    assert begin(fitted, walk)._loss_scale._weight == 0.05
+    object.__setattr__(fitted.windows.database, "rate_hz", 80.0)
+    try:
+        assert begin(fitted, walk)._loss_scale._weight == 0.025
+    finally:
+        object.__setattr__(fitted.windows.database, "rate_hz", 40.0)
+
+
 def sigma_of(estimate: Estimate) -> Floats:
     assert estimate.angle_sigma_rad is not None
     return estimate.angle_sigma_rad
