@@ -23,6 +23,8 @@ _LIMBS = (
 """The bones of each limb. Single hands and feet are too short: a millimetre of noise turns them by a degree."""
 MIRRORED = np.array([0, 1, 3, 2, 5, 4, 7, 6, 9, 8])
 """(10,) the limb that each one becomes when left and right change places."""
+UPPER_BODY = np.array([0, 1, 2, 3, 4, 5])
+"""The limbs without the legs."""
 
 
 def limb_directions(clip: Clip, rows: Ints) -> Floats:

@@ -8,7 +8,7 @@ Two clips share motion if the poses of one second differ by less than `SAME_MOTI
 Different takes differ by more wherever they move. People who stand do not, hence the second condition.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.motion import Clip
-from harness.mocap.limb_directions import MIRRORED, limb_directions
+from harness.mocap.limb_directions import MIRRORED, UPPER_BODY, limb_directions
+from harness.mocap.motion_correlation import GRID_HZ, WINDOWS, Match, accelerations, best_match
 
 SAME_MOTION = 0.004
 """Largest root mean square difference of descriptions over one second of the same motion (see `least_difference`)."""
@@ -34,6 +35,9 @@ _MIRRORED_COLUMNS = np.array(
         *(len(_PAIR_NUMBER) + MIRRORED),
     ]
 )
+_UPPER_PAIRS = np.isin(_PAIRS, UPPER_BODY).all(axis=0)
+_PARTS = np.arange(len(_MIRRORED_COLUMNS)), np.append(np.flatnonzero(_UPPER_PAIRS), len(_UPPER_PAIRS) + UPPER_BODY)
+"""Columns of the descriptions of the whole body and of the upper body."""
 
 
 class SharedMotion(NamedTuple):
@@ -48,13 +52,56 @@ class SharedMotion(NamedTuple):
 def find_shared_motion(
     first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
 ) -> SharedMotion | None:
-    """The longest stretch that runs of frames of two clips share; None if they share less than one moving second."""
+    """The longest stretch that runs of frames of two clips share; None if they share no moving one.
+
+    Where no stretch has the same poses, it is the stretch whose accelerations correlate best (see
+    `motion_correlation`).
+    """
     stretches = [
         stretch
         for comparison in _compare(first, first_runs, second, second_runs)
         if (stretch := comparison.longest_stretch(first, second)) is not None
     ]
-    return max(stretches, key=lambda stretch: stretch.second_s[1] - stretch.second_s[0], default=None)
+    longest = max(stretches, key=lambda stretch: stretch.second_s[1] - stretch.second_s[0], default=None)
+    return longest or _find_edited_motion(first, first_runs, second, second_runs)
+
+
+def _find_edited_motion(
+    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
+) -> SharedMotion | None:
+    """The stretch of the best match of accelerations, if it is one of the same motion."""
+    found = [(match, begin_s, mirrored) for match, begin_s, mirrored in _match(first, first_runs, second, second_runs)]
+    match, begin_s, mirrored = min(found, default=(None, 0.0, False))
+    if match is None or match.share >= 1.0:
+        return None
+    first_s, second_s = begin_s + match.first_s, match.second_s
+    return SharedMotion((first_s, first_s + match.length_s), (second_s, second_s + match.length_s), mirrored)
+
+
+def least_loss(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
+    """Least loss of correlation of two clips, relative to the largest one of a copy; inf where nothing moves."""
+    return min((match.share for match, *_ in _match(first, first_runs, second, second_runs)), default=np.inf)
+
+
+def _match(
+    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
+) -> Iterator[tuple[Match, float, bool]]:
+    """The best match of each run of the first clip, when the run begins [s], and whether it is mirrored."""
+    other = _accelerations(second)
+    moments = np.arange(len(other)) / GRID_HZ * second.rate_hz
+    allowed = np.zeros(len(other), bool)
+    for run in second_runs:
+        allowed |= (moments >= run.start) & (moments < run.stop)
+    if not allowed.any():
+        return
+    for run in first_runs:
+        begin, end = (round(frame / first.rate_hz * GRID_HZ) for frame in (run.start, run.stop))
+        own = _accelerations(first)[begin:end]
+        for mirrored in (False, True):
+            columns = other[:, _MIRRORED_COLUMNS] if mirrored else other
+            match = best_match(own, columns, allowed, _PARTS, WINDOWS)
+            if match is not None:
+                yield match, begin / GRID_HZ, mirrored
 
 
 def least_difference(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
@@ -148,6 +195,7 @@ def _window_spread(samples: Floats, window: int) -> Floats:
 
 
 _frame_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
+_acceleration_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
 _sample_cache: WeakKeyDictionary[Clip, tuple[Ints, Floats]] = WeakKeyDictionary()
 
 
@@ -156,6 +204,13 @@ def _describe_frames(clip: Clip) -> Floats:
     if clip not in _frame_cache:
         _frame_cache[clip] = _describe(clip, np.arange(len(clip)))
     return _frame_cache[clip]
+
+
+def _accelerations(clip: Clip) -> Floats:
+    """(N, 55) accelerations of the descriptions of a clip at the moments of the grid; cached."""
+    if clip not in _acceleration_cache:
+        _acceleration_cache[clip] = accelerations(_describe_frames(clip), clip.rate_hz)
+    return _acceleration_cache[clip]
 
 
 def _describe_samples(clip: Clip) -> tuple[Ints, Floats]:
