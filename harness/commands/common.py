@@ -117,7 +117,7 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether a text consists of at most nine digits 0 to 9; `str.isdigit` accepts `²`, and `int` limits their number."""
+    """Whether a text is at most nine digits 0 to 9: `str.isdigit` takes `²`, and `int` limits the number of digits."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
