@@ -164,8 +164,8 @@ def _carry_out(future: Future[Any], process: FunctionProcess, new: bool, call: t
         process.pipe.send(call)
     except (EOFError, OSError):
         pass  # it has ended, as `receive` says too
-    except Exception as error:  # the call cannot be pickled
-        future.set_exception(error)
+    except Exception as problem:  # the call cannot be pickled
+        future.set_exception(problem)
         return
     try:
         result, error = process.receive()

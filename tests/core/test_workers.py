@@ -9,12 +9,14 @@ import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
+from pickle import PicklingError
 from typing import Any
 
 import pytest
 
 from harness.core.interrupts import SIGNALS
 from harness.core.workers import Pool, run_in_workers, schedule_tasks
+from harness.errors import SystemFault
 from tests.processes import is_running, wait_until
 
 
@@ -173,3 +175,43 @@ def test_the_next_task_can_be_chosen() -> None:
 
     ended = list(schedule_tasks(submit, 4, lambda: 1, choose=lambda waiting: waiting[-1]))
     assert begun == [which for which, _ in ended] == [3, 2, 1, 0]
+
+
+def test_a_worker_that_cannot_begin_is_a_fault_of_the_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python runs `sitecustomize` first; this one breaks a module in every process that is started."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['harness.core.workers'] = None\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    ((_, future),) = run_in_workers(os.getpid, [()], 1)
+    assert isinstance(future.exception(), SystemFault)
+
+
+def raises(error: BaseException) -> None:
+    raise error
+
+
+@pytest.mark.parametrize(
+    "error", [EOFError("mine"), OSError(28, "mine"), SystemExit("mine"), KeyboardInterrupt("mine")]
+)
+def test_whatever_a_task_raises_is_its_own_and_has_the_place(error: BaseException) -> None:
+    ended = dict(run_in_workers(_call, [(raises, error), (abs, -1)], 1))
+    raised = ended[0].exception()
+    assert type(raised) is type(error)
+    assert "in raises" in raised.__notes__[0]
+    assert ended[1].result() == 1
+
+
+def test_a_call_that_cannot_be_sent_fails_alone() -> None:
+    ended = dict(run_in_workers(_call, [(lambda: None,), (abs, -1)], 1))
+    assert isinstance(ended[0].exception(), AttributeError | PicklingError)
+    assert ended[1].result() == 1
+
+
+def test_a_result_that_cannot_be_sent_fails_alone() -> None:
+    ended = dict(run_in_workers(_call, [(_call, iter, "ab"), (make_function,), (abs, -1)], 1))
+    assert list(ended[0].result()) == ["a", "b"]
+    assert isinstance(ended[1].exception(), AttributeError | PicklingError)
+    assert ended[2].result() == 1
+
+
+def make_function() -> Callable[[], None]:
+    return lambda: None
