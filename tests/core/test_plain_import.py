@@ -17,8 +17,9 @@ DRAW = """
 import json
 from harness.report.kit.chart import draw_chart
 chart = draw_chart("name", "title", "caption", "alt", lambda figure: figure.subplots().set_xlabel("a_b$"), 3.0)
-import matplotlib, mujoco, os
-from harness.body.humanoid import tpose
+import matplotlib, os
+import harness.body.humanoid  # MuJoCo
+import harness.core.compiled  # numba
 from numba.core import config
 print(json.dumps([matplotlib.rcParams["text.usetex"], config.NUMBA_DEFAULT_NUM_THREADS > 0, config.DISABLE_JIT,
                   os.environ.get("MUJOCO_GL")]))
