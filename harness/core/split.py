@@ -59,14 +59,24 @@ def _format_share(share: float) -> str:
 
 
 def select_examples(test: ClipPart, candidates: Iterable[str], split: Split, subjects: dict[str, str]) -> list[str]:
-    """The candidate clips that the split allows as examples, sorted; for `block` with the test clip itself."""
+    """The candidate clips that the split allows as examples, sorted; for `block` with the test clip itself.
+
+    Clips at several places of a library that CMU's subject and trial name alike are one take.
+    """
+    others = {name for name in candidates if _take(name) != _take(test.clip)}
     match split:
         case "block":
-            return sorted({*candidates, test.clip})
+            return sorted({*others, test.clip})
         case "sequence":
-            return sorted({name for name in candidates if name != test.clip})
+            return sorted(others)
         case "subject":
             return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
+
+
+def _take(clip: str) -> str:
+    """The take of a clip: CMU's subject and trial, wherever the file lies, else the clip's name."""
+    last = clip.rpartition("/")[2]
+    return last if re.fullmatch(r"\d+_\d+", last) else clip
 
 
 def forbidden_frames(test: ClipPart, split: Split, count: int, rate_hz: float) -> range:

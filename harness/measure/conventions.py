@@ -30,7 +30,7 @@ def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats
 
     The best similarity with and without a reflection is that of Umeyama 1991.
     """
-    first, second = (values - values.mean(axis=0) for values in map(np.concatenate, (reported_m, reference_m)))
+    first, second = _centred(reported_m), _centred(reference_m)
     cross = first.T @ second
     spread = np.linalg.svd(cross, compute_uv=False)
     if np.linalg.det(cross) >= 0.0:
@@ -39,6 +39,11 @@ def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats
     mirrored, turned = (1.0 - (spread[0] + spread[1] + sign * spread[2]) ** 2 / total for sign in (1.0, -1.0))
     if _MIRRORED_GAIN * mirrored < turned:
         raise BadInput(f"Positions of the reference are mirrored. {_LEFT_HANDED}", _TO_RIGHT_HANDED)
+
+
+def _centred(values: Sequence[Floats]) -> Floats:
+    joined: Floats = np.concatenate(values)
+    return joined - joined.mean(axis=0)
 
 
 def require_scale(factor: float) -> None:

@@ -185,10 +185,9 @@ class _File:
 
     def contradicts(self, other: "_File") -> bool:
         """Whether the index names another subject or rate for the other file."""
-        mine, its = self.row, other.row
-        pairs = [(mine.get("subject"), its.get("subject"))]
-        pairs += [(float(a), float(b)) for a, b in [(mine.get("fps"), its.get("fps"))] if a and b]
-        return any(a and b and a != b for a, b in pairs)
+        subjects = {row["subject"] for row in (self.row, other.row) if row.get("subject")}
+        rates_hz = {float(row["fps"]) for row in (self.row, other.row) if row.get("fps")}
+        return len(subjects) > 1 or len(rates_hz) > 1
 
     def is_take_of(self, take: Sequence["_File"], same_place: bool) -> bool:
         """Whether this is a take in another format: by CMU's subject and trial, or at the same place."""

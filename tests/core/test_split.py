@@ -12,6 +12,11 @@ SUBJECTS = {"13_17": "13", "13_30": "13", "14_02": "14"}
 
 def test_a_sequence_is_left_out() -> None:
     assert select_examples(ClipPart("13_17"), SUBJECTS, "sequence", SUBJECTS) == ["13_30", "14_02"]
+    placed = {"60hz/13_17": "13", "120hz/13_17": "13", "Anna/take_001": "Anna", "Bert/take_001": "Bert"}
+    assert select_examples(ClipPart("60hz/13_17"), placed, "sequence", placed) == ["Anna/take_001", "Bert/take_001"]
+    assert select_examples(ClipPart("60hz/13_17"), placed, "block", placed)[0] == "60hz/13_17"
+    assert "120hz/13_17" not in select_examples(ClipPart("60hz/13_17"), placed, "block", placed)
+    assert "Bert/take_001" in select_examples(ClipPart("Anna/take_001"), placed, "sequence", placed)
 
 
 def test_a_subject_is_left_out() -> None:

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,7 @@ class C3dHeader:
         value = self.parameters.get(name, ())
         return [] if isinstance(value, tuple) else [float(number) for number in value]
 
-    def decode(self, data: bytes | memoryview, code: str) -> NDArray[np.generic]:
+    def decode(self, data: bytes | memoryview, code: str) -> NDArray[Any]:
         """Numbers of the file's processor: `code` is numpy's, such as "i2", "u2" and "f4"."""
         return _decode(data, code, self.processor)
 
@@ -188,7 +189,7 @@ def _integers(data: bytes, processor: int) -> list[int]:
     return [int(number) for number in _decode(data, "u2", processor)]
 
 
-def _decode(data: bytes | memoryview, code: str, processor: int) -> NDArray[np.generic]:
+def _decode(data: bytes | memoryview, code: str, processor: int) -> NDArray[Any]:
     """Numbers of a processor; DEC's floats have their words exchanged, and are four times as large."""
     if processor == _DEC and code == "f4":
         words = np.frombuffer(data, "<u2").reshape(-1, 2)[:, ::-1]
