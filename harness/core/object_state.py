@@ -102,7 +102,7 @@ class _StateDescription:
             reduced = reduce(value) if reduce else value.__reduce_ex__(4)
         except Exception as error:  # locks, open files and other handles; code from outside may raise anything
             text = repr(value)
-            if kind.__repr__ is object.__repr__ or _ADDRESS.search(text):
+            if _ADDRESS.search(text):
                 raise _unstable(value, where) from error
             return f"{_name(kind)}({text})"
         if isinstance(reduced, str):
@@ -127,7 +127,7 @@ class _StateDescription:
 
 def _array_text(array: Any, kind: type) -> str:
     state = hashlib.blake2b(digest_size=16)
-    state.update(np.ascontiguousarray(array).reshape(-1).view(np.uint8))
+    state.update(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
     values = array.tolist() if array.size <= 1 else state.hexdigest()
     return f"{kind.__name__}({array.dtype.descr if array.dtype.names else array.dtype.str}, {array.shape}, {values})"
 

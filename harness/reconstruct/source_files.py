@@ -29,6 +29,7 @@ from harness.reconstruct.contract import Method
 MODULE_SUFFIXES = (".py", ".pyc", *EXTENSION_SUFFIXES)
 CACHE_FOLDER = "__pycache__"
 """Folders of compiled code, which is made again from its source."""
+_SITE_FOLDERS = ("site-packages", "dist-packages")
 _IMPORTERS = ("import_module", "__import__")
 
 
@@ -127,21 +128,30 @@ def is_own(path: Path, folders: Iterable[Path]) -> bool:
     return 0 < depth(folders) >= depth(foreign_folders())
 
 
-@cache
 def library_folders() -> tuple[Path, ...]:
     """Folders of the standard library and of installed packages, as named and with links resolved."""
+    return _library_folders(tuple(sys.path))
+
+
+@cache
+def _library_folders(import_path: tuple[str, ...]) -> tuple[Path, ...]:
     named = [sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
     named += [site.getusersitepackages(), *site.getsitepackages()]
+    named += [entry for entry in import_path if Path(entry).name in _SITE_FOLDERS]  # also of another environment
     return tuple(dict.fromkeys(p for name in named if name for p in (Path(name).absolute(), Path(name).resolve())))
 
 
-@cache
 def foreign_folders() -> tuple[Path, ...]:
     """Folders whose files are no method's own: the harness, its data and cache, Python and installed packages."""
+    return _foreign_folders(library_folders())
+
+
+@cache
+def _foreign_folders(libraries: tuple[Path, ...]) -> tuple[Path, ...]:
     ours = [PACKAGE_FOLDER, *(PACKAGE_FOLDER.parent / name for name in ("models", "scenarios"))]
     ours += [folder for folder in [cache_folder()] if folder is not None]
     python = [Path(prefix) for prefix in (sys.prefix, sys.base_prefix)]
-    return tuple(dict.fromkeys([*ours, *python, *(p.resolve() for p in (*ours, *python)), *library_folders()]))
+    return tuple(dict.fromkeys([*ours, *python, *(p.resolve() for p in (*ours, *python)), *libraries]))
 
 
 def _wrapped(method: object) -> Iterator[object]:

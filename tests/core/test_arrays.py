@@ -89,6 +89,6 @@ def test_floats_are_made_of_numbers_alone(values: Any, error: type[Exception]) -
 
 
 def test_numbers_of_other_precision_are_converted() -> None:
-    for values in (np.float32([0.5, np.inf]), np.longdouble([0.5, np.inf]), [0.5, np.inf]):
+    for values in (np.array([0.5, np.inf], np.float32), np.array([0.5, np.inf], np.longdouble), [0.5, np.inf]):
         np.testing.assert_array_equal(immutable(values), [0.5, np.inf])
     assert immutable([]).dtype == np.float64

@@ -89,7 +89,7 @@ CHANGES: dict[str, Callable[[], tuple[Any, Any]]] = {
     "an array": lambda: (np.arange(2000.0), np.arange(2000.0) + 1e-9),
     "a shape": lambda: (np.zeros((2, 3)), np.zeros((3, 2))),
     "a type of numbers": lambda: (np.zeros(3, np.float32), np.zeros(3, np.int32)),
-    "a mask": lambda: (np.ma.array([1.0, 2.0], mask=[0, 1]), np.ma.array([1.0, 2.0], mask=[1, 0])),
+    "a mask": lambda: (np.ma.array([1.0, 2.0], mask=[False, True]), np.ma.array([1.0, 2.0], mask=[True, False])),
     "a scalar": lambda: (np.float32(1.5), np.float64(1.5)),
     "True for 1": lambda: (True, 1),
     "an enumeration": lambda: (Colour.RED, Colour.BLUE),
@@ -178,6 +178,6 @@ def test_a_repr_of_ones_own_serves_where_there_is_no_state() -> None:
             raise TypeError("a handle")
 
         def __repr__(self) -> str:
-            return f"Handle({self.a})"
+            return f"Handle({vars(self)['a']})"
 
     assert describe_state(Handle(a=1), "x") != describe_state(Handle(a=2), "x")

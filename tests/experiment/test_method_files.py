@@ -261,6 +261,7 @@ def write_unnoticed(path: Path, text: str) -> None:
     os.utime(path, (1e9, 1e9))
 
 
+STATES_ANGLE = "files = {files}; __init__ = lambda self: super(Mine, self).__init__(summary=str(gains.ANGLE))"
 GAINS = "ANGLE = {}\n"
 IMPORTS = {
     "by name": "import gains",
@@ -279,7 +280,8 @@ def test_an_edit_that_leaves_size_and_time_is_another_method(folder: Path, state
     """Python would run the compiled code of before: it believes size and time of the source."""
     found = []
     for angle in (0.1, 0.5):
-        write_method(folder, "angle = 0.0", "summary = str(gains.ANGLE)")
+        declared = ["gains.py"] if statement == IMPORTS["by its path"] else []  # Python does not list it
+        write_method(folder, "angle = 0.0", STATES_ANGLE.format(files=declared))
         (folder / "mine.py").write_text((folder / "mine.py").read_text().replace("class", f"{statement}\nclass", 1))
         write_unnoticed(folder / "gains.py", GAINS.format(angle))
         for file in ("gains.py", "mine.py"):
@@ -322,7 +324,7 @@ def test_code_counts_wherever_it_lies(
     entry: str,
     statement: str,
 ) -> None:
-    write_method(folder, "angle = 0.0", "summary = str(gains.ANGLE)")
+    write_method(folder, "angle = 0.0", STATES_ANGLE.format(files=[]))
     (folder / "mine.py").write_text((folder / "mine.py").read_text().replace("class", f"{statement}\nclass", 1))
     monkeypatch.syspath_prepend(folder.parent / entry)
     found = []
@@ -361,7 +363,8 @@ def angle():
 
 
 class Mine(Upright):
-    summary = str(angle())
+    def __init__(self):
+        super().__init__(summary=str(angle()))
 """
 
 
