@@ -30,7 +30,8 @@ def read_mcf(path: Path) -> tuple[Emitter, ...]:
     Raises BadFile for a file that is damaged, and for emitters that no device can use; it names the line.
     """
     data = read_input_file(path, _KIND, MAX_MCF_BYTES, "`harness list` names no such files: check the path.")
-    emitters, line_of, announced = [], list[int](), None
+    announced: int | None = None
+    emitters, line_of = [], []
     for number, line in enumerate(data.replace(b"\r", b"\n" if b"\n" not in data else b"").split(b"\n"), start=1):
         if not line.strip():
             continue
