@@ -62,7 +62,7 @@ def _find_lost(data: bytes, emitters: Sequence[Emitter], announced: int | None) 
     if announced is not None and announced != len(emitters):
         return f"{announced} emitters announced and {len(emitters)} listed"
     numbers = {emitter.number for emitter in emitters}
-    missing = [number for number in range(1, max(numbers)) if number not in numbers]
+    missing = [number for number in range(1, len(emitters) + 1) if number not in numbers]
     if missing and announced is None:
         return f"no emitter {missing[0]}, though there are later ones"
     lines = data.splitlines()
