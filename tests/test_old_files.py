@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 import tarfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import harness
 from harness.calibrate.calibration_file import read_calibration
 from harness.cli import main
 from harness.compare.comparison import compare_runs
-from harness.errors import Outcome
+from harness.errors import BadFile, Outcome
 from harness.experiment.fitted_unit import read_fitted_unit
 from harness.measure.unit_file import read_unit_file
 from harness.results.findings import read_findings
@@ -146,6 +147,29 @@ def test_unit_files(old: Path) -> None:
     assert read_fitted_unit(Path("unit.toml")).components["excursion"]["onsets_per_min"] == 6.808943089430894
     validated = read_unit_file("validated.toml")
     assert validated.session["scale"].value == -0.00014803744610268903
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["poses", "tpose", "unit", "validated"])
+def test_no_lost_line_and_no_cut_of_a_file_without_a_digest_gives_other_values(old: Path, name: str) -> None:
+    path = Path(f"{name}.toml")
+
+    def values() -> str:
+        if name in ("unit", "validated"):
+            unit = read_fitted_unit(path)
+            return repr((unit.components, unit.tracker))
+        found = read_calibration(path)
+        arrays = ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m")
+        bone_m = None if found.skeleton is None else found.skeleton.bone_m.tolist()
+        numbers = [getattr(found.calibration, array).tolist() for array in arrays]
+        return repr((found.calibration.kind, found.calibration.stations, found.calibration.bones, numbers, bone_m))
+
+    lines, whole = path.read_bytes().splitlines(keepends=True), values()
+    for n in range(len(lines)):
+        for rest in (lines[:n] + lines[n + 1 :], lines[:n]):
+            path.write_bytes(b"".join(rest))
+            with suppress(BadFile):
+                assert values() == whole, f"line {n + 1}"
 
 
 def test_a_constellation(old: Path) -> None:

@@ -30,7 +30,8 @@ def read_mcf(path: Path) -> tuple[Emitter, ...]:
     Raises BadFile for a file that is damaged, and for emitters that no device can use; it names the line.
     """
     data = read_input_file(path, _KIND, MAX_MCF_BYTES, "`harness list` names no such files: check the path.")
-    emitters, line_of, announced = [], list[int](), None
+    announced: int | None = None
+    emitters, line_of = [], []
     for number, line in enumerate(data.replace(b"\r", b"\n" if b"\n" not in data else b"").split(b"\n"), start=1):
         if not line.strip():
             continue
@@ -61,7 +62,7 @@ def _find_lost(data: bytes, emitters: Sequence[Emitter], announced: int | None) 
     if announced is not None and announced != len(emitters):
         return f"{announced} emitters announced and {len(emitters)} listed"
     numbers = {emitter.number for emitter in emitters}
-    missing = [number for number in range(1, max(numbers)) if number not in numbers]
+    missing = [number for number in range(1, len(emitters) + 1) if number not in numbers]
     if missing and announced is None:
         return f"no emitter {missing[0]}, though there are later ones"
     lines = data.splitlines()

@@ -108,6 +108,13 @@ def test_a_lost_line_is_noticed(tmp_path: Path, lost: int) -> None:
     assert len(read_mcf(write(tmp_path, *FOUR))) == 4
 
 
+def test_a_large_number_is_refused_at_once(tmp_path: Path) -> None:
+    """Not one number after another up to it."""
+    large = FOURTH.replace(b"    4 ", b" 999999999 ", 1)
+    with pytest.raises(BadFile, match="no emitter 4, though there are later ones"):
+        read_mcf(write(tmp_path, LINE, *OTHERS, large))
+
+
 @pytest.mark.parametrize("head", [b"", b"# 4 emitters\r\n"])
 def test_a_last_line_that_was_cut_is_noticed(tmp_path: Path, head: bytes) -> None:
     """Two digits of the identity are lost: the rest is still a line."""
