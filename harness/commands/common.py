@@ -115,7 +115,7 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether a text consists of one to nine digits; `str.isdigit` accepts `²`, and `int` not more than 4,300 digits."""
+    """Whether a text is one to nine digits. `str.isdigit` accepts `²`, and `int` refuses more than 4,300 digits."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
