@@ -117,7 +117,7 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether a text is at most nine digits 0 to 9: `str.isdigit` takes `²`, and `int` limits the number of digits."""
+    """Whether a text is one to nine digits. `str.isdigit` accepts `²`, and `int` refuses more than 4,300 digits."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
