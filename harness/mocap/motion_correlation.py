@@ -1,10 +1,10 @@
-"""Correlation of the accelerations of two clips: it finds copies that were changed in every frame, or in some limbs.
+"""Correlation of how the descriptions of two clips change: it finds copies that were edited in every frame.
 
 An edited copy no longer has the poses of the clip, but it still speeds up and slows down with it. The descriptions of
-`shared_motion` are differentiated twice, which takes drift and offsets away, and the accelerations in a window of one
-clip are correlated with those of the other clip at every lag. Amplitude does not matter. The upper body is also
+`shared_motion` are differentiated once and twice, which takes drift and offsets away, and the changes in a window of
+one clip are correlated with those of the other clip at every lag. Amplitude does not matter. The upper body is also
 compared alone, because the legs may have been replaced. Different takes correlate less, also those of one walker: the
-longer the window, the less. So a long window finds larger changes than a short one.
+longer the window, the less. So a long window finds larger edits than a short one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,31 +17,44 @@ from harness.core.arrays import Bools, Floats, Ints
 GRID_HZ, EVERY = 100, 10
 """Moments per second at which the first clip is known; every tenth moment of the second one is compared."""
 _HALF_SPAN, _MEAN_OF = 5, 5
-"""Accelerations are second differences of means over five moments, which are this many moments apart."""
-LEAST_ACCELERATION = 0.01
-"""Least root mean square acceleration in a window [change of the descriptions in 0.05 s, squared]; people at rest stay
-below it."""
+"""Differences are of means over five moments, which are this many moments apart (twice for the first derivative)."""
+
+
+class Part(NamedTuple):
+    """What is compared: the whole body or the upper body, by speed or by acceleration."""
+
+    upper_body: bool
+    acceleration: bool
+
+    @property
+    def least_change(self) -> float:
+        """Least root mean square change in a window; people at rest stay below it [choice]."""
+        return 0.01 if self.acceleration else 0.03
 
 
 class Window(NamedTuple):
-    """A length of windows, the part of the body that is compared, and the limit between copies and different takes."""
+    """A length of windows of a part, and the limit between copies and different takes."""
 
+    part: Part
     samples: int
     """Length [0.1 s]."""
-    part: int
-    """Number of the part: 0 is the whole body, 1 the upper body."""
     largest_loss: float
     """Loss of correlation (1 - r) below which the motion is the same."""
 
 
+_SPEED, _ACCELERATION = Part(False, False), Part(False, True)
+_UPPER_SPEED, _UPPER_ACCELERATION = Part(True, False), Part(True, True)
 WINDOWS = (
-    Window(6, 0, 0.0018),
-    Window(16, 0, 0.0060),
-    Window(30, 0, 0.0135),
-    Window(6, 1, 0.0016),
-    Window(16, 1, 0.0034),
-    Window(30, 1, 0.0054),
+    Window(_SPEED, 6, 0.0010),
+    Window(_SPEED, 16, 0.0016),
+    Window(_UPPER_SPEED, 16, 0.0010),
+    Window(_ACCELERATION, 16, 0.0030),
+    Window(_ACCELERATION, 30, 0.0110),
+    Window(_UPPER_ACCELERATION, 16, 0.0015),
+    Window(_UPPER_ACCELERATION, 30, 0.0030),
 )
+"""Limits: about half of the least loss between different takes of one performer and behaviour, and between a block and
+the rest of its take. The nearest are walks of the motion generator; CMU's walks are farther apart."""
 
 
 class Match(NamedTuple):
@@ -55,8 +68,8 @@ class Match(NamedTuple):
     length_s: float
 
 
-def accelerations(descriptions: Floats, rate_hz: float) -> Floats:
-    """(N, D) second differences of descriptions (T, D) at the moments of the grid; a clip's ends are repeated."""
+def changes(descriptions: Floats, rate_hz: float) -> Floats:
+    """(N, 2, D) speeds and accelerations of descriptions (T, D) at the moments of the grid; the ends are repeated."""
     moments = np.arange(0.0, (len(descriptions) - 1) / rate_hz + 1e-9, 1.0 / GRID_HZ) * rate_hz
     row = np.minimum(moments.astype(int), max(len(descriptions) - 2, 0))
     beside = (moments - row)[:, None].astype(np.float32)
@@ -65,46 +78,43 @@ def accelerations(descriptions: Floats, rate_hz: float) -> Floats:
     padded = np.concatenate([at[:1].repeat(ends, 0), at, at[-1:].repeat(ends, 0)])
     count = len(padded) - _MEAN_OF + 1
     smooth = sum((padded[k : k + count] for k in range(1, _MEAN_OF)), start=padded[:count]) / np.float32(_MEAN_OF)
-    out: Floats = smooth[2 * _HALF_SPAN :] - 2.0 * smooth[_HALF_SPAN:-_HALF_SPAN] + smooth[: -2 * _HALF_SPAN]
-    return out
+    before, now, after = smooth[: -2 * _HALF_SPAN], smooth[_HALF_SPAN:-_HALF_SPAN], smooth[2 * _HALF_SPAN :]
+    return np.stack([after - before, after - 2.0 * now + before], axis=1)
 
 
-def best_match(
-    first: Floats, second: Floats, allowed: Bools, parts: Sequence[Ints], windows: Sequence[Window]
-) -> Match | None:
-    """The best match of windows of the accelerations of two clips (N, D) and (M, D); None where nothing moves enough.
+def best_match(first: Floats, second: Floats, allowed: Bools, upper_body: Ints) -> Match | None:
+    """The best match of windows of the changes of two clips (N, 2, D) and (M, 2, D); None where nothing moves enough.
 
-    `allowed` (M,) has the moments of the second clip that count. `parts` has the columns of each part of the body.
+    `allowed` (M,) has the moments of the second clip that count, `upper_body` the columns of the upper body.
     """
     sampled, kept = second[::EVERY], allowed[::EVERY]
-    found = [
-        match
-        for number, columns in enumerate(parts)
-        for match in _matches(first[:, columns], sampled[:, columns], kept, [w for w in windows if w.part == number])
-    ]
+    found = list[Match]()
+    for part in dict.fromkeys(window.part for window in WINDOWS):
+        a, b = (x[:, int(part.acceleration)] for x in (first, sampled))
+        if part.upper_body:
+            a, b = a[:, upper_body], b[:, upper_body]
+        found += _matches(a, b, kept, [window for window in WINDOWS if window.part == part])
     return min(found, default=None)
 
 
 def _matches(first: Floats, second: Floats, allowed: Bools, windows: Sequence[Window]) -> Iterator[Match]:
+    """The best match of each length of windows of one part."""
     products = second @ first.T
-    for window in windows:
-        size = window.samples
+    powers = np.sum(second**2, axis=1), np.sum(first**2, axis=1)
+    for part, size, largest_loss in windows:
         if len(second) < size or len(first) <= (size - 1) * EVERY:
             continue
-        energy = _window_sums(np.sum(second**2, axis=1), size, 1)
-        other = _window_sums(np.sum(first**2, axis=1), size, EVERY)
-        whole = _window_sums(allowed.astype(float), size, 1) > size - 0.5
-        least = LEAST_ACCELERATION**2 * size * first.shape[1]
-        rows, columns = np.flatnonzero(whole & (energy > least)), np.flatnonzero(other > 0.5 * least)
-        if not len(rows) or not len(columns):
+        energy, other = _window_sums(powers[0], size, 1), _window_sums(powers[1], size, EVERY)
+        complete = _window_sums(allowed.astype(float), size, 1) > size - 0.5
+        least = part.least_change**2 * size * first.shape[1]
+        rows, columns = complete & (energy > least), other > 0.5 * least
+        if not rows.any() or not columns.any():
             continue
-        sums = _diagonal_sums(products, size)[np.ix_(rows, columns)]
-        sums /= np.sqrt(energy[rows])[:, None]
-        sums /= np.sqrt(other[columns])[None]
-        row, column = np.unravel_index(int(np.argmax(sums)), sums.shape)
-        loss = 1.0 - float(sums[row, column])
-        begins_s = int(columns[column]) / GRID_HZ, int(rows[row]) * EVERY / GRID_HZ
-        yield Match(loss / window.largest_loss, *begins_s, size * EVERY / GRID_HZ)
+        correlation = _diagonal_sums(products, size) * (columns / np.sqrt(np.maximum(other, 1e-12)))
+        correlation *= (rows / np.sqrt(np.maximum(energy, 1e-12)))[:, None]
+        row, column = np.unravel_index(int(np.argmax(correlation)), correlation.shape)
+        loss = 1.0 - float(correlation[row, column])
+        yield Match(loss / largest_loss, int(column) / GRID_HZ, int(row) * EVERY / GRID_HZ, size * EVERY / GRID_HZ)
 
 
 def _window_sums(values: Floats, size: int, step: int) -> Floats:

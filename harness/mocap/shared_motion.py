@@ -17,7 +17,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.motion import Clip
 from harness.mocap.limb_directions import MIRRORED, UPPER_BODY, limb_directions
-from harness.mocap.motion_correlation import GRID_HZ, WINDOWS, Match, accelerations, best_match
+from harness.mocap.motion_correlation import GRID_HZ, Match, best_match, changes
 
 SAME_MOTION = 0.004
 """Largest root mean square difference of descriptions over one second of the same motion (see `least_difference`)."""
@@ -36,8 +36,8 @@ _MIRRORED_COLUMNS = np.array(
     ]
 )
 _UPPER_PAIRS = np.isin(_PAIRS, UPPER_BODY).all(axis=0)
-_PARTS = np.arange(len(_MIRRORED_COLUMNS)), np.append(np.flatnonzero(_UPPER_PAIRS), len(_UPPER_PAIRS) + UPPER_BODY)
-"""Columns of the descriptions of the whole body and of the upper body."""
+_UPPER_COLUMNS = np.append(np.flatnonzero(_UPPER_PAIRS), len(_UPPER_PAIRS) + UPPER_BODY)
+"""Columns of the descriptions that the legs do not change."""
 
 
 class SharedMotion(NamedTuple):
@@ -54,7 +54,7 @@ def find_shared_motion(
 ) -> SharedMotion | None:
     """The longest stretch that runs of frames of two clips share; None if they share no moving one.
 
-    Where no stretch has the same poses, it is the stretch whose accelerations correlate best (see
+    Where no stretch has the same poses, it is the stretch whose changes correlate best (see
     `motion_correlation`).
     """
     stretches = [
@@ -69,7 +69,7 @@ def find_shared_motion(
 def _find_edited_motion(
     first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
 ) -> SharedMotion | None:
-    """The stretch of the best match of accelerations, if it is one of the same motion."""
+    """The stretch of the best match of changes, if it is one of the same motion."""
     found = [(match, begin_s, mirrored) for match, begin_s, mirrored in _match(first, first_runs, second, second_runs)]
     match, begin_s, mirrored = min(found, default=(None, 0.0, False))
     if match is None or match.share >= 1.0:
@@ -87,7 +87,7 @@ def _match(
     first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
 ) -> Iterator[tuple[Match, float, bool]]:
     """The best match of each run of the first clip, when the run begins [s], and whether it is mirrored."""
-    other = _accelerations(second)
+    other = _changes(second)
     moments = np.arange(len(other)) / GRID_HZ * second.rate_hz
     allowed = np.zeros(len(other), bool)
     for run in second_runs:
@@ -96,10 +96,10 @@ def _match(
         return
     for run in first_runs:
         begin, end = (round(frame / first.rate_hz * GRID_HZ) for frame in (run.start, run.stop))
-        own = _accelerations(first)[begin:end]
+        own = _changes(first)[begin:end]
         for mirrored in (False, True):
-            columns = other[:, _MIRRORED_COLUMNS] if mirrored else other
-            match = best_match(own, columns, allowed, _PARTS, WINDOWS)
+            columns = other[:, :, _MIRRORED_COLUMNS] if mirrored else other
+            match = best_match(own, columns, allowed, _UPPER_COLUMNS)
             if match is not None:
                 yield match, begin / GRID_HZ, mirrored
 
@@ -195,7 +195,7 @@ def _window_spread(samples: Floats, window: int) -> Floats:
 
 
 _frame_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
-_acceleration_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
+_change_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
 _sample_cache: WeakKeyDictionary[Clip, tuple[Ints, Floats]] = WeakKeyDictionary()
 
 
@@ -206,11 +206,11 @@ def _describe_frames(clip: Clip) -> Floats:
     return _frame_cache[clip]
 
 
-def _accelerations(clip: Clip) -> Floats:
-    """(N, 55) accelerations of the descriptions of a clip at the moments of the grid; cached."""
-    if clip not in _acceleration_cache:
-        _acceleration_cache[clip] = accelerations(_describe_frames(clip), clip.rate_hz)
-    return _acceleration_cache[clip]
+def _changes(clip: Clip) -> Floats:
+    """(N, 2, 55) speeds and accelerations of the descriptions of a clip at the moments of the grid; cached."""
+    if clip not in _change_cache:
+        _change_cache[clip] = changes(_describe_frames(clip), clip.rate_hz)
+    return _change_cache[clip]
 
 
 def _describe_samples(clip: Clip) -> tuple[Ints, Floats]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
@@ -110,4 +111,71 @@ COPIES: dict[str, Callable[[Clip], Clip]] = {
     "mirrored": mirrored,
     "noisy": noisy,
     "all at once": lambda clip: noisy(moved(mirrored(resampled(trimmed(clip), 60.0)))),
+}
+
+
+def with_smooth_noise(clip: Clip, size_deg: float, correlation_s: float) -> Clip:
+    """The clip with noise of this standard deviation on each hinge, smoothed by a Gaussian of this width."""
+    rng, edge = np.random.default_rng(2), round(5.0 * correlation_s * clip.rate_hz)
+    white = rng.normal(size=(len(clip) + 2 * edge, clip.angles_rad.shape[1]))
+    noise = gaussian_filter1d(white, correlation_s * clip.rate_hz, axis=0)[edge : edge + len(clip)]
+    return replace(clip, angles_rad=clip.angles_rad + np.deg2rad(size_deg) * noise / noise.std(axis=0))
+
+
+def rounded(clip: Clip, step_deg: float) -> Clip:
+    """The clip with all hinge angles rounded to multiples of a step."""
+    step_rad = np.deg2rad(step_deg)
+    return replace(clip, angles_rad=step_rad * np.round(clip.angles_rad / step_rad))
+
+
+def with_amplitude(clip: Clip, share: float) -> Clip:
+    """The clip with all hinge angles nearer to their means."""
+    mean_rad = clip.angles_rad.mean(axis=0)
+    return replace(clip, angles_rad=mean_rad + share * (clip.angles_rad - mean_rad))
+
+
+def with_scaled_angles(clip: Clip, share: float) -> Clip:
+    """The clip with all hinge angles multiplied."""
+    return replace(clip, angles_rad=share * clip.angles_rad)
+
+
+def with_other_legs(clip: Clip) -> Clip:
+    """The clip with the legs of the same clip half a take later."""
+    skeleton, angles_rad = clip.skeleton, clip.angles_rad.copy()
+    legs = [b for b, name in enumerate(skeleton.names) if name[1:] in ("femur", "tibia", "foot", "toes")]
+    dofs = [d for bone in legs for d in range(*skeleton.dof_of_bone[bone].indices(len(skeleton.axes)))]
+    angles_rad[:, dofs] = np.roll(angles_rad[:, dofs], len(clip) // 2, axis=0)
+    return replace(clip, angles_rad=angles_rad)
+
+
+def in_pieces(clip: Clip, piece_s: float) -> Clip:
+    """Pieces of the clip, each followed by as long a rest."""
+    size = round(piece_s * clip.rate_hz)
+    rows = [
+        np.append(np.arange(start, start + size), np.full(size, start + size))
+        for start in range(0, len(clip) - size, 2 * size)
+    ]
+    return take_rows(clip, np.concatenate(rows))
+
+
+EDITS: dict[str, Callable[[Clip], Clip]] = {
+    "1 deg of drift": lambda clip: with_smooth_noise(clip, 1.0, 2.0),
+    "1 deg of noise of 0.4 s": lambda clip: with_smooth_noise(clip, 1.0, 0.4),
+    "2 deg of noise of 0.4 s": lambda clip: with_smooth_noise(clip, 2.0, 0.4),
+    "4 deg of noise of 0.4 s": lambda clip: with_smooth_noise(clip, 4.0, 0.4),
+    "1 deg of noise of 0.15 s": lambda clip: with_smooth_noise(clip, 1.0, 0.15),
+    "2 deg of noise of 0.15 s": lambda clip: with_smooth_noise(clip, 2.0, 0.15),
+    "rounded to 1 deg": lambda clip: rounded(clip, 1.0),
+    "rounded to 2 deg": lambda clip: rounded(clip, 2.0),
+    "rounded to 4 deg": lambda clip: rounded(clip, 4.0),
+    "0.9 of the amplitude": lambda clip: with_amplitude(clip, 0.9),
+    "0.7 of the amplitude": lambda clip: with_amplitude(clip, 0.7),
+    "angles times 0.95": lambda clip: with_scaled_angles(clip, 0.95),
+    "angles times 0.9": lambda clip: with_scaled_angles(clip, 0.9),
+    "other legs": with_other_legs,
+    "pieces of 0.8 s": lambda clip: in_pieces(clip, 0.8),
+    "pieces of 0.5 s": lambda clip: in_pieces(clip, 0.5),
+    "0.9 of the amplitude, rounded to 1 deg, 60 Hz, mirrored": lambda clip: mirrored(
+        resampled(rounded(with_amplitude(clip, 0.9), 1.0), 60.0)
+    ),
 }
