@@ -26,13 +26,13 @@ _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), typ
 
 def describe_state(value: object, name: str) -> str:
     """Text of a value that is called `name`; BadInput, which names the attribute, for one without a stable state."""
-    text = _StateDescription().describe(value, name)
+    text = _StateText().describe(value, name)
     if len(text) <= _MAX_TEXT:
         return text
     return f"{text[:_MAX_TEXT]}... {hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}"
 
 
-class _StateDescription:
+class _StateText:
     """One description; objects inside themselves are named by their number in it."""
 
     def __init__(self) -> None:
