@@ -356,7 +356,7 @@ class _CaptureRun:
         return errors
 
 
-def read_cell_errors(path: Path, cell: Mapping[str, str], metrics: Sequence[str]) -> dict[str, float | None]:
+def read_cell_errors(path: Path, cell: Mapping[str, Any], metrics: Sequence[str]) -> dict[str, float | None]:
     """Metric -> error of a finished cell; BadFile when it is damaged, edited, another cell's or of other metrics.
 
     `cell` has the entries that tell the cell apart: key, arm, clip and side.
