@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import build_parser, main
-from harness.commands.common import mocap_words
+from harness.commands.common import repeat_flags
 from tests.short_demo import short_demo
 
 
@@ -128,9 +128,8 @@ def test_mocap_may_be_given_more_than_once() -> None:
     assert parse(["run", "demo"]).mocap is None
     assert parse(["run", "demo", "--mocap", "a"]).mocap == Path("a")
     assert parse(["run", "demo", "--mocap", "a", "--mocap", "b", "--mocap", "c"]).mocap == tuple(map(Path, "abc"))
-    assert mocap_words(None) == []
-    assert mocap_words(Path("a")) == ["--mocap", "a"]
-    assert mocap_words((Path("a"), Path("b"))) == ["--mocap", "a", "--mocap", "b"]
+    for folders in ([], ["--mocap", "a"], ["--mocap", "a", "--mocap", "b"]):
+        assert repeat_flags(parse(["run", "demo", *folders]), "mocap") == folders
 
 
 def test_demo_has_all_options_of_run() -> None:
