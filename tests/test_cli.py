@@ -128,10 +128,8 @@ def test_mocap_may_be_given_more_than_once() -> None:
     assert parse(["run", "demo"]).mocap is None
     assert parse(["run", "demo", "--mocap", "a"]).mocap == Path("a")
     assert parse(["run", "demo", "--mocap", "a", "--mocap", "b", "--mocap", "c"]).mocap == tuple(map(Path, "abc"))
-    assert repeat_flags(parse(["run", "demo"]), "mocap") == []
-    assert repeat_flags(parse(["run", "demo", "--mocap", "a"]), "mocap") == ["--mocap", "a"]
-    given = ["--mocap", "a", "--mocap", "b"]
-    assert repeat_flags(parse(["run", "demo", *given]), "mocap") == given
+    for folders in ([], ["--mocap", "a"], ["--mocap", "a", "--mocap", "b"]):
+        assert repeat_flags(parse(["run", "demo", *folders]), "mocap") == folders
 
 
 def test_demo_has_all_options_of_run() -> None:

@@ -52,11 +52,11 @@ class MethodAnswers(NamedTuple):
         sigma_rad = None if self.angle_sigma_rad is None else self.angle_sigma_rad[lag:]
         times = {name: getattr(self, name)[:kept] for name in ("step_ms", "step_cpu_ms", "reference_cpu_ms")}
         answers = {name: getattr(self, name)[lag:] for name in ("qpos", "status", "origin", "lag")}
-        return MethodAnswers(**answers, **times, angle_sigma_rad=sigma_rad), lag
+        return self._replace(**answers, **times, angle_sigma_rad=sigma_rad), lag
 
     def at(self, rows: Ints) -> "MethodAnswers":
         """The answers in these rows."""
-        return MethodAnswers(*(None if column is None else column[rows] for column in self))
+        return self._replace(**{n: column[rows] for n, column in self._asdict().items() if column is not None})
 
 
 def run_method(reconstructor: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> MethodAnswers:

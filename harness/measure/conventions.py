@@ -43,7 +43,8 @@ def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats
 
 def _centred(values: Sequence[Floats]) -> Floats:
     joined: Floats = np.concatenate(values)
-    return joined - joined.mean(axis=0)
+    centred: Floats = joined - joined.mean(axis=0)
+    return centred
 
 
 def require_scale(factor: float) -> None:

@@ -212,4 +212,5 @@ def _write_index(top: Path, names: list[str]) -> None:
             rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
     columns = list(dict.fromkeys(column for row in rows.values() for column in row))
     with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        file.writelines(map(csv_line, [columns, *([row.get(name) for name in columns] for row in rows.values())]))
+        file.write(csv_line(columns))
+        file.writelines(csv_line([row.get(name) for name in columns]) for row in rows.values())

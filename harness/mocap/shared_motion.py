@@ -35,7 +35,7 @@ _MIRRORED_COLUMNS = np.array(
         *(len(_PAIR_NUMBER) + MIRRORED),
     ]
 )
-_UPPER_PAIRS = np.isin(_PAIRS, UPPER_BODY).all(axis=0)
+_UPPER_PAIRS: Bools = np.asarray(np.isin(_PAIRS, UPPER_BODY).all(axis=0))
 _UPPER_COLUMNS = np.append(np.flatnonzero(_UPPER_PAIRS), len(_UPPER_PAIRS) + UPPER_BODY)
 """Columns of the descriptions that the legs do not change."""
 

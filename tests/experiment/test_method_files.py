@@ -278,7 +278,7 @@ IMPORTS = {
 @pytest.mark.parametrize("statement", IMPORTS.values(), ids=IMPORTS)
 def test_an_edit_that_leaves_size_and_time_is_another_method(folder: Path, statement: str) -> None:
     """Python would run the compiled code of before: it believes size and time of the source."""
-    found = []
+    found: list[tuple[str, str]] = []
     for angle in (0.1, 0.5):
         declared = ["gains.py"] if statement == IMPORTS["by its path"] else []  # Python does not list it
         write_method(folder, "angle = 0.0", STATES_ANGLE.format(files=declared))
@@ -344,9 +344,9 @@ def test_the_code_that_makes_a_method_of_the_package_counts(folder: Path) -> Non
             "from harness.reconstruct.methods.ik import Ik\n\n\ndef make():\n    return Ik()\n\n\nSCALE = {scale}\n"
         )
         write_unnoticed(folder / "maker.py", (folder / "maker.py").read_text().format(scale=scale))
-        found.append(resolve_method("maker:make", Isolation()))
-        assert isinstance(found[-1], RemoteMethod)
-        found[-1] = hash_method(found[-1])
+        method = resolve_method("maker:make", Isolation())
+        assert isinstance(method, RemoteMethod)
+        found.append(hash_method(method))
         end_methods()
     assert found[0] != found[1]
 

@@ -340,7 +340,7 @@ class _CaptureRun:
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
         path = self.task.out / "cells" / f"{cell_key(content, method_identity(method, arm.method), source_hash())}.json"
-        cell = {"key": path.stem, "arm": str(arm), "clip": self.clip, "side": side}
+        cell = {"key": path.stem, "arm": str(arm), "clip": str(self.clip), "side": side}
         if path.is_file():
             return read_cell_errors(path, cell, self.task.metrics)
         frames, worn = load(), tuple(self.playback.scenario.worn_stations)

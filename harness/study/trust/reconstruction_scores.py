@@ -78,8 +78,8 @@ def score_registered(
     if len(rows) < 2.0 * WARM_UP_S * found.reader.wire.rate_hz:
         raise BadInput(f"{len(rows)} frames lie inside the reference.", "Record the motion of the reference.")
     truth_qpos = trajectory.qpos(time_s[rows])
-    kept = CalibrationFile(measured_calibration(found.registration, tuple(playback.scenario.stations)), None)
-    calibrated = playback.with_calibration(kept)
+    estimated = CalibrationFile(measured_calibration(found.registration, tuple(playback.scenario.stations)), None)
+    calibrated = playback.with_calibration(estimated)
     out = []
     for done, name in enumerate(methods):
         progress(f"reconstructing with {name}", done, len(methods))
