@@ -52,6 +52,12 @@ class ClipPart:
         return range(round(self.start * count), round(self.end * count))
 
 
+def performer_of(clip: str) -> str | None:
+    """The performer that a clip's name tells: "p1" of walking_p1_01, "13" of CMU's 13_17; None for other names."""
+    match = re.fullmatch(r"(?:.*: )?(?:\w+_(p\d+)_\d+|(\d+)_\d+)(?:@.*)?", clip)
+    return (match[1] or match[2]) if match else None
+
+
 def _format_share(share: float) -> str:
     """A share with two decimals, or more if it needs more."""
     short = f"{share:.2f}"

