@@ -168,7 +168,7 @@ def _carry_out(future: Future[Any], process: FunctionProcess, new: bool, call: t
         future.set_exception(problem)
         return
     try:
-        result, error = process.receive()
+        result, error, place = process.receive()
     except EOFError:
         process.close()
         advice = "Its own message is above. Does `harness doctor` pass?"
@@ -177,7 +177,11 @@ def _carry_out(future: Future[Any], process: FunctionProcess, new: bool, call: t
     except Exception as problem:
         future.set_exception(BrokenExecutor(f"its answer cannot be read ({type(problem).__name__}: {problem})"))
     else:
-        future.set_exception(error) if error is not None else future.set_result(result)
+        if error is None:
+            future.set_result(result)
+        else:
+            error.__cause__ = RuntimeError(f"in a worker process:\n{place}")
+            future.set_exception(error)
 
 
 def _work(pipe: Any, folders: Mapping[str, Iterable[str]]) -> None:
@@ -191,13 +195,12 @@ def _work(pipe: Any, folders: Mapping[str, Iterable[str]]) -> None:
             try:
                 pipe.send(answer)
             except (TypeError, AttributeError, PicklingError) as error:  # it cannot be pickled
-                pipe.send((None, error))
+                pipe.send((None, error, ""))
 
 
-def _call(function: Callable[..., R], task: tuple[Any, ...]) -> tuple[R | None, BaseException | None]:
-    """The result of a call, or the exception that it raises, with its traceback as a note."""
+def _call(function: Callable[..., R], task: tuple[Any, ...]) -> tuple[R | None, BaseException | None, str]:
+    """The result of a call, or the exception that it raises and its traceback."""
     try:
-        return function(*task), None
+        return function(*task), None, ""
     except BaseException as error:
-        error.add_note(traceback.format_exc())
-        return None, error
+        return None, error, traceback.format_exc()
