@@ -25,7 +25,7 @@ def test_the_unit_of_other_times_is_named(factor: float, unit: str, rate_hz: flo
     if rate_hz == 900.0 and factor == 1e3:
         factor *= 2.0  # milliseconds of a fast reference are a motion of one pose a second
     with pytest.raises(BadInput, match=f"in {unit} instead of seconds"):
-        require_seconds(np.asarray(factor * np.arange(100) / rate_hz, dtype=np.float64), "The reference")
+        require_seconds(factor * np.arange(100, dtype=np.float64) / rate_hz, "The reference")
 
 
 @pytest.mark.parametrize("place", [0, 7, 2399])
