@@ -95,12 +95,15 @@ def stack_estimates(
         raise ValueError(f"the method gave standard deviations in {len(sigma_rad)} of {len(estimates)} frames")
     lags = [estimate.lag for estimate in estimates]
     session_lag(lags)
-    missing = np.full(len(estimates), np.nan)
+    missing, measured = np.full(len(estimates), np.nan), (step_ms, step_cpu_ms, reference_cpu_ms)
+    times = [immutable(missing if each is None else each) for each in measured]
     return MethodAnswers(
         immutable(np.array([estimate.qpos for estimate in estimates]).reshape(-1, QPOS_SIZE)),
         immutable([estimate.status for estimate in estimates], np.int64),
         immutable([estimate.origin for estimate in estimates], np.int64),
-        *(immutable(missing if times is None else times) for times in (step_ms, step_cpu_ms, reference_cpu_ms)),
+        times[0],
+        times[1],
+        times[2],
         lag=immutable(lags, np.int64),
         angle_sigma_rad=immutable(sigma_rad) if sigma_rad else None,
     )
