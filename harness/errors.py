@@ -46,11 +46,18 @@ def shorten(text: str, limit: int = MAX_TEXT) -> str:
     return text if len(text) <= limit else shorten(text, limit)
 
 
+def error_chain(error: BaseException | None) -> Iterator[BaseException]:
+    """An error and what has led to it, each once: a method may raise an error from itself."""
+    passed = set[int]()
+    while error is not None and id(error) not in passed:
+        passed.add(id(error))
+        yield error
+        error = error.__cause__ or error.__context__
+
+
 def was_interrupted(error: BaseException | None) -> bool:
     """Whether Ctrl-C caused an error: interrupted code may raise another error while it cleans up."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
+    return any(isinstance(each, KeyboardInterrupt) for each in error_chain(error))
 
 
 class HarnessError(Exception):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from harness.errors import SystemFault
+from harness.errors import SystemFault, error_chain
 
 MAX_CAUSE_CHARACTERS = 300
 """Longer causes are cut: a message may quote a whole file [choice]."""
@@ -54,8 +54,7 @@ def find_system_fault(error: BaseException) -> SystemFault | None:
 
     Such are a full disk, and whatever keeps compiled functions from being made or loaded.
     """
-    cause: BaseException | None = error
-    while cause is not None:
+    for cause in error_chain(error):
         if isinstance(cause, SystemFault):
             return cause
         compiling = any(f.f_globals.get("__name__") == _COMPILER for f, _ in traceback.walk_tb(cause.__traceback__))
@@ -63,7 +62,6 @@ def find_system_fault(error: BaseException) -> SystemFault | None:
             return SystemFault(f"A function cannot be compiled ({cause}).", "Does `harness doctor` pass?")
         if isinstance(cause, OSError) and cause.errno in _DISK_FAULTS:
             return SystemFault(*describe_fault(cause))
-        cause = cause.__cause__
     return None
 
 

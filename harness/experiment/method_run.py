@@ -120,5 +120,5 @@ def describe_failure(error: BaseException) -> str:
     if was_interrupted(error):
         raise KeyboardInterrupt from error
     if fault := find_system_fault(error):
-        raise fault from error
+        raise fault from (None if fault is error else error)
     return str(error) if isinstance(error, HarnessError) else "".join(traceback.format_exception(error))

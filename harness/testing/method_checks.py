@@ -60,5 +60,5 @@ def check_rule(case: ContractCase, rule: str) -> RuleResult:
         if was_interrupted(error):
             raise
         if fault := find_system_fault(error):
-            raise fault from error
+            raise fault from (None if fault is error else error)
         return RuleResult(rule, False, f"raised {type(error).__name__}: {error}")

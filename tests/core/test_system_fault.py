@@ -1,18 +1,24 @@
 """Which errors that a method's code meets are faults of the system, and not its own."""
 
 import errno
+from types import FunctionType
 
 import pytest
 
 from harness.core.fault_report import find_system_fault
-from harness.errors import BadInput, SystemFault
+from harness.errors import BadInput, SystemFault, was_interrupted
+from harness.experiment.method_run import describe_failure
+
+
+def raise_error(error: Exception) -> None:
+    raise error
 
 
 def raised_in(module: str, error: Exception) -> Exception:
     """An error that was raised by a function of a module."""
-    namespace: dict[str, object] = {"__name__": module, "error": error.with_traceback(None)}
+    work = FunctionType(raise_error.__code__, {"__name__": module})
     try:
-        exec("def work():\n    raise error\nwork()", namespace)  # noqa: S102  # a frame of a module of that name
+        work(error.with_traceback(None))
     except Exception as caught:
         return caught
     raise AssertionError
@@ -48,3 +54,33 @@ def test_arguments_that_cannot_be_compiled_are_the_methods() -> None:
     from numba.core.errors import TypingError
 
     assert find_system_fault(raised_in("harness.core.compiled", TypingError("a text"))) is None
+
+
+def test_errors_that_lead_to_each_other() -> None:
+    """A method may raise an error from itself, or two from each other."""
+    first, second = ValueError("one"), ValueError("two")
+    first.__cause__, second.__cause__ = second, first
+    assert find_system_fault(first) is None
+    assert not was_interrupted(first)
+    second.__cause__ = KeyboardInterrupt()
+    assert was_interrupted(first)
+
+
+@pytest.mark.parametrize("depth", [0, 1, 2])
+def test_a_fault_of_the_system_is_raised_again_and_leads_to_itself_by_no_way(depth: int) -> None:
+    fault = SystemFault("The disk is full.", "")
+    error: Exception = fault
+    for _ in range(depth):
+        outer = ValueError("a method")
+        outer.__cause__, error = error, outer
+
+    def describe() -> None:
+        try:
+            raise error
+        except (ValueError, SystemFault) as caught:
+            describe_failure(caught)
+
+    with pytest.raises(SystemFault, match="disk is full") as raised:
+        describe()
+    assert raised.value is fault
+    assert not was_interrupted(raised.value)
