@@ -41,7 +41,7 @@ from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
-from harness.core.python_process import safe_import_path
+from harness.core.python_process import THREAD_VARIABLES, safe_import_path
 from harness.core.working_folder import serve_folder
 from harness.errors import Outcome, SystemFault
 
@@ -103,8 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
-    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
+    for variable in THREAD_VARIABLES:
+        os.environ.setdefault(variable, "1")  # before numpy is imported
     try:
         serve_folder(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     except OSError as error:

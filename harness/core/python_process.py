@@ -12,6 +12,8 @@ from pathlib import Path
 
 from harness.core.package_data import PACKAGE_FOLDER
 
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables by which every verb gives the libraries one thread: times are of one core, --jobs uses the others."""
 _SAFE_PATH = "PYTHONSAFEPATH"
 _SITE_FOLDERS = ("site-packages", "dist-packages")
 

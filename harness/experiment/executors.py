@@ -21,6 +21,7 @@ from threading import Lock
 from typing import Any, Protocol, TypeVar
 
 from harness.core.interrupts import shield_children
+from harness.core.python_process import THREAD_VARIABLES
 from harness.core.workers import Pool, schedule_tasks
 from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, MissingExtra
@@ -41,7 +42,7 @@ LOCAL_CLUSTER_CONFIG = {
     "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
 }
 """Dask settings of a local cluster."""
-_WORKER_ENVIRONMENT = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONSAFEPATH"), 1)
+_WORKER_ENVIRONMENT = dict.fromkeys((*THREAD_VARIABLES, "PYTHONSAFEPATH"), 1)
 
 
 class TaskExecutor(Protocol):

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from harness.core.python_process import THREAD_VARIABLES
 from harness.errors import HarnessError
 from harness.experiment.environment_audit import audit_environment
 from harness.reconstruct.source_files import CACHE_FOLDER, SourceFiles, foreign_folders, is_below, is_own
@@ -60,7 +61,7 @@ class FileAudit:
         """Watch the folders of a method from now on, and look at what was read before."""
         self._states = {name: _file_state(name) for file in source.files for name in _names(str(file))}
         self._folders = tuple(Path(name) for folder in source.folders for name in _names(str(folder)))
-        self._declared = variables
+        self._declared = variables | {*THREAD_VARIABLES}  # the harness sets these itself
         with suppress(UndeclaredInput):  # kept in `violation`: every cell fails and says so
             for path, state in self._opened.items():
                 self._check(path, state)

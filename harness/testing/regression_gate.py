@@ -15,6 +15,7 @@ from harness.compare.margins import GATED_METRICS, margin_of
 from harness.core.fields import build
 from harness.core.files import content_key
 from harness.core.progress import ProgressCallback
+from harness.core.python_process import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
@@ -26,7 +27,6 @@ from harness.results.storage import read_summary
 
 DEFAULT_SCENARIO = "gate"
 """Scenario on which a new baseline is measured by default."""
-_THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,8 @@ def _single_threaded() -> Iterator[None]:
 
     Threads that wait for each other cost CPU time, and steps would appear many times as expensive.
     """
-    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         yield
     finally:

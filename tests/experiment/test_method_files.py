@@ -424,6 +424,12 @@ def test_an_undeclared_variable_fails_the_cell(folder: Path, monkeypatch: pytest
         fit()
 
 
+def test_numbers_of_threads_need_no_declaration(folder: Path) -> None:
+    """The harness sets them, and much code gives them a default before it imports numpy."""
+    write_method(folder, "import os; os.environ.setdefault('OMP_NUM_THREADS', '1'); angle = 0.0")
+    fit()
+
+
 def test_a_variable_that_is_read_while_the_module_is_imported_counts(folder: Path) -> None:
     write_method(folder, "angle = 0.0", f"import os; gain = os.environ.get('{VARIABLE}')")
     with pytest.raises(MethodFailure, match=f"the environment variable {VARIABLE}, which is not declared"):
