@@ -45,16 +45,16 @@ class Window(NamedTuple):
 _SPEED, _ACCELERATION = Part(False, False), Part(False, True)
 _UPPER_SPEED, _UPPER_ACCELERATION = Part(True, False), Part(True, True)
 WINDOWS = (
-    Window(_SPEED, 6, 0.0010),
-    Window(_SPEED, 16, 0.0016),
-    Window(_UPPER_SPEED, 16, 0.0010),
-    Window(_ACCELERATION, 16, 0.0030),
-    Window(_ACCELERATION, 30, 0.0110),
-    Window(_UPPER_ACCELERATION, 16, 0.0015),
-    Window(_UPPER_ACCELERATION, 30, 0.0030),
+    Window(_SPEED, 6, 0.0005),
+    Window(_SPEED, 16, 0.0008),
+    Window(_UPPER_SPEED, 16, 0.0005),
+    Window(_ACCELERATION, 16, 0.0015),
+    Window(_ACCELERATION, 30, 0.0055),
+    Window(_UPPER_ACCELERATION, 16, 0.00075),
+    Window(_UPPER_ACCELERATION, 30, 0.0015),
 )
-"""Limits: about half of the least loss between different takes of one performer and behaviour, and between a block and
-the rest of its take. The nearest are walks of the motion generator; CMU's walks are farther apart."""
+"""Limits: at most 0.6 of the least loss between different takes of one performer and behaviour, and between a fifth of a
+take and the rest of it. The nearest are swings of golf and walks of the motion generator."""
 
 
 class Match(NamedTuple):

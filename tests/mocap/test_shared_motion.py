@@ -174,7 +174,7 @@ def test_takes_of_the_motion_generator_are_apart(behaviour: str) -> None:
     copies, takes, blocks = most_of_copies(clips[:2]), least_of_takes(clips), least_of_blocks(clips, FIFTHS)
     losses = least_losses(clips)
     print(f"{behaviour}: copies up to {copies}, takes from {takes}, blocks from {blocks}, losses from {losses}")
-    assert losses[0] > 1.15
+    assert losses[0] > 1.5
     assert 2.0 * copies[0] < SAME_MOTION < 0.5 * min(takes[0], blocks[0])
 
 
@@ -187,7 +187,7 @@ def test_takes_of_one_subject_of_the_library_are_apart(mocap: Path) -> None:
     copies, takes, blocks = most_of_copies(clips[:3]), least_of_takes(clips), least_of_blocks(clips, FIFTHS)
     losses = least_losses(clips)
     print(f"copies up to {copies}, takes from {takes}, blocks from {blocks}, losses from {losses}")
-    assert losses[0] > 1.15
+    assert losses[0] > 1.5
     assert 2.0 * copies[0] < SAME_MOTION < 0.5 * min(takes[0], blocks[0])
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from harness.core.motion import BodyMotion
+from harness.core.seeds import generator
 from harness.experiment import benchmark_clips
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
@@ -31,8 +32,9 @@ def library(tmp_path: Path) -> PaperStudy:
         ("93_01", "golf", 360),
     ):
         motion = clip(frames, name=name)
-        scale = 1.0 + 0.1 * int(name[:2]) + 0.5 * int(name[3:])  # another motion in each clip
-        write_clip(folder, replace(motion, angles_rad=motion.angles_rad * scale))
+        rng, time_s = generator(1, name), np.arange(frames)[:, None] / 120.0  # another motion in each clip
+        rate_hz, phase_rad = rng.uniform(0.5, 2.0, (2, motion.angles_rad.shape[1]))
+        write_clip(folder, replace(motion, angles_rad=0.2 * np.sin(2.0 * np.pi * rate_hz * time_s + phase_rad)))
         rows.append(f"{name[:2]}/{name}.amc,{name[:2]},{name[3:]},{behaviour},{frames},120")
     (folder / "manifest.csv").write_text("\n".join(rows) + "\n")
     motion_of = replace(WORN.motion, test=("91_01", "91_02@0.2-0.6"), behaviours=("walking",), examples=())
