@@ -20,6 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import TEMPORARY
+from harness.results.reader import load_results
 from tests.experiment.test_sweep_killed import kept
 from tests.short_demo import short_demo
 
@@ -328,7 +329,12 @@ def contents(work: Work, kind: str, out: str) -> dict[str, object]:
         return {"report.html": (work.folder / "made" / "report.html").read_bytes()}
     if kind == "baseline":
         folder = work.folder / "results" / "baselines" / out
-        return {path.name: path.read_bytes() for path in folder.iterdir()}
+        load_results(folder)  # checks the digests
+        files: dict[str, object] = {path.name: path.read_bytes() for path in folder.iterdir()}
+        first, digest, name, *others = (folder / "cells.json").read_bytes().splitlines()
+        assert digest.startswith(b' "sha256": ')
+        assert name == b' "name": "%b",' % out.encode(), "a baseline states its name"
+        return files | {"cells.json": [first, *others]}
     folders = sorted((work.folder / out).rglob("cells"))
     assert folders
     return {str(folder.parent.relative_to(work.folder / out)): kept(folder.parent) for folder in folders}

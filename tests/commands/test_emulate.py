@@ -160,7 +160,7 @@ def test_stations_have_the_numbers_that_are_asked_for(
     assert main([*words, "--stations", "head=9,left_hand=2"]) == 0
     talk = capsys.readouterr().err
     assert "stations 2 left_hand, 9 head\n" in talk
-    assert "--stations left_hand,head" in talk
+    assert "--stations head=9,left_hand=2 " in talk, "the next command has the numbers too"
     ((stations, config),) = played
     assert (stations, config.characters, config.stylus_bytes) == (("left_hand", "head"), "29", 2)
     assert main([*words, "--stations", "head=0"]) == 2

@@ -83,7 +83,7 @@ def test_what_is_refused_says_why(
 ) -> None:
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
     lines = CAVE.read_bytes().splitlines(keepends=True)
-    (tmp_path / "two.mcf").write_bytes(b"".join(lines[:2]))
+    (tmp_path / "two.mcf").write_bytes(b"".join(lines[1:3]))
     (tmp_path / "bad.mcf").write_bytes(lines[0] + b"\x00\x01" + b"".join(lines[1:]))
     assert main(["inspect", *words.split()]) == 2
     shown = capsys.readouterr()

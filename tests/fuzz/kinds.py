@@ -56,7 +56,7 @@ from harness.stream.recording.summary import StreamSummary
 from harness.study.placement.config import base_scenario, load_placement_study, load_scenario_beside
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
-from tests.fuzz.mending import mend_baseline, mend_findings, mend_index, mend_run
+from tests.fuzz.mending import mend_baseline, mend_calibration, mend_findings, mend_index, mend_run
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
@@ -315,7 +315,7 @@ KINDS: dict[str, Kind] = {
         Kind("sweep", _copy_shipped("sweeps/noise_and_rate.toml"), ("*",), TOML, _read_sweep),
         Kind("placement", _copy_shipped("placement/walking.toml"), ("*",), TOML, _read_placement),
         Kind("method options", _write("x.txt", OPTIONS), ("*",), TEXT, _read_options),
-        Kind("calibration", _make_calibration, ("*",), TOML, _read_calibration),
+        Kind("calibration", _make_calibration, ("*",), TOML, _read_calibration, mend=mend_calibration),
         Kind("recording", _make_recording, ("*",), RECORDING, _read_recording, "replay {}/x.rec --frames"),
         Kind("cell", _make_run, ("x/cells/*/cell.json",), JSON, _read_run, _COMPARE, mend_run),
         Kind("frames of a cell", _make_run, ("x/cells/*/frames.npz",), NPZ, _read_run, _COMPARE, mend_run),

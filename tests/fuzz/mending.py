@@ -7,6 +7,7 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
+from harness.core.toml_digest import insert_toml_digest
 from harness.results.digests import insert_digest
 from harness.results.index import _content_digest
 from harness.results.integrity import compute_digests
@@ -55,6 +56,15 @@ def mend_baseline(folder: Path) -> None:
     for name in names:
         _mend_json(folder / "b" / name)
     _mend_json(folder / "b" / "cells.json", digests={name: _sha256(folder / "b" / name) for name in names})
+
+
+def mend_calibration(folder: Path) -> None:
+    """Mend the digest in the first line of `folder`/x.toml, also where that line is damaged or gone."""
+    path = folder / "x.toml"
+    lines = path.read_text(encoding="utf-8", errors="surrogateescape").splitlines(keepends=True)
+    rest = "".join(line for line in lines if not line.startswith("sha256"))
+    with contextlib.suppress(UnicodeEncodeError):  # bytes that no text has: refused in any case
+        path.write_text(insert_toml_digest(rest), encoding="utf-8")
 
 
 def mend_findings(folder: Path) -> None:

@@ -341,7 +341,7 @@ def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path
     (run_folder / f"{TEMPORARY}12345-summary.json").write_text("{")
     make_run(run_folder, manifest(methods=["ik", "local_pca"]))
     storage.remove_leftovers(run_folder)
-    assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
+    assert sorted(os.listdir(run_folder)) == [LOCK_FILE, "cells", "manifest.json"]
     assert os.listdir(run_folder / "cells") == [cell.key]
     assert storage.has_cell(run_folder, cell.key)
 

@@ -53,7 +53,9 @@ def test_the_lines_of_a_shipped_constellation_are_its_file(name: str, tmp_path: 
     path.write_bytes(constellation.lines())
     assert read_mcf(path) == constellation.emitters
     write_mcf(path, constellation.emitters)
-    assert path.read_bytes() == constellation.lines()
+    count = len(constellation.emitters)
+    assert path.read_bytes() == b"# %d emitters\r\n" % count + constellation.lines()
+    assert read_mcf(path) == constellation.emitters
 
 
 def test_an_unknown_name_is_refused() -> None:

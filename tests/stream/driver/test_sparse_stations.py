@@ -55,9 +55,9 @@ def test_some_stations_are_read_by_number_or_in_the_order_of_the_device(characte
         bench, samples = make_unit(characters)
         with bench.driver(config) as driver:
             check_frames(frames_for(driver, bench, 1.0), samples, rows)
-            assert driver.station_list == ", ".join(
-                f"{characters[row]} {name}" for row, name in zip(rows, driver.stations, strict=True)
-            )
+            read = ", ".join(f"{characters[row]} {name}" for row, name in zip(rows, driver.stations, strict=True))
+            others = ", ".join(character for row, character in enumerate(characters) if row not in rows)
+            assert driver.station_list == (f"{read}; not read: {others}" if others else read)
         device = bench.device
         assert isinstance(device, EmulatedDevice)
         assert device.emulator.device.active == characters, "the others are switched on again"

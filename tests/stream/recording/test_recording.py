@@ -328,7 +328,7 @@ def test_conf_blocks_are_json(tmp_path: Path) -> None:
     [
         (b"no JSON", "a conf block that is not JSON"),
         (b"[]", "missing stations, rate_hz"),
-        (b'{"stations": ["head"], "rate_hz": 0}', "0 is not positive"),
+        (b'{"stations": ["head"], "rate_hz": 0}', "0 records per second of each station. A device sends 0.001 to"),
         (b'{"stations": ["head"], "rate_hz": 40, "pace": 1}', "no key in wire format called 'pace'"),
         (b'{"stations": ["head"], "rate_hz": 40, "characters": "Z"}', "one of 123456789ABC for each"),
     ],
