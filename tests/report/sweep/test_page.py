@@ -60,7 +60,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
-    assert re.search(r"on 14 clips\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14", said)
+    assert re.search(r"on 14 clips \(1 performer\)\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14", said)
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -212,7 +212,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
     assert "good is best: " in causal
     assert "late" not in causal
-    assert late.endswith("with a lag of 2 frames. No other method was measured.")
+    assert late.endswith("with a lag of 2 frames (1 performer). No other method was measured.")
     assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
     table = str(scenario_table(sweep, PRIMARY_METRIC))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
