@@ -17,7 +17,8 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize("stream", [Terminal(), io.StringIO()])
 def test_steps_are_counted_on_a_terminal(stream: io.StringIO, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr("tqdm.std.time", lambda clock=count(): float(next(clock)))  # each step takes a second
+    clock = count()
+    monkeypatch.setattr("tqdm.std.time", lambda: float(next(clock)))  # each look at the clock is a second later
     report_step("before any bar")
     with show_steps("parts"):
         for step in ("first", "second"):
