@@ -39,9 +39,9 @@ class MethodRanking:
 
     @property
     def performers(self) -> str:
-        """How many performers the clips are of, such as "3 performers", as far as the clips' names tell it."""
+        """How many performers the clips are of, such as "3 performers"; empty where a clip's name does not tell it."""
         names = {performer_of(clip) for clip in self.clips}
-        return count_noun(len(names), "performer") if None not in names else "unknown performers"
+        return count_noun(len(names), "performer") if None not in names else ""
 
     @property
     def lowest(self) -> str:

@@ -60,9 +60,9 @@ def name_module(module: str) -> None:
 def leave_relative_folders_out() -> None:
     """Take relative folders of PYTHONPATH off the import path; `:` at an end adds an empty one, the working folder."""
     entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    relative = {os.path.abspath(entry) for entry in entries if not os.path.isabs(entry)} - {*entries}
     library = os.path.dirname(os.__file__)
     if len(entries) > 1 or entries[0]:
+        relative = {os.path.abspath(entry) for entry in entries if not os.path.isabs(entry)} - {*entries}
         given = sys.path[: sys.path.index(library)] if library in sys.path else []
         sys.path[: len(given)] = [entry for entry in given if os.path.abspath(entry) not in relative]
 

@@ -33,7 +33,7 @@ def found(b: ResultSet, a: ResultSet | None = None, **options: Any) -> Compariso
         (side(clips=5), Outcome.NOT_COMPARABLE, "cells are only in A"),
         (side(scenario="other"), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (scenario: demo against"),
         (ResultSet("B", manifest(), (), 0), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (a side has no"),
-        (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "no gated metric was measured on both sides"),
+        (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, f"{ANGLE} was measured on one side only in 8 of 8 cells"),
         (side(defined_by={"calibration": "poses"}), Outcome.NOT_COMPARABLE, "inputs differ: calibration: none against"),
         (side(failed=["ik on walk_99"]), Outcome.INCOMPLETE, "planned cells are missing: B: ik on walk_99"),
         (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells are not finished"),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.errors import ShapeError
 from harness.experiment.method_run import run_method
 from harness.experiment.reference_workload import FRAMES_PER_TIMING
 
@@ -69,5 +70,5 @@ def test_a_pose_of_another_size_is_an_error() -> None:
     method: Any = Rewriter()
     method.qpos = np.zeros(54)
     shown: Any = range(5)
-    with pytest.raises(ValueError, match=r"shape \(54,\), expected \(55,\)"):
+    with pytest.raises(ShapeError, match=r"shape \(54,\), expected \(55\)"):
         run_method(method, method, shown)

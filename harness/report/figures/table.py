@@ -154,8 +154,9 @@ def _standing(ranking: MethodRanking, series: str) -> Standing:
 
 def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
     sentences = ["Mean over clips and its 95 % interval."]
-    if rankings := [ranking for each in run.conditions if (ranking := each.rank()) is not None]:
-        sentences.append(f"The clips are of {' or '.join(dict.fromkeys(r.performers for r in rankings))}.")
+    rankings = [ranking for each in run.conditions if (ranking := each.rank()) is not None]
+    if performers := dict.fromkeys(ranking.performers for ranking in rankings if ranking.performers):
+        sentences.append(f"The clips are of {' or '.join(performers)}.")
     if any(value.bold for row in rows for value in row.values):
         sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")
     if few:

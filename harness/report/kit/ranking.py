@@ -26,9 +26,9 @@ def describe_ranking(
     """Which method is best, or has the lowest error, and what can be told about the others.
 
     `where` names the motion, such as "5 clips of built-in motion"; `clips` is the noun for what is counted. The number
-    of performers follows.
+    of performers follows where the names of the clips tell it.
     """
-    where = f"{where} ({ranking.performers})"
+    where = f"{where} ({ranking.performers})" if ranking.performers else where
     lowest, error = ranking.lowest, format_error(ranking.means[ranking.lowest])
     if not ranking.results:
         return f"{lowest}: {error} mean joint-angle error on {where}. No other method was measured."

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
+from harness.core.object_state import describe_state
 from harness.core.split import ClipPart, allowed_frames
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.scenario import Scenario
@@ -83,4 +84,4 @@ def _left_out_rows(scenario: Scenario) -> list[tuple[str, ...]]:
 
 def _method_constants(study: PaperStudy) -> tuple[tuple[str, ...], ...]:
     names: Sequence[str] = list(dict.fromkeys(chain.from_iterable(s.methods for s in study.runs.values())))
-    return tuple((name, repr(registry.resolve(name))) for name in names)
+    return tuple((name, describe_state(registry.resolve(name), name)) for name in names)

@@ -210,7 +210,7 @@ def test_a_run_without_any_finished_cell_has_a_page(tmp_path: Path) -> None:
 def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
     said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
-    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion. No other" in said
+    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion (1 performer). No other" in said
     assert "Its mean joint position error is 0 mm." in said
 
 
@@ -239,7 +239,7 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
         assert f" {row['metrics']['joint_angle_mean_deg']['mean']:.2f} " in said
     last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
     assert f"ik has the lowest mean joint-angle error, {last:.2f}° on 1 sequence" in said
-    assert "of built-in motion, with components.echo.share=0.1, but cannot be called better than" in said
+    assert "of built-in motion, with components.echo.share=0.1 (1 performer), but cannot be called better than" in said
     assert {trace.key for trace in read_run(out).traces} == {
         row["key"] for row in read_run(out).full_summary["cells"][-2:]
     }

@@ -33,6 +33,8 @@ from harness.report.sweep.wording import describe_effect, group_failures, senten
 from harness.results.index import CellIndex
 from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.report.drawing import texts_apart
+from tests.report.fabricate import Plan as RunPlan
+from tests.report.fabricate import fabricate
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of
 from tests.report.watching import is_whole_and_quiet
@@ -60,7 +62,10 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
-    assert re.search(r"on 14 clips\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14", said)
+    assert re.search(
+        r"on 14 clips \(1 performer\)\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14",
+        said,
+    )
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -212,7 +217,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
     assert "good is best: " in causal
     assert "late" not in causal
-    assert late.endswith("with a lag of 2 frames. No other method was measured.")
+    assert late.endswith("with a lag of 2 frames (1 performer). No other method was measured.")
     assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
     table = str(scenario_table(sweep, PRIMARY_METRIC))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
@@ -281,12 +286,22 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 
 
 def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page = write_sweep_page(fabricate_sweep(tmp_path))
+    """The verb reads the cells too: a sweep with a damaged one is refused."""
+    fabricate(tmp_path, RunPlan(behaviours=("walking",), methods={"ik": 3.0, "mean_pose": 9.0}, duration_s=3.0))
+    with CellIndex(tmp_path) as index:
+        index.note(kind="sweep", name="made_up", command=COMMAND)
+        index.write_digest({})
+    page = write_sweep_page(tmp_path)
     before = page.read_bytes()
     assert main(["report", str(tmp_path)]) == 0
     assert page.read_bytes() == before
     assert str(page) in capsys.readouterr().out
     assert main(["report", str(tmp_path), "--movie"]) == 2
+    cell = next((tmp_path / "cells").glob("*/cell.json"))
+    cell.write_text(cell.read_text().replace("walking", "running"))
+    assert main(["report", str(tmp_path)]) == 2
+    assert str(cell) in capsys.readouterr().err
+    assert page.read_bytes() == before
 
 
 def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
