@@ -53,8 +53,8 @@ WINDOWS = (
     Window(_UPPER_ACCELERATION, 16, 0.00075),
     Window(_UPPER_ACCELERATION, 30, 0.0015),
 )
-"""Limits: at most 0.6 of the least loss between different takes of one performer and behaviour, and between a fifth of a
-take and the rest of it. The nearest are swings of golf and walks of the motion generator."""
+"""Limits: at most 0.6 of the least loss between different takes of one performer and behaviour, and between a fifth of
+a take and the rest of it. The nearest are swings of golf and walks of the motion generator."""
 
 
 class Match(NamedTuple):
