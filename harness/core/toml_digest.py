@@ -39,7 +39,8 @@ def read_digested_toml(path: Path, expected: str, advice: str) -> tuple[dict[str
         return content, "an earlier version wrote it without a digest: not every lost line in it is noticed"
     if schema != SCHEMA:
         found = "no schema" if schema is None else f"schema {schema!r}"
-        raise BadFile(path, found, f"schema {SCHEMA}", "This version of the harness reads no other.")
+        repair = advice if schema is None else "This version of the harness reads no other."
+        raise BadFile(path, found, f"{expected} of schema {SCHEMA}", repair)
     if stored == _EDITED:
         return content, "it was edited by hand: lost lines in it are not noticed"
     line = _LINE.match(data)

@@ -141,10 +141,10 @@ def line(key: str, value: str) -> Callable[[str], str]:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (line("schema", "3"), "schema 3; expected schema 2"),
-        (line("schema", '"1"'), "schema '1'; expected schema 2"),
-        (line("schema", "true"), "schema True; expected schema 2"),
-        (without("schema"), "no schema; expected schema 2"),
+        (line("schema", "3"), "schema 3; expected a calibration of schema 2"),
+        (line("schema", '"1"'), "schema '1'; expected a calibration of schema 2"),
+        (line("schema", "true"), "schema True; expected a calibration of schema 2"),
+        (without("schema"), "no schema; expected a calibration of schema 2"),
         (lambda text: text + "[", "not TOML"),
         (lambda text: text.replace("mount_m", "mont_m"), "Did you mean 'mount_m'"),
         (lambda text: text.replace("[room]", "[rom]"), "Did you mean 'room'"),

@@ -90,7 +90,7 @@ def test_bad_input_is_refused_in_one_line(
 ) -> None:
     text, negative, unknown = tmp_path / "text.toml", tmp_path / "negative.toml", tmp_path / "unknown.toml"
     text.write_text("nothing = 1\n", encoding="utf-8")
-    head = 'schema = 1\nkind = "unit"\nname = "u"\n[tracker]\nrate_hz = 40.0\n'
+    head = 'sha256 = "edited"\nschema = 2\nkind = "unit"\nname = "u"\n[tracker]\nrate_hz = 40.0\n'
     negative.write_text(f"{head}[components.white]\nposition_m = -0.001\n", encoding="utf-8")
     unknown.write_text(f"{head}[components.white]\ncolour = 1.0\n", encoding="utf-8")
     for words, problem in (
