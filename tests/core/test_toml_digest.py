@@ -51,5 +51,5 @@ def test_what_cannot_be_verified_is_said(tmp_path: Path) -> None:
     assert (edited["a"], "edited by hand" in caveat) == ({"b": 2}, True)
     earlier, caveat = read_digested_toml(write(tmp_path, as_earlier_version(write(tmp_path, whole))), "a file", "")
     assert (earlier["schema"], "without a digest" in caveat) == (1, True)
-    with pytest.raises(BadFile, match="schema 1; expected .* of schema 2"):
+    with pytest.raises(BadFile, match="schema 1; expected a file of schema 2"):
         read_digested_toml(write(tmp_path, whole.replace("schema = 2", "schema = 1")), "a file", "")
