@@ -388,12 +388,15 @@ def format_score_table(judged: Sequence[RecordingScore]) -> str:
 
 
 def _missing_records(judged: Sequence[RecordingScore]) -> list[str]:
-    """A line if fewer records arrived than let anything be measured."""
+    """A line if fewer records arrived than let anything be measured, unless the recording's scenario allows it."""
     for one in judged:
         if one.records_arrived < COVERAGE_FLOOR * one.records_expected:
+            arrived = f"{one.records_arrived:,} of {one.records_expected:,} records arrived"
+            if any(value is not None for value in one.metrics.values()):
+                return [f"{arrived}, which tracker.overload of the recording's scenario allows."]
             return [
-                f"{one.records_arrived:,} of {one.records_expected:,} records arrived: the line is too slow for the "
-                "stations, or some were off. Record at a lower rate, a higher baud rate or with fewer stations. If the "
-                "slow line is what the scenario studies, set tracker.overload = true in it."
+                f"{arrived}: the line is too slow for the stations, or some were off. Record at a lower rate, a higher "
+                "baud rate or with fewer stations. If the slow line is what the scenario studies, set tracker.overload "
+                "= true in it."
             ]
     return []
