@@ -30,6 +30,8 @@ from tests.reconstruct.conftest import Scene, moved, scene
 
 NAMES = sorted(registry.methods())
 ALSO = ("mean_pose+ik", "best_match+ik")
+COSTLY = ("dynamic_map:literal", "kernel_cca:literal", "weighted_blend:literal", "best_match+ik")
+"""Methods whose contract takes half a minute each; they share their session with one that is cheaper."""
 _OTHERS = (("walking", 1), ("boxing", 2))
 LEARNERS = [name for name in NAMES if registry.resolve(name).needs_examples]
 
@@ -118,7 +120,9 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*NAMES, *ALSO])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in COSTLY else ()) for name in (*NAMES, *ALSO)]
+)
 def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every rule but the one of the next test."""
     rules = {rule: check for rule, check in RULES.items() if check is not works_in_another_process}

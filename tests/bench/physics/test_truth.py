@@ -19,10 +19,10 @@ SEEDS = tuple(range(101, 115))
     ("rows", "count"),
     [
         (truth.rest_row, 1),
-        (truth.free_rows, 3),
+        pytest.param(truth.free_rows, 3, marks=pytest.mark.slow),
         (truth.speed_row, 1),
         (truth.turned_row, 1),
-        (truth.hand_row, 1),
+        pytest.param(truth.hand_row, 1, marks=pytest.mark.slow),
         (truth.temperature_row, 1),
         (truth.covered_row, 2),
     ],
@@ -55,7 +55,7 @@ def test_the_temperature_row_is_missed_where_the_device_measures_the_temperature
     assert row.met is False
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_excursions_need_the_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, room=replace(Physics().room, shadow=False))
     assert truth.free_rows(SEEDS[:3])[0].met is False

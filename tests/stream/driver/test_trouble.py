@@ -395,7 +395,7 @@ def test_no_rate_is_told_before_it_is_known() -> None:
 
 
 @pytest.mark.long
-def test_times_strictly_increase_in_ten_minutes_of_faults() -> None:
+def test_times_strictly_increase_in_three_minutes_of_faults() -> None:
     """All faults of the emulator, at random, behind an adapter that holds bytes back."""
     scenario = load_scenario("emulator_faults")
     faults = tuple(replace(fault, station="torso") if fault.station else fault for fault in scenario.fault)
@@ -404,7 +404,7 @@ def test_times_strictly_increase_in_ten_minutes_of_faults() -> None:
     host_clock, host_s = HostClockEstimator(), [0.0]
     latest_s, unstamped, frames = np.full(4, -np.inf), 0, 0
     with bench.driver() as stream:
-        for frame in frames_for(stream, bench, 600.0):
+        for frame in frames_for(stream, bench, 180.0):
             stamped = ~np.isnan(frame.measured_s)
             assert (frame.measured_s[stamped] > latest_s.max()).all()
             latest_s[stamped] = frame.measured_s[stamped]
@@ -413,8 +413,8 @@ def test_times_strictly_increase_in_ten_minutes_of_faults() -> None:
             assert (frame.suspect | stamped | ~frame.position_valid).all()
             unstamped += int((frame.suspect & ~stamped).sum())
             frames += 1
-        assert stream.counts["reconnects"] >= 2
-    assert frames > 23000
+        assert stream.counts["reconnects"] >= 1
+    assert frames > 6900
     repeated = sum(4 * frames * fault.share for fault in faults if fault.kind == "repeated")  # has no time of its own
     assert 0.5 * repeated < unstamped < 100 + 1.2 * repeated, "damaged stamps cost more than themselves"
 
