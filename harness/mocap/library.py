@@ -41,6 +41,8 @@ class LibraryEntry:
     note: str = ""
     copies: tuple[Path, ...] = ()
     """Further files of the clip, in other formats or places."""
+    subject_known: bool = True
+    """Whether the index or CMU's name tells the subject; otherwise it is a part of the path."""
 
     def as_dict(self) -> dict[str, object]:
         """The fields for JSON; paths as text."""
@@ -267,4 +269,5 @@ def _make_entry(name: str, take: Sequence[_File]) -> LibraryEntry:
         rate_hz=float(row["fps"]) if row.get("fps") else None,
         note=row.get("note") or "",
         copies=tuple(file.path for file in take[1:]),
+        subject_known=bool(row.get("subject") or CMU_NAME.fullmatch(short)),
     )

@@ -34,6 +34,8 @@ class Manifest:
     metric_versions: Mapping[str, int]
     circumstances: Mapping[str, Any]
     """Methods, command, source hash, commit, versions, platform."""
+    performers: Mapping[str, str] | None = None
+    """Performer of each test clip whose performer is known; None in manifests of versions that did not store them."""
 
     def as_dict(self) -> dict[str, Any]:
         out: dict[str, Any] = to_json_types(asdict(self))
@@ -45,8 +47,10 @@ class Manifest:
         advice = "Is this a folder written by `harness run`? If so, restore it, or run again with another --out."
         content = read_result_json(path, "the manifest of a run", advice)
         try:
-            return cls(*(dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")))
-        except (KeyError, TypeError, ValueError) as error:
+            parts = [dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")]
+            performers = content.get("performers")
+            return cls(*parts, None if performers is None else {str(k): str(v) for k, v in performers.items()})
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             advice = "Is this a folder written by `harness run`?"
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
 
@@ -62,6 +66,7 @@ def describe_run(
     motion_source: str | Sequence[str],
     command: str,
     constants: Mapping[str, str] | None = None,
+    performers: Mapping[str, str] | None = None,
 ) -> Manifest:
     """Manifest of running a scenario, or a sweep's scenarios, with this code on this machine.
 
@@ -78,6 +83,7 @@ def describe_run(
             "command": command,
             **current_circumstances(),
         },
+        performers=performers,
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import MotionLibrary
+from harness.mocap.sources import LibrarySource
 from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, mvnx_text, write_clip
 
 INDEX = "path,subject,trial,behaviour,frames,fps,note\n91/91_01.amc,91,01,walking,24,60,limps\n"
@@ -172,6 +173,8 @@ def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: 
     assert [len(library.load(name)) for name in library.names()] == [12, 15, 18]
     assert [library.entry(f"{who}/take_001").subject.lower() for who in ("Anna", "Bert")] == ["anna", "bert"]
     assert [entry.copies for entry in library.entries()] == [(), (), ()]
+    known = [LibrarySource(library).performer(name) for name in library.names()]
+    assert known == (["anna", "bert", ""] if index else ["", "", ""]), "a part of a path is no known performer"
     assert library.load("Bert/take_001").name == "Bert/take_001"
     with pytest.raises(BadInput, match=r"2 different takes\. Name one of Anna/take_001, Bert/take_001"):
         library.load("take_001")
@@ -201,6 +204,7 @@ def test_a_clip_at_two_rates_is_two_clips(tmp_path: Path) -> None:
     library = MotionLibrary(tmp_path)
     assert [library.load(name).rate_hz for name in ("60hz/91_01", "120hz/91_01")] == pytest.approx([60.0, 120.0])
     assert {entry.subject for entry in library.entries()} == {"91"}
+    assert LibrarySource(library).performer("60hz/91_01") == "91"
 
 
 def test_formats_of_one_place_are_one_take_and_those_of_two_places_only_by_subject_and_trial(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
 from harness.core.number_format import format_number
+from harness.core.split import count_performers
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
 from harness.results.cell import varied_text
@@ -154,8 +155,9 @@ def _standing(ranking: MethodRanking, series: str) -> Standing:
 def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
     sentences = ["Mean over clips and its 95 % interval."]
     rankings = [ranking for each in run.conditions if (ranking := each.rank()) is not None]
-    if performers := dict.fromkeys(ranking.performers for ranking in rankings if ranking.performers):
-        sentences.append(f"The clips are of {' or '.join(performers)}.")
+    counts = dict.fromkeys(count_performers(ranking.clips, run.performers) for ranking in rankings)
+    if performers := " or ".join(filter(None, counts)):
+        sentences.append(f"The clips are of {performers}.")
     if any(value.bold for row in rows for value in row.values):
         sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")
     if few:
