@@ -294,6 +294,27 @@ def test_an_edit_that_leaves_size_and_time_is_another_method(folder: Path, state
     assert found[0][1] != found[1][1]
 
 
+@pytest.mark.parametrize("name", ["package.mine:Mine", "mine:Mine"])
+def test_byte_code_of_an_installed_method_is_not_that_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Installers compile what they install, and an edit within a second may keep size and time of the source."""
+    site, found = tmp_path / "site-packages", list[tuple[str, str]]()
+    module = site / f"{name.partition(':')[0].replace('.', '/')}.py"
+    monkeypatch.syspath_prepend(site)
+    for angle in (0.1, 0.5):
+        write_unnoticed(module, UPRIGHT.read_text().replace("the T-pose, whatever is seen", f"angle {angle}"))
+        if not found:
+            (module.parent / "__init__.py").touch()
+            for file in module.parent.iterdir():
+                py_compile.compile(str(file), doraise=True)
+        method = resolve_method(name.replace("Mine", "Upright"), Isolation())
+        found.append((method.summary, hash_method(method)))
+        end_methods()
+    assert [summary for summary, _ in found] == ["angle 0.1", "angle 0.5"]
+    assert found[0][1] != found[1][1]
+
+
 def write_byte_code(folder: Path, angle: float) -> None:
     write_unnoticed(folder / "source" / "gains.py", GAINS.format(angle))
     py_compile.compile(str(folder / "source" / "gains.py"), str(folder / "methods" / "gains.pyc"), doraise=True)
