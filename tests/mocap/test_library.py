@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.library import MotionLibrary
+from harness.mocap.library import MotionLibrary, ignored_paths_note
 from harness.mocap.sources import LibrarySource
 from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, mvnx_text, write_clip
 
@@ -178,6 +178,32 @@ def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: 
     assert library.load("Bert/take_001").name == "Bert/take_001"
     with pytest.raises(BadInput, match=r"2 different takes\. Name one of Anna/take_001, Bert/take_001"):
         library.load("take_001")
+
+
+def test_an_index_reaches_no_file_outside_its_folder(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"outside": 12, "library/=1+1": 12, "library/..a": 15})
+    top = tmp_path / "library"
+    rows = (f"{path},x,walking" for path in ("../outside.bvh", tmp_path / "outside.bvh", "..", "/", "", "=1+1.bvh"))
+    (top / "manifest.csv").write_text("\n".join(["path,subject,behaviour", *filter(lambda row: row[0] != ",", rows)]))
+    library = MotionLibrary(top)
+    assert library.names() == ("..a", "=1+1")
+    assert [library.entry(name).behaviour for name in library.names()] == ["", "walking"]
+
+
+@pytest.mark.parametrize("text", ["a\x1b[2J", "a\x07", "\u202eba"])
+def test_control_characters_reach_no_terminal(text: str, tmp_path: Path) -> None:
+    """In the index they are refused with their line; a file of such a name is left out and counted."""
+    write_takes(tmp_path, {"take_001": 12, text: 15})
+    library = MotionLibrary(tmp_path)
+    assert library.names() == ("take_001",)
+    assert library.ignored_paths == (tmp_path / f"{text}.bvh",)
+    (note,) = ignored_paths_note(library.ignored_paths)
+    assert note.isprintable()
+    for column in ("subject", "behaviour", "note"):
+        (tmp_path / "manifest.csv").write_text(f"path,{column}\ntake_001.bvh,{text}\n")
+        with pytest.raises(BadFile, match=r"manifest\.csv, line 2: the control character") as refused:
+            MotionLibrary(tmp_path)
+        assert str(refused.value).isprintable()
 
 
 def test_equal_files_at_two_places_are_one_clip_unless_the_index_says_otherwise(tmp_path: Path) -> None:
