@@ -54,6 +54,7 @@ def write_method(folder: Path, training: str, attributes: str = "", files: Mappi
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "methods").mkdir()
+    monkeypatch.setattr(engine, "close_methods", end_methods)
     monkeypatch.syspath_prepend(tmp_path / "methods")
     yield tmp_path / "methods"
     end_methods()
@@ -426,6 +427,9 @@ def test_a_declared_variable_is_part_of_the_key_and_may_be_read(folder: Path, mo
         f"'{VARIABLE}' in os.environ",
         f"os.environ.setdefault('{VARIABLE}', '1')",
         f"os.environb.get(b'{VARIABLE}')",
+        f"os.environ.pop('{VARIABLE}')",
+        "os.environ.copy()",
+        "list(os.environ.values())",
         "dict(os.environ)",
     ],
 )
