@@ -19,7 +19,7 @@ _KINDS = {
     "trust": ("a trust study", "Its command, `harness trust`, writes its page, report.html in the folder."),
     "benchmark": ("the work of a benchmark", "Its command, `harness bench`, prints the result."),
     "baseline": ("a baseline", "`harness compare` reads it. Its run is the folder that it was saved from."),
-    "": ("no results of the harness", "Name the folder that was given as --out."),
+    "": ("no results of the harness", "Name the folder that `harness run` or another verb was given as --out."),
 }
 """Kind -> what it is called, and what shows it."""
 
