@@ -45,6 +45,8 @@ class CalibrationFile:
     """The performer's skeleton, with the standard body's hinges; None leaves the body to the scenario."""
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
     """Quality figures of the calibration: strings, numbers, booleans, and lists and mappings of them."""
+    performer: str = ""
+    """Who was calibrated; "" where nobody said it, as of a person without a clip."""
     caveat: str = ""
     """What cannot be verified of the file that it was read from; "" if its digest fits."""
 
@@ -98,6 +100,7 @@ class _FileContent:
     kind: str
     room: _RoomTable
     station: dict[str, _StationTable]
+    performer: str = ""
     bone_m: dict[str, tuple[float, float, float]] | None = None
     diagnostics: dict[str, Any] = field(default_factory=dict)
 
@@ -116,7 +119,7 @@ def read_calibration(path: Path | str) -> CalibrationFile:
     content, caveat = read_digested_toml(path, EXPECTED, _ADVICE)
     try:
         tables = build(_FileContent, content, "calibration")
-        found = CalibrationFile(_calibration(tables), _skeleton(tables), tables.diagnostics, caveat)
+        found = CalibrationFile(_calibration(tables), _skeleton(tables), tables.diagnostics, tables.performer, caveat)
     except (TypeError, ValueError, HarnessError) as error:
         raise BadFile(path, str(error).rstrip("."), EXPECTED, _ADVICE) from error
     if tables.schema == EARLIER_SCHEMA:
@@ -190,6 +193,7 @@ def _lines(content: CalibrationFile) -> Iterator[str]:
         _HEAD_COMMENT,
         f"schema = {SCHEMA}",
         f"kind = {format_toml_value(calibration.kind)}",
+        *([f"performer = {format_toml_value(content.performer)}"] if content.performer else []),
         "",
         _ROOM_COMMENT,
         "[room]",

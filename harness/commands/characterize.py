@@ -16,6 +16,7 @@ from harness.commands.common import (
     print_caveat,
     print_result,
     print_status,
+    recording_note,
     show_progress,
     this_command,
 )
@@ -140,16 +141,17 @@ def _record_stretches(args: argparse.Namespace) -> Path:
     )
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **_line_options(args))
-    capture_stretches(
-        args.source,
-        config,
-        path,
-        _stretches(60.0 * minutes),
-        {"source": "port", "port": args.source, "purpose": "characterize", "harness": VERSION},
-        ready=_always_ready if args.yes or not sys.stdin.isatty() else _wait_for_enter,
-        log=print_status,
-        progress=show_progress,
-    )
+    with recording_note(path, ", and the same command resumes."):
+        capture_stretches(
+            args.source,
+            config,
+            path,
+            _stretches(60.0 * minutes),
+            {"source": "port", "port": args.source, "purpose": "characterize", "harness": VERSION},
+            ready=_always_ready if args.yes or not sys.stdin.isatty() else _wait_for_enter,
+            log=print_status,
+            progress=show_progress,
+        )
     if "static" not in finished_stretches(path):
         raise BadFile(path, "no finished static stretch", "a capture", "Give the same command to go on with it.")
     return path

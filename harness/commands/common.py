@@ -12,7 +12,7 @@ from typing import Any
 
 from harness.commands.ending import print_data
 from harness.core.interrupts import refuse_interrupts
-from harness.errors import BadInput, Outcome
+from harness.errors import BadInput, Outcome, was_interrupted
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
@@ -221,11 +221,25 @@ def parse_names(text: str) -> list[str]:
 
 @contextmanager
 def progress_note(out: Path) -> Iterator[None]:
-    """Add to a fault or an interrupt that leaves the block how much of the work in `out` is kept."""
+    """Add to a fault or an interrupt that leaves the block how much of the work in `out` is kept, for it to resume."""
     try:
         yield
     except (KeyboardInterrupt, Exception) as error:
-        error.add_note(_describe_progress(out))
+        kept = _describe_progress(out)
+        resumes = was_interrupted(error) and out.is_dir()
+        error.add_note(f"{kept.removesuffix('.')}, and the same command resumes." if resumes else kept)
+        raise
+
+
+@contextmanager
+def recording_note(path: Path, more: str = ".") -> Iterator[None]:
+    """Add to an interrupt that leaves the block whether a recording is kept; `more` ends the sentence if it is."""
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        if was_interrupted(error):
+            kept, nothing = f"What was recorded is kept in {path}{more}", f"Nothing was recorded into {path}."
+            error.add_note(kept if path.exists() else nothing)
         raise
 
 

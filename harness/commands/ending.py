@@ -33,12 +33,12 @@ def print_data(text: str) -> bool:
 def describe_ending(words: Sequence[str], error: BaseException) -> tuple[Outcome, dict[str, Any]]:
     """The outcome of a command that an exception ended, and what --json adds; it prints one line to stderr.
 
-    `words` is the command line without the program's name. Notes of the exception say what is kept. A verb that runs
-    until Ctrl-C takes the interrupt itself, once it does its work.
+    `words` is the command line without the program's name. Notes of the exception say what is kept, and of an interrupt
+    whether the same command resumes. A verb that runs until Ctrl-C takes the interrupt itself, once it does its work.
     """
     kept = " ".join(getattr(error, "__notes__", ()))
     if was_interrupted(error):
-        print(f"harness: stopped. {(kept or _KEPT).rstrip('.')}, and the same command resumes.", file=sys.stderr)
+        print(f"harness: stopped. {kept or _KEPT}", file=sys.stderr)
         return Outcome.INTERRUPTED, {}
     if isinstance(error, HarnessError) and error.outcome is not Outcome.FAILED:
         print(f"harness: {shorten(str(error), _MAX_LINE)}", file=sys.stderr)

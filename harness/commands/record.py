@@ -18,10 +18,11 @@ from harness.commands.common import (
     positive_float,
     print_result,
     print_status,
+    recording_note,
     show_progress,
 )
 from harness.core.package_data import VERSION
-from harness.errors import BadInput, Outcome, was_interrupted
+from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.stream.recording.recording import RecordingWriter
@@ -67,13 +68,8 @@ def add_record(verbs: Verbs) -> None:
 
 
 def run_record(args: argparse.Namespace) -> Outcome:
-    try:
+    with recording_note(args.file):
         return _record(args)
-    except (KeyboardInterrupt, Exception) as error:
-        if was_interrupted(error):
-            kept = "What was recorded is kept in" if args.file.exists() else "Nothing was recorded into"
-            error.add_note(f"{kept} {args.file}.")
-        raise
 
 
 def _record(args: argparse.Namespace) -> Outcome:

@@ -21,17 +21,15 @@ def add_report(verbs: Verbs) -> None:
 
 
 def run_report(args: argparse.Namespace) -> Outcome:
-    from harness.report.paper.writer import FINDINGS
-    from harness.results.storage import read_kind
+    from harness.results.folder_kind import require_kind
 
-    if (args.run / FINDINGS).exists():
-        return _report_findings(args)
-    if args.readme:
-        raise BadInput(
-            f"--readme with {args.run}, where no {FINDINGS} is.", "Name the folder that `harness paper` wrote."
-        )
-    if read_kind(args.run) == "sweep":
-        return _report_sweep(args)
+    kind = require_kind(args.run, "run", "sweep", "placement", "paper")
+    if args.readme and kind != "paper":
+        raise BadInput(f"--readme with {args.run}, a {kind}.", "Name the folder that `harness paper` wrote.")
+    if args.movie and kind != "run":
+        raise BadInput(f"--movie with {args.run}, a {kind}.", "Movies show cells of a run: name the folder of a run.")
+    if kind != "run":
+        return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
     from harness.report.run.writer import write_run_page
 
     with show_steps("parts of the report"), ProgressBar("movies") as bar:
@@ -45,28 +43,15 @@ def _report_sweep(args: argparse.Namespace) -> Outcome:
     from harness.report.sweep.page import write_sweep_page
     from harness.results.integrity import check_cells
 
-    if args.movie:
-        raise BadInput(
-            f"--movie with {args.run}, a sweep.", "Movies show cells of a run: name the folder of `harness run`."
-        )
     check_cells(args.run)
     with show_steps("parts of the report"):
         page = write_sweep_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}")
 
 
-def _report_findings(args: argparse.Namespace) -> Outcome:
-    from harness.report.paper.writer import FINDINGS
+def _report_placement(args: argparse.Namespace) -> Outcome:
     from harness.report.placement.writer import write_placement_page
-    from harness.results.placement_findings import is_placement_findings
 
-    if not is_placement_findings(args.run / FINDINGS):
-        return _report_paper(args)
-    if args.movie or args.readme:
-        raise BadInput(
-            f"--movie or --readme with {args.run}, a placement study.",
-            "--movie is for runs, --readme for papers: leave it out.",
-        )
     with show_steps("parts of the report"):
         page = write_placement_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}", following=["plot", args.run])
@@ -74,13 +59,10 @@ def _report_findings(args: argparse.Namespace) -> Outcome:
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
     from harness.report.paper.readme import update_readme
-    from harness.report.paper.writer import FINDINGS, write_paper_page
+    from harness.report.paper.writer import write_paper_page
     from harness.results.findings import read_findings
+    from harness.results.folder_kind import FINDINGS
 
-    if args.movie:
-        raise BadInput(
-            "--movie with a paper's folder.", "Movies show cells of a run: name the folder of one of its runs."
-        )
     with show_steps("parts of the report"):
         page = write_paper_page(args.run)
     if args.readme:

@@ -21,7 +21,15 @@ from typing import Any
 
 from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
-from harness.core.files import content_key, move_into_place, temporary_path, to_json, to_json_types, write_text
+from harness.core.files import (
+    content_key,
+    move_into_place,
+    remove_leftovers,
+    temporary_path,
+    to_json,
+    to_json_types,
+    write_text,
+)
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, shorten
 from harness.results.digests import file_digest, insert_digest, write_result_json
@@ -63,6 +71,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
         raise BadInput(f"{run} has no cells.", "A baseline needs at least one.")
     if target.exists() and not force:
         raise BadInput(f"Baseline {name} exists ({target}).", "Choose another name, or replace it with --force.")
+    remove_leftovers(target)
     temporary = temporary_path(target)
     shutil.rmtree(temporary, ignore_errors=True)
     try:
@@ -82,7 +91,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
 
 def _replace_folder(new: Path, target: Path) -> None:
     """Move a folder to `target`; an earlier one is put back when that fails."""
-    previous = new.with_name(f"{new.name}-before")
+    previous = target.with_name(f".replaced-{os.getpid()}-{target.name}")  # no temporary name: those are removed
     with defer_interrupts():
         if target.exists():
             os.rename(target, previous)

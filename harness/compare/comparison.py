@@ -1,5 +1,6 @@
 """Comparison of two results on the cells that they share. A is the reference; differences are B - A."""
 
+from collections import ChainMap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ from harness.compare.matching import (
 )
 from harness.compare.significance import Verdict
 from harness.core.files import to_json_types
+from harness.core.split import count_performers
 from harness.errors import Outcome
 from harness.results.manifest import Manifest, flatten
 from harness.results.reader import ResultSet, load_results
@@ -63,6 +65,8 @@ class Comparison:
     """Groups in which the sides cover different shares of the frames, or less than 95 %."""
     failed: tuple[str, ...] = ()
     """Planned cells that failed on either side, such as "A: ik on walking_p1_01"."""
+    performers: str = ""
+    """How many performers the clips of the gated lines are of, such as "3 performers"; "" where one is not known."""
 
 
 def compare_results(
@@ -117,6 +121,7 @@ def compare_results(
         why=why,
         coverage=tuple(faults["coverage"]),
         failed=missing,
+        performers=_count_performers(differences, a.manifest, b.manifest),
     )
 
 
@@ -135,6 +140,13 @@ def compare_runs(
     reference = load_results(a)
     other = reference if b is None else load_results(b)
     return compare_results(reference, other, methods=methods, metrics=metrics, allow=allow)
+
+
+def _count_performers(differences: Sequence[Difference], a: Manifest, b: Manifest) -> str:
+    """The performers of the clips of the gated lines, as either side knows them."""
+    sides = [side.performers for side in (a, b) if side.performers is not None]
+    clips = {clip for line in differences if line.gated for clip in line.clips}
+    return count_performers(clips, dict(ChainMap(*sides)) if sides else None)
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:

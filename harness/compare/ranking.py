@@ -16,8 +16,6 @@ from harness.compare.margins import GATED_METRICS, margin_of
 from harness.compare.paired_statistics import MIN_CLIPS
 from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
 from harness.core.arrays import Floats
-from harness.core.number_format import count_noun
-from harness.core.split import performer_of
 
 ClipValues = Mapping[str, Mapping[str, float]]
 """Metric -> clip -> mean value over the cells of the clip."""
@@ -36,12 +34,6 @@ class MethodRanking:
     """Other method -> verdict on the first one against it, over the clips on which both were measured."""
     differences: Mapping[str, float]
     """Other method -> its mean minus that of the first one, over the clips on which both were measured."""
-
-    @property
-    def performers(self) -> str:
-        """How many performers the clips are of, such as "3 performers"; empty where a clip's name does not tell it."""
-        names = {performer_of(clip) for clip in self.clips}
-        return count_noun(len(names), "performer") if None not in names else ""
 
     @property
     def lowest(self) -> str:

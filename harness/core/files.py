@@ -1,11 +1,13 @@
 """JSON with the same text for the same content, atomic writers, and one reader each for JSON and TOML."""
 
-import glob
 import hashlib
 import json
 import math
 import os
+import re
+import shutil
 import socket
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -24,6 +26,8 @@ from harness.errors import BadFile
 TEMPORARY = ".unfinished-"
 """Prefix of the names of files and folders that are still being written; a killed process leaves them behind."""
 JSON_ADVICE = "Is this a folder written by `harness run`?"
+_ABANDONED_S = 86400.0
+"""Age of a temporary file of another name, or of an unknown computer, that no process writes any more [s, choice]."""
 MAX_TOML_BYTES = MEGABYTE
 """Largest TOML file that is read [choice]: the largest that the harness writes has some 10 kB."""
 MAX_JSON_BYTES = 64 * MEGABYTE
@@ -85,12 +89,24 @@ def _host() -> str:
     return hashlib.blake2b(socket.gethostname().encode(), digest_size=4).hexdigest() + "-"
 
 
-def _remove_leftovers(path: Path) -> None:
-    """Remove what dead processes of this computer left behind when they wrote this file."""
-    for leftover in path.parent.glob(f"{TEMPORARY}{_host()}*-{glob.escape(path.name)}"):
-        process = leftover.name.removeprefix(TEMPORARY + _host()).removesuffix(f"-{path.name}")
-        if process.isdecimal() and not _is_alive(int(process)):
-            with suppress(OSError):
+def remove_leftovers(path: Path) -> None:
+    """Remove what dead processes of this computer left behind when they wrote this file or folder.
+
+    Whatever else they left in the parent folder goes a day after it was written last. So do files of version 23b301b7,
+    whose names do not tell the computer.
+    """
+    names = re.compile(rf"{re.escape(TEMPORARY)}({_host()})?(\d{{1,7}})-(.+)", re.DOTALL)
+    for leftover in path.parent.glob(f"{TEMPORARY}*"):
+        match = names.fullmatch(leftover.name)
+        if match is None or _is_alive(int(match[2])):
+            continue
+        with suppress(OSError):
+            ours = match[1] and match[3] == path.name
+            if not ours and time.time() - leftover.lstat().st_mtime < _ABANDONED_S:
+                continue
+            if leftover.is_dir() and not leftover.is_symlink():
+                shutil.rmtree(leftover, ignore_errors=True)
+            else:
                 leftover.unlink()
 
 
@@ -142,7 +158,7 @@ def flush_together(paths: Iterable[Path]) -> None:
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary path to write a file to, which takes the place of `path` when the block ends without an error."""
     temporary = temporary_path(path)
-    _remove_leftovers(path)
+    remove_leftovers(path)
     try:
         yield temporary
         move_into_place(temporary, path)

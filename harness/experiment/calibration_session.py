@@ -27,6 +27,7 @@ from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.mocap.library import LibraryFolders
+from harness.mocap.sources import MotionSource
 from harness.stream.frame import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
@@ -86,10 +87,14 @@ class CalibrationSession:
         return [configuration(pose, self.body.skeleton) for pose in self.poses]
 
     @cached_property
+    def source(self) -> MotionSource:
+        """The scenario's motion source."""
+        return open_scenario_motion(self.resolved_scenario.motion, self.folder, self.resolved_scenario.seed)
+
+    @cached_property
     def space(self) -> SkeletonPrior:
         """Prior on bone lengths, from the people of the scenario's motion source."""
-        motion = self.resolved_scenario.motion
-        source = open_scenario_motion(motion, self.folder, self.resolved_scenario.seed)
+        source = self.source
         people = source.other_skeletons(without=source.subject(ClipPart.parse(self.clip).clip) if self.clip else "")
         return fit_skeleton_prior(list(people.values()), source=f"{len(people)} people ({source.title})")
 
@@ -125,4 +130,5 @@ class CalibrationSession:
         made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {VERSION}"}
         made |= {"source": source, "scenario": self.resolved_scenario.name}
         made |= {"others": self.space.source} if self.kind == "poses" else {}
-        return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}), lines)
+        performer = self.source.performer(ClipPart.parse(self.clip).clip) if self.clip else ""
+        return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}, performer), lines)

@@ -19,6 +19,7 @@ from typing import Any
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
+from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cell_watcher import CellCount
 from harness.experiment.cells import (
@@ -185,6 +186,7 @@ def _run_folder(
                 kind=kind,
                 name=name,
                 command=command,
+                performers=manifest.performers,
                 scenarios=[scenario_label(scenario) for scenario in scenarios],
                 vary=dict(pair for scenario in scenarios for pair in dotted_keys(scenario.vary)),
                 orders=scenarios[0].expected_order if kind == "run" else None,
@@ -207,13 +209,16 @@ def _describe(
     command: str,
     isolation: Isolation,
 ) -> Manifest:
-    sources = list(dict.fromkeys(open_scenario_motion(s.motion, folder, s.seed).title for s in scenarios))
+    opened = [(open_scenario_motion(s.motion, folder, s.seed), s.motion.test) for s in scenarios]
+    sources = list(dict.fromkeys(source.title for source, _ in opened))
+    clips = {name: source for source, test in opened for name in (ClipPart.parse(text).clip for text in test)}
+    performers = {name: known for name, source in clips.items() if (known := source.performer(name))}
     constants = {}
     for name in content["methods"]:
         with suppress(MethodFailure):  # its cells fail and say why
             constants[name] = describe_options(resolve_method(name, isolation))
     source = sources if "sweep" in content else sources[0]
-    return describe_run(content, motion_source=source, command=command, constants=constants)
+    return describe_run(content, motion_source=source, command=command, constants=constants, performers=performers)
 
 
 def _run_tasks(

@@ -15,7 +15,14 @@ from urllib.parse import unquote, urlsplit
 from harness.core.python_process import THREAD_VARIABLES
 from harness.errors import HarnessError
 from harness.experiment.environment_audit import audit_environment
-from harness.reconstruct.source_files import CACHE_FOLDER, SourceFiles, foreign_folders, is_below, is_own
+from harness.reconstruct.source_files import (
+    CACHE_FOLDER,
+    SourceFiles,
+    foreign_folders,
+    is_below,
+    is_own,
+    library_folders,
+)
 
 _EVENTS = ("open", "sqlite3.connect", "ctypes.dlopen", "import")
 _METADATA = ("METADATA", "PKG-INFO", "RECORD", "SOURCES.txt", "entry_points.txt", "requires.txt", "top_level.txt")
@@ -43,10 +50,13 @@ class FileAudit:
     """Records what this process reads, and refuses undeclared files and variables once `cover` was called.
 
     A refusal is kept in `violation`, so that a method that catches the exception is noticed all the same. Machine code
-    that was kept of a user's source is never read: it is as if it were not there.
+    that was kept of a user's source, or of the installed package that defines the method, is never read: it is as if it
+    were not there.
     """
 
     def __init__(self) -> None:
+        self.package = ""
+        """Name of the package or module that defines the method, before it is imported."""
         self.violation: UndeclaredInput | None = None
         self._opened: dict[str, tuple[int, ...]] = {}
         self._variables: dict[str, str] = {}
@@ -64,7 +74,8 @@ class FileAudit:
         self._declared = variables | {*THREAD_VARIABLES}  # the harness sets these itself
         with suppress(UndeclaredInput):  # kept in `violation`: every cell fails and says so
             for path, state in self._opened.items():
-                self._check(path, state)
+                if not _is_machine_code(path):  # of another installed package, as far as was known
+                    self._check(path, state)
             for name, file in self._variables.items():
                 self._hear_variable(name, file)
         self._opened.clear()
@@ -92,9 +103,18 @@ class FileAudit:
     def _is_own(self, path: str, *, unknown: bool = False) -> bool:
         """Whether a path belongs to the method; with `unknown`, also whether it is nobody else's as far as is known."""
         names = [Path(name) for name in _names(path)]
-        if unknown and not any(is_below(name, foreign_folders()) for name in names):
+        if unknown and (not any(is_below(name, foreign_folders()) for name in names) or self._defines(names)):
             return True
         return any(is_own(name, self._folders or ()) for name in names)
+
+    def _defines(self, names: list[Path]) -> bool:
+        """Whether kept machine code is of the installed package or module that defines the method."""
+        sources = [name.parent.parent / name.name.partition(".")[0] for name in names]
+        return bool(self.package) and any(
+            source.is_relative_to(folder) and source.relative_to(folder).parts[:1] == (self.package,)
+            for source in sources
+            for folder in library_folders()
+        )
 
     def _check(self, path: str, state: tuple[int, ...]) -> None:
         if os.path.basename(path) in _METADATA and os.path.dirname(path).endswith(_METADATA_FOLDERS):

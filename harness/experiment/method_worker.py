@@ -79,6 +79,7 @@ class MethodWorker:
         for folder, names in header["folders"].items():
             serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
+        self._audit.package = registry.defining_module(header["name"]).partition(".")[0]
         method = registry.resolve(header["name"])
         modules = tuple(sys.modules.values())
         self._audit.cover(source_files(method, modules), declared_environment(method))

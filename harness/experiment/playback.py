@@ -18,7 +18,7 @@ from harness.calibrate.poses import POSES, configuration
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadInput, UnknownName, shorten
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
@@ -33,10 +33,11 @@ class Playback:
     """Playback of one clip of a scenario with some of its stations; each part is made when it is first needed.
 
     With `posing` it plays the calibration poses, which are held before the clip in the same session of the tracker.
+    `performer` is the clip's, where somebody named the clip and its performer is known.
     """
 
-    def __init__(self, setting: ClipEvaluation, *, posing: bool = False) -> None:
-        self.clip_evaluation, self.posing = setting, posing
+    def __init__(self, setting: ClipEvaluation, *, posing: bool = False, performer: str = "") -> None:
+        self.clip_evaluation, self.posing, self.performer = setting, posing, performer
 
     @property
     def scenario(self) -> Scenario:
@@ -73,7 +74,7 @@ class Playback:
         """A copy of the playback with a stored calibration. If it has no skeleton, the body is the scenario's.
 
         BadInput when it lacks one of the stations, and when it has others that are not worn, unless the user or the
-        device named the stations (`named`). `say` receives both lists where they differ.
+        device named the stations (`named`). `say` receives both lists where they differ, and both performers.
         """
         stations = tuple(self.scenario.stations)
         chosen = kept.select(stations)
@@ -82,9 +83,13 @@ class Playback:
                 advice = f"Name what is worn, such as --stations {','.join(kept.calibration.stations)}."
                 raise BadInput(f"{difference[0].upper()}{difference[1:]}.", advice)
             say(difference)
+        if kept.performer and self.performer and kept.performer != self.performer:
+            who = shorten(f"the calibration is of performer {kept.performer}; {self.clip_evaluation.part} is of")
+            say(f"{who} {self.performer}")
         body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
         calibrated = PerformerCalibration(chosen.calibration, body, {})
-        return Playback(self.clip_evaluation.with_calibration(calibrated), posing=self.posing)
+        evaluation = self.clip_evaluation.with_calibration(calibrated)
+        return Playback(evaluation, posing=self.posing, performer=self.performer)
 
     @cached_property
     def take(self) -> BodyMotion:
@@ -148,9 +153,8 @@ def prepare_playback(
     part = ClipPart.parse(clip or asked.motion.test[0])
     source = open_scenario_motion(asked.motion, folder, asked.seed)
     check_names([replace(asked, motion=replace(asked.motion, test=(str(part),)))], folder)
-    return Playback(
-        ClipEvaluation(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
-    )
+    evaluation = ClipEvaluation(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip))
+    return Playback(evaluation, posing=posing, performer=source.performer(part.clip) if clip else "")
 
 
 def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import BadFile
+from harness.results.folder_kind import require_kind
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_folder, check_index
 from harness.results.lock import is_running
@@ -47,8 +48,8 @@ def read_status(out: Path) -> RunStatus:
     if not runs and running:  # it has just begun
         return RunStatus("study", out.name, "", 0, 0, {}, running)
     if not runs:
-        found = "no such folder" if not out.is_dir() else f"neither {INDEX_FILE} nor manifest.json"
-        raise BadFile(out, found, "a folder of `harness sweep` or `harness run`", "Name the one given as --out.")
+        kind = require_kind(out, "run", "sweep", "placement", "paper")
+        raise BadFile(out, f"the work of a {kind} without cells", "a finished cell", "Give its command again.")
     failures = {f"{run.name}: {cell}": text for run in runs for cell, text in run.failures.items()}
     planned, finished = sum(run.planned for run in runs), sum(run.finished for run in runs)
     return RunStatus("paper", out.name, runs[0].command, planned, finished, failures, running)

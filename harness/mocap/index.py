@@ -32,6 +32,9 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
     for line, row in rows:
         if not row.get("path"):
             raise BadFile(path, "a row without a path", "columns path, subject, behaviour, ...", "Repair it.", line)
+        for text in row.values():
+            if isinstance(text, str) and not text.isprintable():
+                raise BadFile(path, f"the control character in {text[:60]!r}", "texts of one line", "Remove it.", line)
         for column, kind in (("frames", int), ("fps", float)):
             _check_number(path, row.get(column) or "", column, kind, line)
     return {row["path"]: row for _, row in rows}

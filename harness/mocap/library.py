@@ -16,7 +16,7 @@ from filecmp import cmp
 from pathlib import Path
 
 from harness.core.motion import Clip
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadInput, UnknownName, shorten
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
 from harness.mocap.folder_scan import scan_folder
 from harness.mocap.index import INDEX_NAME, read_index
@@ -41,6 +41,8 @@ class LibraryEntry:
     note: str = ""
     copies: tuple[Path, ...] = ()
     """Further files of the clip, in other formats or places."""
+    subject_known: bool = True
+    """Whether the index or CMU's name tells the subject; otherwise it is a part of the path."""
 
     def as_dict(self) -> dict[str, object]:
         """The fields for JSON; paths as text."""
@@ -67,11 +69,11 @@ class UnknownClip(UnknownName):
 
 
 def ignored_paths_note(paths: Sequence[Path | str]) -> list[str]:
-    """A sentence that names the ignored links and folders of a library; [] if there are none."""
+    """A sentence that names the ignored links, folders and files of a library; [] if there are none."""
     if not paths:
         return []
-    names = ", ".join(map(str, paths))
-    return [f"Ignored links that lead outside the library's folder or to nothing, and unreadable folders: {names}."]
+    what = "links that lead outside the library's folder or to nothing, unreadable folders, control characters in names"
+    return [f"Ignored ({what}): {shorten(', '.join(map(str, paths)), 1000)}."]
 
 
 class MotionLibrary:
@@ -107,7 +109,8 @@ class MotionLibrary:
         self._takes = dict(sorted(self._takes.items()))
         self._entries = {name: _make_entry(name, take) for name, take in self._takes.items()}
         self.ignored_paths = tuple(ignored)
-        """Symbolic links that lead outside their library folder or to nothing, and folders that cannot be read."""
+        """Symbolic links that lead outside their library folder or to nothing, folders that cannot be read, and files
+        with a control character in their path."""
 
     def entries(self) -> tuple[LibraryEntry, ...]:
         """Every clip, sorted by name."""
@@ -201,12 +204,15 @@ def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
     index = read_index(top / INDEX_NAME)
     rows = {(top / path).resolve(): row for path, row in index.items()}
     scan = scan_folder(top, {f".{kind}" for kind in FORMATS})
-    files = []
+    files, ignored = [], list(scan.ignored_paths)
     for path in scan.files:
         inside = path.relative_to(top)
+        if not str(inside).isprintable():  # no command line could name it
+            ignored.append(path)
+            continue
         row = index.get(inside.as_posix()) or rows.get(path.resolve(), {})
         files.append(_File(path, folder, inside.with_name(clip_name(path)).as_posix(), row))
-    return files, scan.ignored_paths
+    return files, tuple(ignored)
 
 
 def _group_takes(files: Sequence[_File]) -> list[list[_File]]:
@@ -267,4 +273,5 @@ def _make_entry(name: str, take: Sequence[_File]) -> LibraryEntry:
         rate_hz=float(row["fps"]) if row.get("fps") else None,
         note=row.get("note") or "",
         copies=tuple(file.path for file in take[1:]),
+        subject_known=bool(row.get("subject") or CMU_NAME.fullmatch(short)),
     )

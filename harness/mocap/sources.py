@@ -32,6 +32,10 @@ class MotionSource(Protocol):
         ...
 
     def subject(self, name: str) -> str: ...
+    def performer(self, name: str) -> str:
+        """The performer of the clip where an index, CMU's name or the motion generator tells it, else ""."""
+        ...
+
     def behaviour(self, name: str) -> str:
         """What the performer does in the clip; "" where it is unknown."""
         ...
@@ -87,6 +91,8 @@ class SyntheticSource:
     def subject(self, name: str) -> str:
         return _parse_take_name(name)[1]
 
+    performer = subject
+
     def behaviour(self, name: str) -> str:
         return _parse_take_name(name)[0]
 
@@ -136,6 +142,10 @@ class LibrarySource:
 
     def subject(self, name: str) -> str:
         return self._library.entry(name).subject
+
+    def performer(self, name: str) -> str:
+        entry = self._library.entry(name)
+        return entry.subject if entry.subject_known else ""
 
     def behaviour(self, name: str) -> str:
         return self._library.entry(name).behaviour

@@ -64,6 +64,13 @@ def is_built_in(name: str) -> bool:
     return plain in _BUILT_IN or plain.partition(":")[0].partition(".")[0] == "harness"
 
 
+def defining_module(name: str) -> str:
+    """The module in which `resolve` finds a method that is no built-in one; nothing is imported to tell."""
+    plain = without_options(name).partition("+")[0]
+    registered = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+    return registered.get(plain, plain).partition(":")[0]
+
+
 _ORIGINS = {
     "ik": "docs/papers.md C1",
     "best_match": "Slyper & Hodgins 2008, who play the nearest example",

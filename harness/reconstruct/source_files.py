@@ -99,7 +99,11 @@ def source_files(method: object, modules: Iterable[ModuleType] = ()) -> SourceFi
     for part in _wrapped(method):
         add(type(part).__module__, _defining_file(type(part)))
     own = tuple(folders)
+    apart, ours = (tuple(os.path.join(folder, "") for folder in some) for some in (foreign_folders(), own))
     for module in modules:
+        place = os.path.abspath(getattr(module, "__file__", None) or "")
+        if place.startswith(apart) and not place.startswith(ours):  # most modules: paths would be slow
+            continue
         file = _existing_file(getattr(module, "__file__", None))
         if file is not None and file not in files and (is_own(file, own) or not is_below(file, foreign_folders())):
             add(module.__name__, file)

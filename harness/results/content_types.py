@@ -97,6 +97,8 @@ def check_summary_types(path: Path, content: Mapping[str, Any], advice: str) -> 
     """BadFile unless the entries of the summary.json of a run have their types."""
     try:
         check_entries(content, _SUMMARY, "summary")
+        if content.get("performers") is not None:  # versions before did not store them
+            check_entries(content, {"performers": dict[str, str]}, "summary")
         for n, row in enumerate(content["cells"]):
             if not re.fullmatch(r"\w+", str(row.get("key"))):
                 raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)

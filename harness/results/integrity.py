@@ -12,7 +12,8 @@ from harness.core.files import MAX_JSON_BYTES
 from harness.errors import BadFile
 from harness.results.cell import OPTIONAL_COLUMNS, cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, file_digest, read_result_json
-from harness.results.index import CellIndex
+from harness.results.folder_kind import require_kind
+from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest
 
 SUMMARY = "summary.json"
@@ -29,6 +30,8 @@ def check_folder(out: Path) -> None:
     While a process writes, and after one was killed, the index has no digest yet. Only the manifest and the presence of
     the cells are then checked. BadFile names the first file that is missing, damaged or edited.
     """
+    if not ((out / "manifest.json").exists() and (out / INDEX_FILE).exists()):
+        require_kind(out, "run", "sweep")
     Manifest.read(out / "manifest.json")
     check_index(out)
 

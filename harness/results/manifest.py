@@ -16,13 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import to_json_types
-from harness.core.package_data import PACKAGE_FOLDER, VERSION
+from harness.core.package_data import PACKAGE_FOLDER, VERSION, data_folder
 from harness.errors import BadFile
 from harness.results.digests import read_result_json
 from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")
 """Packages whose versions are listed; "absent" if not installed."""
+SOURCE_SUFFIXES = frozenset({".py", ".xml", ".mcf", ".json", ".toml", ".csv", ".npz", ".txt"})
+"""Endings of code and data; others are of pages and texts."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Manifest:
     metric_versions: Mapping[str, int]
     circumstances: Mapping[str, Any]
     """Methods, command, source hash, commit, versions, platform."""
+    performers: Mapping[str, str] | None = None
+    """Performer of each test clip whose performer is known; None in manifests of versions that did not store them."""
 
     def as_dict(self) -> dict[str, Any]:
         out: dict[str, Any] = to_json_types(asdict(self))
@@ -45,8 +49,10 @@ class Manifest:
         advice = "Is this a folder written by `harness run`? If so, restore it, or run again with another --out."
         content = read_result_json(path, "the manifest of a run", advice)
         try:
-            return cls(*(dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")))
-        except (KeyError, TypeError, ValueError) as error:
+            parts = [dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")]
+            performers = content.get("performers")
+            return cls(*parts, None if performers is None else {str(k): str(v) for k, v in performers.items()})
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             advice = "Is this a folder written by `harness run`?"
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
 
@@ -62,6 +68,7 @@ def describe_run(
     motion_source: str | Sequence[str],
     command: str,
     constants: Mapping[str, str] | None = None,
+    performers: Mapping[str, str] | None = None,
 ) -> Manifest:
     """Manifest of running a scenario, or a sweep's scenarios, with this code on this machine.
 
@@ -78,6 +85,7 @@ def describe_run(
             "command": command,
             **current_circumstances(),
         },
+        performers=performers,
     )
 
 
@@ -97,13 +105,24 @@ def current_circumstances() -> dict[str, Any]:
 
 @cache
 def source_hash() -> str:
-    """Hash of every Python file of the package, 16 hex digits."""
-    package = PACKAGE_FOLDER
+    """Hash of the files of the package that `source_files` lists, 16 hex digits."""
     state = blake2b(digest_size=8)
-    for file in sorted(package.rglob("*.py")):
-        state.update(f"{file.relative_to(package).as_posix()}\0".encode())
+    for name, file in sorted(source_files().items()):
+        state.update(f"{name}\0".encode())
         state.update(file.read_bytes() + b"\0")
     return state.hexdigest()
+
+
+def source_files() -> dict[str, Path]:
+    """Name -> path of the code and data of the package and of `models`, on which results depend.
+
+    The files of `scenarios` are left out: a run stores the whole scenario.
+    """
+    shipped, models = PACKAGE_FOLDER / "share", data_folder("models")
+    own = [file for file in PACKAGE_FOLDER.rglob("*") if not file.is_relative_to(shipped)]
+    named = {file.relative_to(PACKAGE_FOLDER).as_posix(): file for file in own}
+    named |= {f"models/{file.relative_to(models).as_posix()}": file for file in models.rglob("*")}
+    return {name: file for name, file in named.items() if file.suffix in SOURCE_SUFFIXES}
 
 
 def _commit(root: Path) -> dict[str, Any]:

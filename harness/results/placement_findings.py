@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.core.files import read_json, to_json_types
+from harness.core.files import to_json_types
 from harness.errors import BadFile, UnknownName
 from harness.results.digests import check_study, read_result_json, write_result_json
 from harness.results.findings import Claim
@@ -328,11 +328,6 @@ def read_placement(path: Path) -> PlacementFindings:
     identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}
     check_study(path, identity, expected, advice)
     return findings
-
-
-def is_placement_findings(path: Path) -> bool:
-    """Whether a file holds the findings of a placement study; BadFile when it is no JSON."""
-    return read_json(path, "findings").get("kind") == "placement"
 
 
 def _unknown_stations(findings: PlacementFindings) -> list[str]:

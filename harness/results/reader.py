@@ -11,6 +11,7 @@ from harness.core.names import check_words
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, check_key, read_result_json
+from harness.results.folder_kind import CELLS_FILE
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_folder, check_row
 from harness.results.manifest import Manifest, flatten
@@ -18,8 +19,6 @@ from harness.results.plausibility import find_impossible_metric
 from harness.score.metrics import DEFINITIONS
 
 BASELINES = Path("results/baselines")
-CELLS_FILE = "cells.json"
-"""File of a baseline (see `compare.baseline.write_baseline`)."""
 BASELINE_FILES = ("manifest.json", "summary.json")
 """Files of a baseline whose digests stand in `CELLS_FILE`."""
 SCHEMA = 2

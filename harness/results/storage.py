@@ -36,7 +36,6 @@ __all__ = [
     "open_run",
     "read_cell",
     "read_cells",
-    "read_kind",
     "read_summary",
     "remove_leftovers",
     "write_cell",
@@ -136,12 +135,6 @@ def _indexed_cells(out: Path, keys: Collection[str] | None) -> Iterator[Cell]:
             cell = read_cell(cell_folder(out, row["key"]))
             check_row(index.path, row, as_row(cell))
             yield cell
-
-
-def read_kind(out: Path) -> str:
-    """Kind of the work in a folder with an index: `run`, `sweep` or `placement`."""
-    with CellIndex(out, read_only=True) as index:
-        return str(index.facts().get("kind", "placement"))
 
 
 def write_summary(

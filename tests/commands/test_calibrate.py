@@ -106,7 +106,7 @@ def test_a_file_is_not_written_over_unasked(
     assert path.read_text() == "mine"
     assert main(["calibrate", str(recording), "--out", str(path), "--kind", "tpose", "--force"]) == 0
     kept = read_calibration(path)
-    assert kept.calibration.kind == "tpose"
+    assert (kept.calibration.kind, kept.performer) == ("tpose", CLIP.split("_")[1])
     assert kept.skeleton is not None
 
 

@@ -1,6 +1,7 @@
 """Verbs that run until Ctrl-C: an interrupt before they did anything is `interrupted`, and nothing half done stays."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.cli import main
+from harness.commands.common import progress_note, recording_note
 from harness.experiment import playback
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording import command_recording, line_server, recorder, recording
@@ -128,7 +130,31 @@ def test_emulate_and_live_that_are_stopped_while_they_prepare(
 ) -> None:
     monkeypatch.setattr(playback, "prepare_playback", interrupt)
     assert main(words) == 130
-    assert last_words(capsys)[0] == "interrupted"
+    word, talk = last_words(capsys)
+    assert word == "interrupted"
+    assert "resumes" not in talk
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_verb_says_that_it_resumes_only_where_it_does(recorded: bool, tmp_path: Path) -> None:
+    """A folder of cells and a guided capture go on, where they were begun; other recordings do not."""
+    path = tmp_path / "kept"
+    for note, keeps in (
+        (progress_note(path), "cells in .* kept, and the same command resumes"),
+        (recording_note(path, ", and the same command resumes."), "kept in .*kept, and the same command resumes"),
+        (recording_note(path), r"kept in .*kept\.$"),
+    ):
+        if recorded:
+            path.mkdir(exist_ok=True)
+        with pytest.raises(KeyboardInterrupt) as stopped, note:
+            raise KeyboardInterrupt
+        assert re.search(keeps if recorded else r"^Nothing .*kept\.$", stopped.value.__notes__[0])
+
+
+def test_a_fault_says_what_is_kept_and_leaves_the_advice_to_its_cause(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="disk") as failed, progress_note(tmp_path):
+        raise OSError("disk")
+    assert failed.value.__notes__ == [f"The finished cells in {tmp_path} are kept."]
 
 
 def test_a_discarded_recording_of_nothing_leaves_no_file(tmp_path: Path) -> None:

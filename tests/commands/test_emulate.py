@@ -71,6 +71,7 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
         (["builtin_walking", "--restart", "nan"], "restart_s = nan"),
         (["builtin_walking", "--rate", "1000000"], "rate_hz = 1000000.0. Give a number from 1 to 1000."),
         (["builtin_walking", "--anywhere"], "--anywhere with --pty"),
+        (["builtin_walking", "--baud", "9600"], "a line of 9600 baud carries 960. Try --rate 6;"),
         (["builtin_walking", "--noise", "loud"], "loud"),
         (["walking"], "HARNESS_MOCAP"),
     ],

@@ -51,6 +51,23 @@ def test_a_capture_is_validated_against_its_clip(
     assert run(capsys, "validate", boxing, "--truth", CLIP, "--out", unit, "--expect", unit, "--force")[0] == 0
 
 
+def test_a_method_that_fails_leaves_the_validation_and_is_named(
+    boxing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    upright = Path(__file__).parents[1] / "testing" / "upright.py"
+    (tmp_path / "diverging.py").write_text(
+        upright.read_text().replace(
+            "def begin(", "def begin(self, _): raise OverflowError('diverged')\n\n    def unused("
+        )
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    words = ("validate", boxing, "--truth", CLIP, "--methods", "diverging:Upright", "--out", tmp_path / "unit.toml")
+    code, out, _ = run(capsys, *words)
+    assert (code, out.splitlines()[-1]) == (4, "incomplete")
+    assert "failed: diverging:Upright: OverflowError: diverged" in out
+    assert read_unit_file(tmp_path / "unit.toml").session
+
+
 def test_json_holds_every_number_with_its_interval(boxing: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "validate", boxing, "--truth", CLIP, "--json")
     content: dict[str, Any] = json.loads(out)

@@ -18,6 +18,7 @@ from harness.results.digests import read_result_json, write_result_json
 from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
+from tests.core.leftovers import leave_behind
 from tests.results.finish import finish_run, make_run
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
@@ -50,6 +51,13 @@ def test_what_a_baseline_keeps_is_what_the_run_measured(run: Path, baselines: Pa
     assert load_results(baselines / "main") == found
     comparison = compare_results(found, there)
     assert (comparison.outcome, {line.difference for line in comparison.differences}) == (Outcome.PASS, {0.0})
+
+
+def test_what_a_killed_baseline_left_is_removed_by_the_next(run: Path, baselines: Path) -> None:
+    left = leave_behind(baselines / "main", folder=True)
+    assert left.is_dir()
+    write_baseline(run, "main")
+    assert [path.name for path in baselines.iterdir()] == ["main"]
 
 
 def test_a_baseline_in_the_place_of_another_is_refused(run: Path, baselines: Path, tmp_path: Path) -> None:
@@ -150,7 +158,7 @@ def test_what_is_no_side_is_told(run: Path, baselines: Path, tmp_path: Path) -> 
     with pytest.raises(BadFile, match="no such folder"):
         load_results("some/where")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(BadFile, match=r"manifest\.json"):
+    with pytest.raises(BadFile, match=r"no results of the harness; expected a run or a sweep"):
         load_results("empty")
 
 

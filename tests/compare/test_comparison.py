@@ -9,6 +9,7 @@ import pytest
 from harness.compare.comparison import EVERYTHING, Comparison, compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
+from harness.report.comparison.wording import sentence
 from harness.results.reader import ResultSet
 from harness.score.metrics import DEFINITIONS
 from tests.compare.sides import SIZES, cell, manifest, side
@@ -205,6 +206,23 @@ def test_cells_without_a_partner_are_named_and_may_be_allowed() -> None:
 def test_circumstances_that_differ_are_listed() -> None:
     a, b = (replace(side(), manifest=manifest(packages={"numpy": version})) for version in ("2.3", "2.4"))
     assert found(b, a).circumstances == (("packages.numpy", "2.3", "2.4"),)
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        ([{"walk_00": "Anna", "walk_01": "Bert", "walk_02": "Anna"}] * 2, "3 clips (2 performers)"),
+        ([None, {"walk_00": "Anna", "walk_01": "Anna", "walk_02": "Anna"}], "3 clips (1 performer)"),
+        ([{"walk_00": "Anna", "walk_01": "Anna"}] * 2, "3 clips:"),
+        ([None, None], "3 clips:"),
+    ],
+)
+def test_the_headline_states_how_many_performers_its_clips_are_of(
+    known: list[dict[str, str] | None], said: str
+) -> None:
+    sides = [side(title, clips=3) for title in "AB"]
+    a, b = (replace(s, manifest=replace(s.manifest, performers=who)) for s, who in zip(sides, known, strict=True))
+    assert said in sentence(found(b, a))
 
 
 def test_every_margin_is_of_a_metric_and_what_has_no_worse_is_refused() -> None:

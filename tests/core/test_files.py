@@ -11,6 +11,7 @@ import pytest
 
 from harness.core import files
 from harness.errors import BadFile
+from tests.core.leftovers import dead_process
 
 
 def test_a_writer_replaces_a_file_and_leaves_nothing_else(tmp_path: Path) -> None:
@@ -71,6 +72,29 @@ def test_a_writer_removes_what_dead_processes_left_and_nothing_of_living_ones(tm
         process.kill()
     files.write_text(path, "two")
     assert {entry.name for entry in tmp_path.iterdir()} == {path.name, f"{files.TEMPORARY}other-a[1].txt"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot be asked whether a process lives")
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_what_a_killed_process_left_goes_at_once_or_after_a_day(tmp_path: Path, kind: str) -> None:
+    """The name of the same target goes at once, any other and one of version 23b301b7 a day later, others never."""
+    dead = dead_process()
+    here = files.temporary_path(tmp_path / "NAME").name.replace(f"{os.getpid()}-NAME", f"{dead}-")
+    old, other = f"{files.TEMPORARY}{dead}-", here.replace(files.TEMPORARY, f"{files.TEMPORARY}0")
+    at_once, after_a_day = [f"{here}a.bvh"], [f"{here}b.bvh", f"{old}a.bvh", f"{old}b.bvh"]
+    never = [f"{other}a.bvh", f"{files.TEMPORARY}a.bvh", files.temporary_path(tmp_path / "c.bvh").name]
+    for name in (*at_once, *after_a_day, *never):
+        (tmp_path / name).touch() if kind == "file" else (tmp_path / name).mkdir()
+
+    def left() -> set[str]:
+        return {path.name for path in tmp_path.iterdir()}
+
+    files.remove_leftovers(tmp_path / "a.bvh")
+    assert left() == {*after_a_day, *never}
+    for path in tmp_path.iterdir():
+        os.utime(path, (0.0, 0.0))
+    files.remove_leftovers(tmp_path / "a.bvh")
+    assert left() == set(never)
 
 
 def test_a_folder_moves_where_nothing_is(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body
+from harness.compare.comparison import compare_runs
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY
@@ -23,8 +24,10 @@ from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment import cells, engine
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station, load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
+from harness.report.comparison.wording import sentence
 from harness.report.run.text import run_table
 from harness.results.expected_orders import ExpectedOrder
+from harness.results.manifest import Manifest
 from harness.results.storage import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
 from tests.interrupts import heeding_interrupts
@@ -64,6 +67,10 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
         "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
         "jitter_m_s3,step_p50_ms,step_p99_ms,fps"
     )
+    performers = {"walking_p1_01": "p1", "boxing_p2_01": "p2"}
+    assert Manifest.read(out / "manifest.json").performers == performers
+    assert read_summary(out)["performers"] == performers
+    assert "2 clips (2 performers)" in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
 
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:

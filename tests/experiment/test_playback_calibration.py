@@ -44,3 +44,23 @@ def test_another_order_is_said_and_equal_lists_are_not(four: Playback) -> None:
     turned = kept.select(four.calibration.stations[::-1])
     assert four.with_calibration(turned, say=said.append).calibration.stations == four.calibration.stations
     assert len(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("calibrated", "clip", "said"),
+    [
+        ("p1", "walking_p2_01", ["the calibration is of performer p1; walking_p2_01 is of p2"]),
+        ("p2", "walking_p2_01", []),
+        ("", "walking_p2_01", []),
+        ("13", None, []),
+    ],
+)
+def test_a_calibration_of_another_performer_is_named_where_both_are_known(
+    calibrated: str, clip: str | None, said: list[str]
+) -> None:
+    """Without a named clip a person wears the tracker, and the scenario's clip says nothing of who it is."""
+    playback = prepare_playback("demo", clip=clip, stations=4)
+    heard: list[str] = []
+    kept = CalibrationFile(playback.calibration, None, performer=calibrated)
+    assert playback.with_calibration(kept, say=heard.append).performer == ("p2" if clip else "")
+    assert heard == said

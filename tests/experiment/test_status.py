@@ -109,5 +109,5 @@ def test_what_is_no_work_of_ours_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="no such folder"):
         read_status(tmp_path / "nowhere")
     (tmp_path / "mine").mkdir()
-    with pytest.raises(BadFile, match=r"neither index\.sqlite nor manifest\.json"):
+    with pytest.raises(BadFile, match="no results of the harness; expected a run, a sweep"):
         read_status(tmp_path / "mine")

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.library import MotionLibrary
+from harness.mocap.library import MotionLibrary, ignored_paths_note
+from harness.mocap.sources import LibrarySource
 from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, mvnx_text, write_clip
 
 INDEX = "path,subject,trial,behaviour,frames,fps,note\n91/91_01.amc,91,01,walking,24,60,limps\n"
@@ -104,7 +105,7 @@ def test_links_out_of_the_folder_are_ignored_and_named(folder: Path, tmp_path_fa
     library = MotionLibrary(folder)
     assert library.ignored_paths == tuple(links)
     assert "92_01" not in library.names()
-    with pytest.raises(UnknownName, match=r"Ignored links that lead outside .*/92, .*/92_01\.amc") as error:
+    with pytest.raises(UnknownName, match=r"Ignored \(links that lead outside .*/92, .*/92_01\.amc") as error:
         library.load("92_01")
     assert str(copy(error.value)) == str(error.value)  # as on the way out of a worker process
     with pytest.raises(UnknownName):
@@ -172,9 +173,37 @@ def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: 
     assert [len(library.load(name)) for name in library.names()] == [12, 15, 18]
     assert [library.entry(f"{who}/take_001").subject.lower() for who in ("Anna", "Bert")] == ["anna", "bert"]
     assert [entry.copies for entry in library.entries()] == [(), (), ()]
+    known = [LibrarySource(library).performer(name) for name in library.names()]
+    assert known == (["anna", "bert", ""] if index else ["", "", ""]), "a part of a path is no known performer"
     assert library.load("Bert/take_001").name == "Bert/take_001"
     with pytest.raises(BadInput, match=r"2 different takes\. Name one of Anna/take_001, Bert/take_001"):
         library.load("take_001")
+
+
+def test_an_index_reaches_no_file_outside_its_folder(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"outside": 12, "library/=1+1": 12, "library/..a": 15})
+    top = tmp_path / "library"
+    rows = (f"{path},x,walking" for path in ("../outside.bvh", tmp_path / "outside.bvh", "..", "/", "", "=1+1.bvh"))
+    (top / "manifest.csv").write_text("\n".join(["path,subject,behaviour", *filter(lambda row: row[0] != ",", rows)]))
+    library = MotionLibrary(top)
+    assert library.names() == ("..a", "=1+1")
+    assert [library.entry(name).behaviour for name in library.names()] == ["", "walking"]
+
+
+@pytest.mark.parametrize("text", ["a\x1b[2J", "a\x07", "\u202eba"])
+def test_control_characters_reach_no_terminal(text: str, tmp_path: Path) -> None:
+    """In the index they are refused with their line; a file of such a name is left out and counted."""
+    write_takes(tmp_path, {"take_001": 12, text: 15})
+    library = MotionLibrary(tmp_path)
+    assert library.names() == ("take_001",)
+    assert library.ignored_paths == (tmp_path / f"{text}.bvh",)
+    (note,) = ignored_paths_note(library.ignored_paths)
+    assert note.isprintable()
+    for column in ("subject", "behaviour", "note"):
+        (tmp_path / "manifest.csv").write_text(f"path,{column}\ntake_001.bvh,{text}\n")
+        with pytest.raises(BadFile, match=r"manifest\.csv, line 2: the control character") as refused:
+            MotionLibrary(tmp_path)
+        assert str(refused.value).isprintable()
 
 
 def test_equal_files_at_two_places_are_one_clip_unless_the_index_says_otherwise(tmp_path: Path) -> None:
@@ -201,6 +230,7 @@ def test_a_clip_at_two_rates_is_two_clips(tmp_path: Path) -> None:
     library = MotionLibrary(tmp_path)
     assert [library.load(name).rate_hz for name in ("60hz/91_01", "120hz/91_01")] == pytest.approx([60.0, 120.0])
     assert {entry.subject for entry in library.entries()} == {"91"}
+    assert LibrarySource(library).performer("60hz/91_01") == "91"
 
 
 def test_formats_of_one_place_are_one_take_and_those_of_two_places_only_by_subject_and_trial(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from harness.core.fault_report import is_system_fault
-from harness.core.files import move_into_place, temporary_path
+from harness.core.files import move_into_place, remove_leftovers, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.body_model import BodyModel, stick_figure
 from harness.mocap.write.bvh import bvh_files
@@ -100,6 +100,7 @@ def _write_unfinished(path: Path, content: bytes, force: bool) -> Path:
     """Write the content under a temporary name, so that all files can be renamed at once."""
     if path.exists() and not force:
         raise BadInput(f"{path} exists.", "Name another folder with --out, or replace it with --force.")
+    remove_leftovers(path)
     unfinished = temporary_path(path)
     unfinished.write_bytes(content)
     return unfinished

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from harness.core.arrays import Singles
-from harness.core.files import MAX_JSON_BYTES, flush, move_into_place, temporary_path, write_text
+from harness.core.files import MAX_JSON_BYTES, flush, move_into_place, remove_leftovers, temporary_path, write_text
 from harness.core.input_file import check_input_file, read_input_file
 from harness.core.npz_file import read_npy_header
 from harness.core.parsing import parse_json
@@ -117,6 +117,7 @@ def open_writer(folder: Path) -> Iterator[FolderWriter]:
     if os.path.lexists(folder):
         raise taken
     folder.parent.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(folder)
     temporary = temporary_path(folder)
     temporary.mkdir()
     try:

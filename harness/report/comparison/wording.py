@@ -36,6 +36,7 @@ def sentence(comparison: Comparison) -> str:
     gated = [line for line in comparison.differences if line.gated]
     counts = count_verdicts(gated)
     lines = f"{count_noun(len(gated), 'gated line')} on {count_noun(len(clips_of(gated)), 'clip')}"
+    lines += f" ({comparison.performers})" if comparison.performers else ""
     match comparison.outcome:
         case Outcome.REGRESSED:
             worse = [

@@ -78,6 +78,8 @@ class ConditionSet:
     conditions: tuple[RunCondition, ...]
     finished: int
     planned: int
+    performers: Mapping[str, str] | None = None
+    """Performer of each clip whose performer is known; None in runs of versions that did not store them."""
 
     def select(self, condition: str = "", methods: Sequence[str] = ()) -> "ConditionSet":
         """The conditions that have all parts of a name such as "noise=clean", with these methods, in their order.
@@ -121,7 +123,9 @@ def read_conditions(folder: Path) -> ConditionSet:
     several = [len({getattr(group, name) for group in groups}) > 1 for name in RankingGroup._fields]
     keys.sort(key=lambda key: key[1].lag)
     conditions = (_condition(*key, several, cells, summary["methods"]) for key in keys)
-    return ConditionSet(folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"])
+    return ConditionSet(
+        folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"], summary.get("performers")
+    )
 
 
 def _condition(

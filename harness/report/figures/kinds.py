@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from harness.errors import BadInput, UnknownName
 from harness.report.figures.conditions import ConditionSet, read_conditions
@@ -12,8 +13,8 @@ from harness.report.figures.over_time import over_time_figure
 from harness.report.figures.placement import placement_figure
 from harness.report.figures.ranking import ranking_figure
 from harness.report.figures.selection import FigureSelection
-from harness.report.figures.source import SourceKind, find_kind
 from harness.report.kit.print_figure import PrintFigure
+from harness.results.folder_kind import require_kind
 
 _FROM_RUN: dict[str, Callable[[ConditionSet, FigureSelection], PrintFigure]] = {
     "ranking": ranking_figure,
@@ -28,7 +29,7 @@ class FigureKind:
     """One kind of figure."""
 
     text: str
-    source: SourceKind
+    source: Literal["run", "placement"]
     width_mm: int
     """Default width."""
     choices: frozenset[str]
@@ -75,7 +76,7 @@ def plan_figure(folder: Path, kind: str, selection: FigureSelection) -> tuple[st
     """
     if kind and kind not in KINDS:
         raise UnknownName("kind of figure", kind, KINDS)
-    source = find_kind(folder)
+    source = require_kind(folder, "run", "placement")
     kind = kind or next(name for name, each in KINDS.items() if each.source == source)
     if KINDS[kind].source != source:
         fitting = ", ".join(name for name, each in KINDS.items() if each.source == source)

@@ -10,7 +10,7 @@ from harness.report.kit.metric_labels import quantity
 from harness.report.kit.print_figure import PrintFigure
 from harness.report.placement.pareto import draw_pareto, measured_best
 from harness.report.placement.wording import measured_errors
-from harness.report.placement.writer import FINDINGS
+from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import PlacementFindings, read_placement
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ import numpy as np
 from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
 from harness.core.number_format import format_number
-from harness.errors import BadInput, UnknownName
+from harness.core.split import count_performers
+from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
-from harness.report.figures.source import find_kind
 from harness.results.cell import varied_text
+from harness.results.folder_kind import require_kind
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -93,8 +94,7 @@ def build_table(
     for metric in metrics:
         if metric not in DEFINITIONS:
             raise UnknownName("metric", metric, DEFINITIONS)
-    if find_kind(folder) == "placement":
-        raise BadInput(f"{folder} is a placement study.", "Name a run; `harness report` writes the tables of a study.")
+    require_kind(folder, "run")
     run = read_conditions(folder).select(condition, methods)
     names = _condition_names(run, by_behaviour)
     rows, few = [], False
@@ -155,8 +155,9 @@ def _standing(ranking: MethodRanking, series: str) -> Standing:
 def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
     sentences = ["Mean over clips and its 95 % interval."]
     rankings = [ranking for each in run.conditions if (ranking := each.rank()) is not None]
-    if performers := dict.fromkeys(ranking.performers for ranking in rankings if ranking.performers):
-        sentences.append(f"The clips are of {' or '.join(performers)}.")
+    counts = dict.fromkeys(count_performers(ranking.clips, run.performers) for ranking in rankings)
+    if performers := " or ".join(filter(None, counts)):
+        sentences.append(f"The clips are of {performers}.")
     if any(value.bold for row in rows for value in row.values):
         sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")
     if few:

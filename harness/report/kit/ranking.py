@@ -1,11 +1,12 @@
 """A ranking of methods in words, as pages and the terminal print it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from harness.compare.ranking import MethodRanking
 from harness.core.number_format import count_noun, format_share
+from harness.core.split import count_performers
 from harness.report.kit.text import list_first
 
 BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
@@ -21,14 +22,19 @@ def name_lag(lag: int) -> str:
 
 
 def describe_ranking(
-    ranking: MethodRanking, where: str, format_error: Callable[[float], str], clips: str = "clip"
+    ranking: MethodRanking,
+    where: str,
+    format_error: Callable[[float], str],
+    clips: str = "clip",
+    performers: Mapping[str, str] | None = None,
 ) -> str:
     """Which method is best, or has the lowest error, and what can be told about the others.
 
     `where` names the motion, such as "5 clips of built-in motion"; `clips` is the noun for what is counted. The number
-    of performers follows where the names of the clips tell it.
+    of performers follows where they are known, by `performers` as in `core.split.count_performers`.
     """
-    where = f"{where} ({ranking.performers})" if ranking.performers else where
+    counted = count_performers(ranking.clips, performers)
+    where = f"{where} ({counted})" if counted else where
     lowest, error = ranking.lowest, format_error(ranking.means[ranking.lowest])
     if not ranking.results:
         return f"{lowest}: {error} mean joint-angle error on {where}. No other method was measured."

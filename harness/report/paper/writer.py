@@ -8,9 +8,7 @@ from harness.report.kit.chart import clear_plots
 from harness.report.paper.charts import charts
 from harness.report.paper.page import PaperContent, paper_page, run_link
 from harness.results.findings import read_findings
-
-FINDINGS = "findings.json"
-"""Name of the findings file in the folder of a study."""
+from harness.results.folder_kind import FINDINGS
 
 
 def write_paper_page(folder: Path) -> Path:

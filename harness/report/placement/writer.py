@@ -9,10 +9,8 @@ from harness.report.kit.style import Chart
 from harness.report.placement.body_map import draw_body_map, select_body_maps
 from harness.report.placement.charts import charts
 from harness.report.placement.page import PlacementContent, placement_page
+from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import PlacementFindings, read_placement
-
-FINDINGS = "findings.json"
-"""Name of the findings file in the folder of a study."""
 
 
 def write_placement_page(folder: Path) -> Path:

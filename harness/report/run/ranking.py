@@ -102,7 +102,7 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
         )
         where += f", with {setting}" if setting else ""
         where += f", with {name_lag(group.lag)}" if group.lag else ""
-        text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°", "sequence")
+        text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°", "sequence", summary.get("performers"))
         found.append((text, ranking.lowest))
     if len({group.lag for group in groups}) > 1:
         found.append((LAG_NOTE, None))

@@ -58,6 +58,8 @@ class SweepData:
     """Lag of the method of each series [frames]; methods with different lags are never ranked together."""
     clips: tuple[str, ...]
     """Names as "scenario: clip", because clips of the same name may differ between scenarios."""
+    clip_performers: Mapping[str, str] | None
+    """Performer of each clip whose performer is known; None in sweeps of versions that did not store them."""
     keys: tuple[VariedKey, ...]
     scenario_of: Ints
     """(N,) index into `scenarios`."""

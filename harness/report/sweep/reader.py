@@ -14,6 +14,7 @@ from harness.report.sweep.data import READ_METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
 from harness.results.integrity import check_folder
+from harness.results.manifest import Manifest
 
 _GROUP_COLUMNS = ("inputs", "split", "performer")
 """Columns that are never pooled: each combination of them is a series of its own. The performer must be last."""
@@ -26,6 +27,7 @@ def read_sweep(out: Path) -> SweepData:
     BadFile if `out` holds no sweep, or a damaged or edited one.
     """
     check_folder(out)
+    clip_performers = Manifest.read(out / "manifest.json").performers
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
@@ -35,6 +37,7 @@ def read_sweep(out: Path) -> SweepData:
             planned=counts.planned,
             failures=failures,
             command=str(facts.get("command", "")),
+            clip_performers=clip_performers,
         )
 
 
@@ -46,10 +49,11 @@ def collect_cells(
     failures: Mapping[str, str],
     command: str = "",
     lags: Iterable[int] | None = None,
+    clip_performers: Mapping[str, str] | None = None,
 ) -> SweepData:
     """The data of a sweep from its cells, each a row of the index's columns.
 
-    `lags` has the lag of the method of each cell [frames], by default 0.
+    `lags` has the lag of the method of each cell [frames], by default 0. `clip_performers` are those of the manifest.
     """
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
@@ -75,6 +79,7 @@ def collect_cells(
         performers=tuple(group[-1] for group in groups.names),
         lags=tuple(lag_of_group[code] for code in range(len(groups.names))),
         clips=tuple(clips.names),
+        clip_performers=clip_performers,
         keys=keys,
         scenario_of=scenario_of,
         series_of=series_of,

@@ -51,16 +51,18 @@ def _best(sweep: SweepData) -> str:
         return "Nothing was measured." if len(sweep) else ""
     lags = dict(zip(sweep.series, sweep.lags, strict=True))
     parts = [(lag, values) for group in groups.values() for lag, values in split_by_lag(group, lags).items()]
-    sentences = [_best_of(values, lag) for lag, values in sorted(parts, key=lambda part: part[0])]
+    sentences = [
+        _best_of(values, lag, sweep.clip_performers) for lag, values in sorted(parts, key=lambda part: part[0])
+    ]
     return " ".join([*sentences, *([LAG_NOTE] if len({lag for lag, _ in parts}) > 1 else [])])
 
 
-def _best_of(values: Mapping[str, ClipValues], lag: int) -> str:
+def _best_of(values: Mapping[str, ClipValues], lag: int, performers: Mapping[str, str] | None) -> str:
     ranking = rank_methods(values, PRIMARY_METRIC)
     if ranking is None:
         return f"{list_first(list(values))} share no measured clip, so they are not ranked."
     where = count_noun(len(ranking.clips), "clip") + (f", with {name_lag(lag)}" if lag else "")
-    return describe_ranking(ranking, where, _format_error)
+    return describe_ranking(ranking, where, _format_error, performers=performers)
 
 
 def describe_effect(sweep: SweepData, key: VariedKey) -> str:

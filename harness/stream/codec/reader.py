@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.names import Label
 from harness.errors import BadInput
 from harness.stream.codec.assembler import FrameAssembler
 from harness.stream.codec.capture import ByteCapture
@@ -54,6 +55,9 @@ class WireFormat:
                 f"{self.rate_hz:g} records per second of each station.",
                 f"A device sends {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}; an IS-900 up to 180.",
             )
+        for name in self.stations:
+            if not Label().accepts(name):
+                raise BadInput(f"The station name {name[:100]!r} cannot be used.", f"Give it {Label()}.")
         if len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {', '.join(self.stations)}: a name occurs twice.", "Give each its own name.")
         positions = [STATION_CHARACTERS.find(character) for character in self.characters]

@@ -21,6 +21,7 @@ from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import Claim
+from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import (
     BestSet,
     PlacementFindings,
@@ -43,7 +44,6 @@ from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
 from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition
 
-FINDINGS = "findings.json"
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""
 

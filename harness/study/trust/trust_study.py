@@ -24,6 +24,7 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import write_result_json
+from harness.results.folder_kind import FINDINGS
 from harness.results.trust_findings import (
     Equivalence,
     ErrorDistance,
@@ -44,8 +45,6 @@ from harness.study.trust.equivalence import judge_equivalence
 from harness.study.trust.pair_agreement import ArmErrors, clip_means, correlate_ranks, judge_pairs
 from harness.study.trust.plan import Plan, load_plan, parameter_variants, plan_digest, scenario_file, unit_file
 from harness.study.trust.reading_errors import FEATURES, HealthCounts
-
-FINDINGS_FILE = "findings.json"
 
 
 class OtherPlan(HarnessError):
@@ -148,7 +147,7 @@ def run_trust_study(
             notes=(f"{plan.unit}: {fitted.caveat}.",) if fitted and fitted.caveat else (),
         )
         findings = judge_study(head, plan, task.arms, results)
-        write_result_json(out / FINDINGS_FILE, {**asdict(findings), "outcome": findings.outcome.word})
+        write_result_json(out / FINDINGS, {**asdict(findings), "outcome": findings.outcome.word})
     return TrustStudy(findings, sum(result.methods_s for result in results))
 
 

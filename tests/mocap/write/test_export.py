@@ -25,6 +25,7 @@ from harness.mocap.write.tum import POINTS
 from harness.score.pair import Pair, compute_poses
 from harness.score.positions import root_position_mm
 from harness.testing.doctor import find_evo, run_evo_ape_m
+from tests.core.leftovers import leave_behind
 
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)
@@ -71,6 +72,14 @@ def joints_m(qpos: Floats, skeleton: Skeleton) -> Floats:
     root_m, quaternion, angles_rad = unpack(qpos)
     pose = forward_kinematics(skeleton, root_m, quaternion, angles_rad)
     return np.concatenate([root_m[:, None], pose.end_m], axis=1)
+
+
+def test_what_a_killed_export_left_is_removed_by_the_next(cell: Written, tmp_path: Path) -> None:
+    stem = export([cell], "glb", tmp_path)[0].stem
+    left = leave_behind(tmp_path / f"{stem}.truth.bvh")
+    assert left.is_file()
+    files = export([cell], "bvh", tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {f"{stem}.glb", *(path.name for path in files)}
 
 
 def test_pymotion_reads_the_same_joint_centres_from_bvh(cell: Written, tmp_path: Path) -> None:

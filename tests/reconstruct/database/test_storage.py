@@ -9,6 +9,7 @@ import pytest
 
 from harness.errors import BadFile
 from harness.reconstruct.database import MotionDatabase, TakeSegment
+from tests.core.leftovers import leave_behind
 
 
 @pytest.fixture
@@ -40,6 +41,13 @@ def test_the_same_database_gives_the_same_bytes(database: MotionDatabase, saved:
     database.save(tmp_path / "again")
     for path in saved.iterdir():
         assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes()
+
+
+def test_what_a_killed_writer_left_is_removed_by_the_next(database: MotionDatabase, tmp_path: Path) -> None:
+    left = leave_behind(tmp_path / "some" / "database", folder=True)
+    assert left.is_dir()
+    database.save(tmp_path / "some" / "database")
+    assert [path.name for path in left.parent.iterdir()] == ["database"]
 
 
 def test_nothing_is_overwritten(database: MotionDatabase, saved: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.compare.paired_statistics import mean_interval
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadFile, UnknownName
 from harness.report.figures.conditions import read_conditions
 from harness.report.figures.table import MetricValue, build_table
 from harness.results.storage import read_summary
@@ -91,5 +91,5 @@ def test_what_was_not_measured_is_a_dash(tmp_path: Path) -> None:
 def test_unknown_metrics_and_other_folders_are_refused(ranked: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'mpjpe_mm'"):
         build_table(ranked, ("mpjpe_m",))
-    with pytest.raises(BadInput, match="is a placement study"):
+    with pytest.raises(BadFile, match="a placement study; expected a run"):
         build_table(write_made_up(tmp_path / "study"))

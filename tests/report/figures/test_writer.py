@@ -103,9 +103,9 @@ def test_folders_without_a_run_are_refused_by_what_they_are(tmp_path: Path) -> N
     for name, kind, said in (
         ("nowhere", BadFile, "no such folder"),
         ("empty", BadFile, "no results"),
-        ("paper", BadInput, "holds the findings of a paper"),
-        ("baseline", BadInput, "is a baseline"),
-        ("sweep", BadInput, "is a sweep"),
+        ("paper", BadFile, "the study of a paper"),
+        ("baseline", BadFile, "a baseline"),
+        ("sweep", BadFile, "a sweep"),
     ):
         with pytest.raises(kind, match=said):
             write_figure(tmp_path / name)

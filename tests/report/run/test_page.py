@@ -286,7 +286,7 @@ def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadFile, match="manifest"):
+    with pytest.raises(BadFile, match="no results of the harness; expected a run or a sweep"):
         write_run_page(tmp_path)
     assert not list(tmp_path.iterdir())
 

@@ -305,7 +305,7 @@ def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 
 def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadFile, match="the manifest of a run"):
+    with pytest.raises(BadFile, match="no results of the harness; expected a run or a sweep"):
         write_sweep_page(tmp_path)
     assert not list(tmp_path.iterdir())
 

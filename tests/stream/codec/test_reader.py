@@ -1,5 +1,6 @@
 """The complete path from bytes to frames."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,7 @@ from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.codec.reader import CaptureStream, FrameReader, WireFormat
+from harness.stream.codec.reader import LEAST_RATE_HZ, MOST_RATE_HZ, CaptureStream, FrameReader, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame
@@ -28,6 +29,33 @@ from tests.stream.wire import (
 )
 
 ROUNDS = 12
+
+
+@pytest.mark.parametrize(
+    ("stations", "rate_hz", "characters", "complaint"),
+    [
+        ((), 40.0, b"", "0 stations are not possible"),
+        (tuple("abcdefghijklm"), 40.0, b"", "13 stations are not possible"),
+        (("a",), 0.9 * LEAST_RATE_HZ, b"", "records per second"),
+        (("a",), 1.1 * MOST_RATE_HZ, b"", "records per second"),
+        (("a",), np.nan, b"", "nan records per second"),
+        (("a", "a"), 40.0, b"", "a name occurs twice"),
+        (("a\x1b[2J",), 40.0, b"", "cannot be used. Give it a text of 1 to 100 characters in one line"),
+        (("",), 40.0, b"", "cannot be used"),
+        (("a" * 101,), 40.0, b"", "cannot be used"),
+        (("a", "b"), 40.0, b"21", "do not fit 2 names"),
+        (("a",), 40.0, b"D", "do not fit 1 names"),
+        (("a",), 40.0, b"12", "do not fit 1 names"),
+    ],
+)
+def test_the_limits_of_a_wire_format(
+    stations: tuple[str, ...], rate_hz: float, characters: bytes, complaint: str
+) -> None:
+    with pytest.raises(BadInput, match=re.escape(complaint)):
+        WireFormat(stations, rate_hz, characters=characters)
+    for allowed_hz in (LEAST_RATE_HZ, MOST_RATE_HZ):
+        WireFormat(tuple("abcdefghijkl"), allowed_hz)
+    WireFormat(("=1+1", "../a", "C" * 100), 40.0, characters=b"19C")
 
 
 def clean_capture() -> ByteCapture:

@@ -285,6 +285,13 @@ def judged_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Pl
     return folder, findings
 
 
+def test_a_study_whose_line_drops_most_records_is_not_comparable(tmp_path: Path) -> None:
+    """One station at 20 Hz needs 7,600 bit/s. Without `link` the rate stays, and 2400 baud carry a third."""
+    findings, outcome = run_placement(written(tmp_path, "[ablate]\n[changes.tracker]\nbaud = 2400"), tmp_path / "out")
+    assert outcome is Outcome.NOT_COMPARABLE
+    assert any("THE LINK IS TOO SLOW" in note for note in findings.notes)
+
+
 def test_the_rate_of_a_set_is_that_of_its_size(judged_elsewhere: tuple[Path, PlacementFindings]) -> None:
     folder, findings = judged_elsewhere
     rates = {len(tried.stations): tried.rate_hz for tried in findings.tried}

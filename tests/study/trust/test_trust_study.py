@@ -18,6 +18,7 @@ from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.digests import read_result_json, write_result_json
+from harness.results.folder_kind import FINDINGS
 from harness.results.lock import folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
@@ -27,7 +28,6 @@ from harness.study.trust.capture_cells import Arm, CaptureTask, read_cell_errors
 from harness.study.trust.expected_values import preset_components
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import (
-    FINDINGS_FILE,
     OtherPlan,
     comparable_pairs,
     judge_outcome,
@@ -48,7 +48,7 @@ def finished(small_study: SmallStudy, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def read_findings(out: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads((out / FINDINGS_FILE).read_text(encoding="utf-8"))
+    content: dict[str, Any] = json.loads((out / FINDINGS).read_text(encoding="utf-8"))
     return content
 
 
@@ -126,7 +126,7 @@ def test_finished_cells_are_read_and_the_findings_have_the_same_bytes(
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(finished, out)
-    (out / FINDINGS_FILE).unlink()
+    (out / FINDINGS).unlink()
     cells = sorted((out / "cells").iterdir())
     for cell in cells[::5]:
         cell.unlink()
@@ -139,7 +139,7 @@ def test_finished_cells_are_read_and_the_findings_have_the_same_bytes(
     monkeypatch.setattr(capture_cells, "run_over_frames", count_runs)
     run_trust_study(small_study.plan, small_study.captures, out)
     assert len(ran) == len(cells[::5])
-    assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
+    assert (out / FINDINGS).read_bytes() == (finished / FINDINGS).read_bytes()
     assert {cell.name: cell.read_bytes() for cell in (out / "cells").iterdir()} == {
         cell.name: cell.read_bytes() for cell in (finished / "cells").iterdir()
     }
@@ -160,7 +160,7 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bytes(
         killed += process.wait() == -signal.SIGKILL
     assert killed == 10
     assert subprocess.run([*command, "--out", str(out)], check=False, capture_output=True).returncode == 0
-    assert (out / FINDINGS_FILE).read_bytes() == (finished / FINDINGS_FILE).read_bytes()
+    assert (out / FINDINGS).read_bytes() == (finished / FINDINGS).read_bytes()
 
 
 def test_a_refused_study_changes_nothing(finished: Path, small_study: SmallStudy, tmp_path: Path) -> None:
