@@ -85,32 +85,17 @@ class Match(NamedTuple):
     """Whether left and right of the second clip have changed places."""
 
 
-class _Described(NamedTuple):
-    """Windows of one length by their first moments."""
-
-    energy: Floats
-    """(V, W) sums of squares."""
-    along: Floats
-    """(V, W, F) unit windows along orthonormal directions."""
-
-    def features(self, directions: Floats) -> Singles:
-        """(V, W, K + 1) components along some of the directions (F, K), and the length of the rest."""
-        kept = self.along @ directions
-        rest = np.sqrt(np.maximum(1.0 - np.sum(kept**2, axis=2, keepdims=True), 0.0))
-        return np.concatenate([kept, rest], axis=2).astype(np.float32)
-
-
 class _Bound(NamedTuple):
     """What bounds the correlation of the windows of a first clip with others."""
 
     components: Floats
     """(E, C) principal components of what is compared."""
     directions: Floats
-    """(F, K) principal components of the unit windows."""
+    """(S, C, K) orthonormal directions, by samples of a window and their components."""
     energy: Floats
     """(W,) sums of squares of the windows of the first clip."""
     features: Singles
-    """(W, K + 1) their features."""
+    """(W, K + 1) their components along the directions, and the lengths of the rests."""
 
 
 def changes(descriptions: Singles, rate_hz: float) -> Singles:
@@ -145,11 +130,13 @@ class FirstClip:
     def bound(self, window: Window) -> _Bound:
         """The bound for a length of windows; computed once. The clip must have such a window."""
         if window not in self._bounds:
-            values = self.of_part(window.part, self.changes)[None].astype(float)
-            components = _principal(values[0], _COMPONENTS)
-            own = _describe(values, components, window.samples, EVERY)
-            directions = _principal(own.along[0], window.directions)
-            self._bounds[window] = _Bound(components, directions, own.energy[0], own.features(directions)[0])
+            values = self.of_part(window.part, self.changes)
+            components = _principal(values.astype(float), _COMPONENTS)
+            waves = _waves(window.samples)
+            _, along = _along(values[None, ::EVERY], components, waves, 1)
+            directions = waves @ _principal(along[0], window.directions)
+            energy, along = _along(values[None], components, directions, EVERY)
+            self._bounds[window] = _Bound(components, directions, energy[0], _with_rest(along[0]))
         return self._bounds[window]
 
 
@@ -174,9 +161,10 @@ def _better_match(
         return None
     bound = first.bound(window)
     mine, theirs = (first.of_part(window.part, x) for x in (first.changes, second))
-    other, least = _describe(theirs, bound.components, size, 1), window.part.least_change**2 * size * mine.shape[1]
+    energy, along = _along(theirs, bound.components, bound.directions, 1)
+    least = window.part.least_change**2 * size * mine.shape[1]
     start = run.start + np.flatnonzero(bound.energy[run.start : stop] > 0.5 * least)
-    mirrored, row = np.nonzero((other.energy > least) & sliding_window_view(allowed, size).all(axis=1))
+    mirrored, row = np.nonzero((energy > least) & sliding_window_view(allowed, size).all(axis=1))
     if not len(start) or not len(row):
         return None
     samples = np.arange(size)
@@ -184,11 +172,11 @@ def _better_match(
     def correlations(pairs: Ints) -> Floats:
         b, a = np.divmod(pairs, len(start))
         x, y = mine[start[a, None] + EVERY * samples], theirs[mirrored[b, None], row[b, None] + samples]
-        energies = bound.energy[start[a]] * other.energy[mirrored[b], row[b]]
+        energies = bound.energy[start[a]] * energy[mirrored[b], row[b]]
         out: Floats = np.einsum("nke,nke->n", x, y, dtype=float) / np.sqrt(energies)
         return out
 
-    bounds = other.features(bound.directions)[mirrored, row] @ bound.features[start].T
+    bounds = _with_rest(along[mirrored, row]) @ bound.features[start].T
     correlation, pair = _largest(bounds.ravel(), correlations, 1.0 - limit * window.largest_loss)
     share = (1.0 - correlation) / window.largest_loss
     if share >= limit:
@@ -224,12 +212,24 @@ def _principal(values: Floats, count: int) -> Floats:
     return out
 
 
-def _describe(values: Singles, components: Floats, size: int, step: int) -> _Described:
-    """The windows of values (V, N, E) whose samples are `step` apart."""
-    samples = np.arange(values.shape[1] - (size - 1) * step)[:, None] + step * np.arange(size)
-    exact = values.astype(float)
-    energy = np.sum(exact**2, axis=2)[:, samples].sum(axis=2)
+def _waves(size: int) -> Floats:
+    """(S, C, F) orthonormal directions: each component in the lowest modes of the cosine transform over a window."""
     modes = np.cos(np.pi / size * np.outer(np.arange(size) + 0.5, np.arange(min(size, _MODES))))
     modes /= np.sqrt(np.sum(modes**2, axis=0))
-    along = np.tensordot((exact @ components)[:, samples], modes, (2, 0)).reshape(*energy.shape, -1)
-    return _Described(energy, along / np.sqrt(np.maximum(energy, 1e-12))[..., None])
+    return np.einsum("sm,cd->scmd", modes, np.eye(_COMPONENTS)).reshape(size, _COMPONENTS, -1)
+
+
+def _along(values: Singles, components: Floats, directions: Floats, step: int) -> tuple[Floats, Floats]:
+    """(V, W) energies of the windows of values (V, N, E) whose samples are `step` apart, and (V, W, K) unit windows."""
+    exact, count = values.astype(float), values.shape[1] - (len(directions) - 1) * step
+    power, reduced = np.sum(exact**2, axis=2), exact @ components
+    at = [slice(start, start + count) for start in range(0, len(directions) * step, step)]
+    energy: Floats = np.sum([power[:, samples] for samples in at], axis=0)
+    along = sum((reduced[:, samples] @ d for samples, d in zip(at, directions, strict=True)), start=np.zeros(()))
+    return energy, along / np.sqrt(np.maximum(energy, 1e-12))[..., None]
+
+
+def _with_rest(along: Floats) -> Singles:
+    """(N, K + 1) components of unit vectors (N, K), and the lengths of the rests."""
+    rest = np.sqrt(np.maximum(1.0 - np.sum(along**2, axis=1, keepdims=True), 0.0))
+    return np.concatenate([along, rest], axis=1).astype(np.float32)

@@ -60,7 +60,7 @@ def test_the_table_of_edits_holds() -> None:
     clips = [generated(*take) for take in TAKES]
     for name, edit in EDITS.items():
         pairs = [(clip, complete(clip), copy, complete(copy)) for clip in clips for copy in [edit(clip)]]
-        found = [find_shared_motion(*pair) is not None for pair in pairs]
+        found = [shared(pair[0], pair[2]) is not None and shared(pair[2], pair[0]) is not None for pair in pairs]
         shares = " ".join(
             f"{least_difference(*pair) / SAME_MOTION:5.2f} {least_loss(*pair, limit=10.0):5.2f}  " for pair in pairs
         )
