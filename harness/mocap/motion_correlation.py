@@ -197,11 +197,12 @@ def _largest(bounds: Singles, values: Callable[[Ints], Floats], least: float) ->
     largest = float(values(np.array([number]))[0])
     left = np.flatnonzero(bounds > max(largest, least) - _ROUNDING)
     left = left[np.argsort(-bounds[left], kind="stable")]
-    for numbers in np.split(left, range(_TOGETHER, len(left), _TOGETHER)):
-        if largest > 1.0 - _ROUNDING or bounds[numbers[:1]] + _ROUNDING < largest:
+    for start in range(0, len(left), _TOGETHER):
+        numbers = left[start : start + _TOGETHER]
+        if largest > 1.0 - _ROUNDING or bounds[numbers[0]] + _ROUNDING < largest:
             break
         found = values(numbers)
-        if found.max(initial=-np.inf) > largest:
+        if found.max() > largest:
             largest, number = float(found.max()), int(numbers[np.argmax(found)])
     return largest, number
 
