@@ -21,6 +21,8 @@ _LIMBS = (
     ("rtibia",),
 )
 """The bones of each limb. Single hands and feet are too short: a millimetre of noise turns them by a degree."""
+_MOVED = tuple(bone for bone in BONES if bone[1:] not in ("hand", "foot"))
+"""The bones of the limbs, and those that carry them."""
 MIRRORED = np.array([0, 1, 3, 2, 5, 4, 7, 6, 9, 8])
 """(10,) the limb that each one becomes when left and right change places."""
 UPPER_BODY = np.array([0, 1, 2, 3, 4, 5])
@@ -29,15 +31,15 @@ UPPER_BODY = np.array([0, 1, 2, 3, 4, 5])
 
 def limb_directions(clip: Clip, rows: Ints) -> Floats:
     """(N, 10, 3) unit vectors of the limbs in the world in these frames (N,); zero for a limb without length."""
-    skeleton, dofs = clip.skeleton.subset(BONES)
+    skeleton, dofs = clip.skeleton.subset(_MOVED)
     ends = np.cumsum([0, *(len(hinges) for hinges in skeleton.hinges)])
-    limb = np.full(len(BONES), -1)
+    limb = np.full(len(_MOVED), -1)
     for number, bones in enumerate(_LIMBS):
         limb[[skeleton.index(bone) for bone in bones]] = number
     vectors_m = _limb_vectors(
         np.array(skeleton.parents),
         ends,
-        standard_skeleton().bone_m,
+        standard_skeleton().subset(_MOVED)[0].bone_m,
         np.ascontiguousarray(skeleton.axes),
         limb,
         rotations.to_matrix(clip.world_from_root[rows]),

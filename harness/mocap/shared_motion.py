@@ -8,16 +8,16 @@ Two clips share motion if the poses of one second differ by less than `SAME_MOTI
 Different takes differ by more wherever they move. People who stand do not, hence the second condition.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.motion import Clip
 from harness.mocap.limb_directions import MIRRORED, UPPER_BODY, limb_directions
-from harness.mocap.motion_correlation import GRID_HZ, Match, best_match, changes
+from harness.mocap.motion_correlation import EVERY, GRID_HZ, FirstClip, Match, best_match, changes
 
 SAME_MOTION = 0.004
 """Largest root mean square difference of descriptions over one second of the same motion (see `least_difference`)."""
@@ -70,38 +70,42 @@ def _find_edited_motion(
     first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
 ) -> SharedMotion | None:
     """The stretch of the best match of changes, if it is one of the same motion."""
-    found = [(match, begin_s, mirrored) for match, begin_s, mirrored in _match(first, first_runs, second, second_runs)]
-    match, begin_s, mirrored = min(found, default=(None, 0.0, False))
-    if match is None or match.share >= 1.0:
+    match = _best_match(first, first_runs, second, second_runs, 1.0)
+    if match is None:
         return None
-    first_s, second_s = begin_s + match.first_s, match.second_s
-    return SharedMotion((first_s, first_s + match.length_s), (second_s, second_s + match.length_s), mirrored)
+    first_s, second_s = ((begin_s, begin_s + match.length_s) for begin_s in (match.first_s, match.second_s))
+    return SharedMotion(first_s, second_s, match.mirrored)
 
 
-def least_loss(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
-    """Least loss of correlation of two clips, relative to the largest one of a copy; inf where nothing moves."""
-    return min((match.share for match, *_ in _match(first, first_runs, second, second_runs)), default=np.inf)
+def least_loss(
+    first: Clip,
+    first_runs: Sequence[range],
+    second: Clip,
+    second_runs: Sequence[range],
+    limit: float = np.inf,
+) -> float:
+    """Least loss of correlation of two clips, relative to the largest one of a copy; inf if none is below the limit.
+
+    The lower the limit, the less time it takes. Only windows that move have a loss.
+    """
+    match = _best_match(first, first_runs, second, second_runs, limit)
+    return match.share if match else np.inf
 
 
-def _match(
-    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
-) -> Iterator[tuple[Match, float, bool]]:
-    """The best match of each run of the first clip, when the run begins [s], and whether it is mirrored."""
-    other = _changes(second)
-    moments = np.arange(len(other)) / GRID_HZ * second.rate_hz
-    allowed = np.zeros(len(other), bool)
+def _best_match(
+    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range], limit: float
+) -> Match | None:
+    """The best match of changes whose share is below a limit, or None."""
+    known, other = _first_clip(first), _describe_samples(second).changes
+    moments = np.arange(other.shape[1]) * EVERY / GRID_HZ * second.rate_hz
+    allowed = np.zeros(len(moments), bool)
     for run in second_runs:
         allowed |= (moments >= run.start) & (moments < run.stop)
-    if not allowed.any():
-        return
-    for run in first_runs:
-        begin, end = (round(frame / first.rate_hz * GRID_HZ) for frame in (run.start, run.stop))
-        own = _changes(first)[begin:end]
-        for mirrored in (False, True):
-            columns = other[:, :, _MIRRORED_COLUMNS] if mirrored else other
-            match = best_match(own, columns, allowed, _UPPER_COLUMNS)
-            if match is not None:
-                yield match, begin / GRID_HZ, mirrored
+    grid = [
+        range(*(min(round(frame / first.rate_hz * GRID_HZ), len(known.changes)) for frame in (run.start, run.stop)))
+        for run in first_runs
+    ]
+    return min((match for run in grid if (match := best_match(known, run, other, allowed, limit))), default=None)
 
 
 def least_difference(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
@@ -139,7 +143,7 @@ class _Comparison(NamedTuple):
 
 def _compare(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> list[_Comparison]:
     """Comparisons of two clips by run of the first one, as recorded and mirrored, where any two poses are close."""
-    rows, samples = _describe_samples(second)
+    rows, samples, _ = _describe_samples(second)
     allowed = np.zeros(len(rows), bool)
     for run in second_runs:
         allowed |= (rows >= run.start) & (rows < run.stop)
@@ -194,37 +198,51 @@ def _window_spread(samples: Floats, window: int) -> Floats:
     return out
 
 
-_frame_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
-_change_cache: WeakKeyDictionary[Clip, Floats] = WeakKeyDictionary()
-_sample_cache: WeakKeyDictionary[Clip, tuple[Ints, Floats]] = WeakKeyDictionary()
+_frame_cache: WeakKeyDictionary[Clip, Singles] = WeakKeyDictionary()
+_first_cache: WeakKeyDictionary[Clip, FirstClip] = WeakKeyDictionary()
+_sample_cache: WeakKeyDictionary[Clip, "_Samples"] = WeakKeyDictionary()
 
 
-def _describe_frames(clip: Clip) -> Floats:
-    """(T, 55) descriptions of all frames of a clip; cached."""
+class _Samples(NamedTuple):
+    """What is kept of a second clip."""
+
+    frames: Ints
+    """(N,) the frames of ten poses per second."""
+    descriptions: Singles
+    """(N, 55) their descriptions."""
+    changes: Singles
+    """(2, M, 2, 55) the changes at ten moments per second, as recorded and mirrored."""
+
+
+def _describe_frames(clip: Clip) -> Singles:
+    """(T, 55) descriptions of all frames of a first clip; cached."""
     if clip not in _frame_cache:
-        _frame_cache[clip] = _describe(clip, np.arange(len(clip)))
+        _frame_cache[clip] = _describe(clip)
     return _frame_cache[clip]
 
 
-def _changes(clip: Clip) -> Floats:
-    """(N, 2, 55) speeds and accelerations of the descriptions of a clip at the moments of the grid; cached."""
-    if clip not in _change_cache:
-        _change_cache[clip] = changes(_describe_frames(clip), clip.rate_hz)
-    return _change_cache[clip]
+def _first_clip(clip: Clip) -> FirstClip:
+    """The changes of a first clip at all moments of the grid; cached."""
+    if clip not in _first_cache:
+        _first_cache[clip] = FirstClip(changes(_describe_frames(clip), clip.rate_hz), _UPPER_COLUMNS)
+    return _first_cache[clip]
 
 
-def _describe_samples(clip: Clip) -> tuple[Ints, Floats]:
-    """The frames (N,) of ten poses per second of a clip, and their descriptions (N, 55); cached."""
+def _describe_samples(clip: Clip) -> _Samples:
+    """What is compared of a second clip; cached. Its other frames are not kept, because there can be many clips."""
     if clip not in _sample_cache:
+        descriptions = _describe(clip)
         rows = np.round(np.arange(0.0, len(clip), clip.rate_hz / _RATE_HZ)).astype(int)
         rows = rows[rows < len(clip)]
-        _sample_cache[clip] = rows, _describe(clip, rows)
+        sampled = changes(descriptions, clip.rate_hz)[::EVERY]
+        both = np.stack([sampled, sampled[..., _MIRRORED_COLUMNS]])
+        _sample_cache[clip] = _Samples(rows, descriptions[rows], both)
     return _sample_cache[clip]
 
 
-def _describe(clip: Clip, rows: Ints) -> Floats:
-    """(N, 55) cosines between all limbs, and upward components of the limbs' directions, in these frames."""
-    directions = limb_directions(clip, rows)
+def _describe(clip: Clip) -> Singles:
+    """(T, 55) cosines between all limbs, and upward components of the limbs' directions, by frame."""
+    directions = limb_directions(clip, np.arange(len(clip)))
     cosines = directions @ directions.transpose(0, 2, 1)
-    out: Floats = np.concatenate([cosines[:, *_PAIRS], directions[:, :, 2]], axis=1).astype(np.float32)
+    out: Singles = np.concatenate([cosines[:, *_PAIRS], directions[:, :, 2]], axis=1).astype(np.float32)
     return out

@@ -10,6 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.motion import Clip
 from harness.core.skeleton import forward_kinematics
+from harness.mocap import synthetic
 
 
 def trimmed(clip: Clip) -> Clip:
@@ -158,6 +159,61 @@ def in_pieces(clip: Clip, piece_s: float) -> Clip:
     return take_rows(clip, np.concatenate(rows))
 
 
+def stretched(clip: Clip, share: float) -> Clip:
+    """The clip slower by this share, at its old rate."""
+    return replace(resampled(clip, clip.rate_hz * (1.0 + share)), rate_hz=clip.rate_hz)
+
+
+def with_offset(clip: Clip, bones: tuple[str, ...], offset_deg: float) -> Clip:
+    """The clip with a constant added to all hinges of some bones."""
+    added_rad, skeleton = np.zeros(clip.angles_rad.shape[1]), clip.skeleton
+    for bone in bones:
+        added_rad[skeleton.dof_of_bone[skeleton.index(bone)]] = np.deg2rad(offset_deg)
+    return replace(clip, angles_rad=clip.angles_rad + added_rad)
+
+
+def shuffled(clip: Clip, piece_s: float) -> Clip:
+    """All pieces of the clip in another order."""
+    pieces = np.array_split(np.arange(len(clip)), round(len(clip) / clip.rate_hz / piece_s))
+    order = np.random.default_rng(3).permutation(len(pieces))
+    return take_rows(clip, np.concatenate([pieces[number] for number in order]))
+
+
+def with_jitter(clip: Clip) -> Clip:
+    """The clip with each frame replaced by itself, the one before or the one after."""
+    rows = np.arange(len(clip)) + np.random.default_rng(4).integers(-1, 2, len(clip))
+    return take_rows(clip, np.clip(rows, 0, len(clip) - 1))
+
+
+def smoothed(clip: Clip, width_s: float) -> Clip:
+    """The clip with its hinge angles filtered by a Gaussian of this standard deviation."""
+    return replace(clip, angles_rad=gaussian_filter1d(clip.angles_rad, width_s * clip.rate_hz, axis=0))
+
+
+def _other_take(clip: Clip) -> Clip:
+    """Another take of the same performer and behaviour, as long as the clip."""
+    other = synthetic.generate(clip.behaviour, clip.subject, 4, seed=1, duration_s=len(clip) / clip.rate_hz)
+    return take_rows(other, np.minimum(np.arange(len(clip)), len(other) - 1))
+
+
+def blended(clip: Clip, share: float) -> Clip:
+    """The clip with this share of the hinge angles of another take."""
+    return replace(clip, angles_rad=(1.0 - share) * clip.angles_rad + share * _other_take(clip).angles_rad)
+
+
+def hidden(clip: Clip, length_s: float) -> Clip:
+    """A part of the clip, rounded to 1 deg, between two halves of another take."""
+    other, middle, half = _other_take(clip), len(clip) // 2, round(0.5 * length_s * clip.rate_hz)
+    part = rounded(take_rows(clip, np.arange(middle - half, middle + half)), 1.0)
+    pieces = take_rows(other, np.arange(middle)), part, take_rows(other, np.arange(middle, len(clip)))
+    return replace(
+        clip,
+        **{k: np.concatenate([getattr(c, k) for c in pieces]) for k in ("root_m", "world_from_root", "angles_rad")},
+    )
+
+
+_ARMS = ("lhumerus", "lradius", "rhumerus", "rradius")
+
 EDITS: dict[str, Callable[[Clip], Clip]] = {
     "1 deg of drift": lambda clip: with_smooth_noise(clip, 1.0, 2.0),
     "1 deg of noise of 0.4 s": lambda clip: with_smooth_noise(clip, 1.0, 0.4),
@@ -175,6 +231,24 @@ EDITS: dict[str, Callable[[Clip], Clip]] = {
     "other legs": with_other_legs,
     "pieces of 0.8 s": lambda clip: in_pieces(clip, 0.8),
     "pieces of 0.5 s": lambda clip: in_pieces(clip, 0.5),
+    "mirrored": mirrored,
+    "reversed": reversed_in_time,
+    "50 Hz": lambda clip: resampled(clip, 50.0),
+    "moved and turned": moved,
+    "3 % slower": lambda clip: stretched(clip, 0.03),
+    "rounded to 1 deg, 1 % slower": lambda clip: stretched(rounded(clip, 1.0), 0.01),
+    "rounded to 1 deg, 3 % slower": lambda clip: stretched(rounded(clip, 1.0), 0.03),
+    "rounded to 1 deg, reversed": lambda clip: reversed_in_time(rounded(clip, 1.0)),
+    "20 deg added to an elbow": lambda clip: with_offset(clip, ("lradius",), 20.0),
+    "5 deg added to the arms": lambda clip: with_offset(clip, _ARMS, 5.0),
+    "20 deg added to the arms": lambda clip: with_offset(clip, _ARMS, 20.0),
+    "pieces of 0.8 s in another order": lambda clip: shuffled(clip, 0.8),
+    "0.05 of another take": lambda clip: blended(clip, 0.05),
+    "half of another take": lambda clip: blended(clip, 0.5),
+    "jitter of a frame": with_jitter,
+    "filtered with 0.05 s": lambda clip: smoothed(clip, 0.05),
+    "filtered with 0.1 s": lambda clip: smoothed(clip, 0.1),
+    "3 s rounded to 1 deg inside another take": lambda clip: hidden(clip, 3.0),
     "0.9 of the amplitude, rounded to 1 deg, 60 Hz, mirrored": lambda clip: mirrored(
         resampled(rounded(with_amplitude(clip, 0.9), 1.0), 60.0)
     ),

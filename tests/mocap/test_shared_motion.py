@@ -43,22 +43,29 @@ def test_an_edited_copy_is_found(copy: str, take: tuple[str, str, int]) -> None:
 FOUND = (
     *("1 deg of drift", "1 deg of noise of 0.4 s", "2 deg of noise of 0.4 s", "1 deg of noise of 0.15 s"),
     *("rounded to 1 deg", "0.9 of the amplitude", "angles times 0.95", "other legs", "pieces of 0.8 s"),
+    *("mirrored", "reversed", "50 Hz", "moved and turned", "3 % slower", "pieces of 0.8 s in another order"),
+    *("0.05 of another take", "jitter of a frame", "filtered with 0.05 s"),
 )
 """Edits that are found in every one of `TAKES`; docs/trust.md says the same."""
+NOT_FOUND = (
+    *("4 deg of noise of 0.4 s", "rounded to 4 deg", "0.7 of the amplitude", "20 deg added to the arms"),
+    *("half of another take", "0.9 of the amplitude, rounded to 1 deg, 60 Hz, mirrored"),
+)
+"""Edits that are found in none. The other ones are found in some."""
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("take", TAKES)
-def test_a_copy_that_was_edited_in_every_frame_is_found(take: tuple[str, str, int]) -> None:
-    """The table shows how near each edit is to the limit, 1.00; above it a copy is not found."""
-    clip, losses = generated(*take), dict[str, float]()
+def test_the_table_of_edits_holds() -> None:
+    """It shows how near each edit is to the limits of the two searches, 1.00; above both a copy is not found."""
+    clips = [generated(*take) for take in TAKES]
     for name, edit in EDITS.items():
-        copy = edit(clip)
-        losses[name] = least_loss(clip, complete(clip), copy, complete(copy))
-        print(f"{name:58} {losses[name]:6.2f}")
-        if name in FOUND:
-            assert shared(clip, copy) is not None, name
-    assert any(loss > 1.0 for loss in losses.values())
+        pairs = [(clip, complete(clip), copy, complete(copy)) for clip in clips for copy in [edit(clip)]]
+        found = [shared(pair[0], pair[2]) is not None and shared(pair[2], pair[0]) is not None for pair in pairs]
+        shares = " ".join(
+            f"{least_difference(*pair) / SAME_MOTION:5.2f} {least_loss(*pair, limit=10.0):5.2f}  " for pair in pairs
+        )
+        print(f"{name:56} {sum(found)} of {len(TAKES)}: {shares}")
+        assert (name in FOUND, name in NOT_FOUND) == (all(found), not any(found)), name
 
 
 def test_the_times_of_an_edited_copy_say_where_the_clips_agree() -> None:
@@ -70,14 +77,16 @@ def test_the_times_of_an_edited_copy_say_where_the_clips_agree() -> None:
 
 
 def least_losses(clips: Sequence[Clip]) -> tuple[float, str]:
-    """The least loss of correlation of two different takes, or of a fifth of a take and its guard to the rest."""
-    found = [(least_loss(a, complete(a), b, complete(b)), f"{a.name} and {b.name}") for a, b in combinations(clips, 2)]
+    """The least loss below 3 of two different takes, or of a fifth of a take and its guard to the rest; inf if none."""
+    found = [
+        (least_loss(a, complete(a), b, complete(b), 3.0), f"{a.name} and {b.name}") for a, b in combinations(clips, 2)
+    ]
     for clip in clips:
         for start, end in FIFTHS:
             part = ClipPart(clip.name, start, end)
             forbidden = forbidden_frames(part, "block", len(clip), clip.rate_hz)
             rest = allowed_frames([part], clip.name, len(clip), clip.rate_hz)
-            found.append((least_loss(clip, [forbidden], clip, rest), str(part)))
+            found.append((least_loss(clip, [forbidden], clip, rest, 3.0), str(part)))
     return min(found)
 
 
