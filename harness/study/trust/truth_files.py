@@ -149,8 +149,8 @@ def read_csv(path: Path) -> dict[str, TruthPoses]:
     for number, row in enumerate(lines[1:], 2):
         if not row:
             continue
-        if len(row) < len(head):
-            raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "")
+        if len(row) < len(head) or any(row[len(head) :]):
+            raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "Look at that line.")
         values = [row[column].strip() for column in place]
         if not values[0]:
             continue
@@ -191,8 +191,12 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
         raise BadFile(
             path, "a quaternion that is not of length 1", "unit quaternions", "Is the order of columns right?"
         )
-    _, rows = np.unique(time_s, return_index=True)
-    return TruthPoses(time_s[rows], position_m[rows], quaternion[rows] / length[rows, None])
+    poses = np.column_stack([position_m, quaternion / length[:, None]])
+    unique_s, rows, row_of = np.unique(time_s, return_index=True, return_inverse=True)
+    if not np.array_equal(poses[rows][row_of], poses, equal_nan=True):
+        twice = unique_s[row_of][np.flatnonzero((poses[rows][row_of] != poses).any(axis=1))[0]]
+        raise BadFile(path, f"two poses at {twice:.10g} s", "one pose at each time", "Give times with more digits.")
+    return TruthPoses(unique_s, poses[rows, :3], poses[rows, 3:])
 
 
 def _is_marker_of(label: str, station: str) -> bool:

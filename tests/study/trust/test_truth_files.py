@@ -285,3 +285,18 @@ def test_times_that_are_no_seconds_are_refused_before_any_array_is_made(
     with pytest.raises(BadInput, match=cause) as refused:
         read_truth_file(path, ["bar"])
     assert str(refused.value).startswith(str(path))
+
+
+def test_two_poses_at_one_time_and_a_row_that_is_too_long_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "frames.csv"
+    head = "time_s,station,x_m,y_m,z_m,qw,qx,qy,qz\n"
+    rows = [f"{0.1 * k:g},head,{k},0,1,1,0,0,0\n" for k in range(4)]
+    file.write_text(head + "".join([*rows, rows[2]]))
+    assert len(read_csv(file)["head"].time_s) == 4  # the same pose twice
+    for more, found in (("0.2,head,9,0,1,1,0,0,0\n", "two poses at 0.2 s"), ("0.4,head,9,0,1,1,0,0,0,7\n", "10 of 9")):
+        file.write_text(head + "".join(rows) + more)
+        with pytest.raises(BadFile, match=found):
+            read_csv(file)
+    file.write_text(head + "".join(rows) + "0.4,head,1e160,0,1,1,0,0,0\n")
+    with pytest.raises(BadInput, match="farther than"):
+        read_csv(file)
