@@ -171,6 +171,7 @@ def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: 
     assert library.names() == ("Anna/take_001", "Bert/take_001", "take_002")
     assert [len(library.load(name)) for name in library.names()] == [12, 15, 18]
     assert [library.entry(f"{who}/take_001").subject.lower() for who in ("Anna", "Bert")] == ["anna", "bert"]
+    assert library.entry("take_002").subject == "Bert"  # his folder, as for his other take
     assert [entry.copies for entry in library.entries()] == [(), (), ()]
     assert library.load("Bert/take_001").name == "Bert/take_001"
     with pytest.raises(BadInput, match=r"2 different takes\. Name one of Anna/take_001, Bert/take_001"):
@@ -276,3 +277,20 @@ def test_the_staged_library_is_whole(mocap: Path) -> None:
     boxing = library.entry("13_17")
     assert (boxing.format, boxing.behaviour, boxing.rate_hz, boxing.frames) == ("amc", "boxing", 120.0, 4840)
     assert [copy.suffix for copy in library.entry("02_01").copies] == [".bvh", ".c3d"]
+
+
+def test_a_file_that_the_index_names_twice_is_refused_and_forms_of_its_path_are_one(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"Zoe\u0308/gang_001": 12})
+    index = tmp_path / "manifest.csv"
+    index.write_text("path,subject\nZo\u00eb\\gang_001.bvh,zoe\n./Zo\u00eb/gang_001.bvh,zoe\n", encoding="utf-8")
+    with pytest.raises(BadFile, match="twice, with different values"):
+        index.write_text(index.read_text(encoding="utf-8") + "Zoe\u0308/gang_001.bvh,anna\n", encoding="utf-8")
+        MotionLibrary(tmp_path)
+    index.write_text("path,subject\nZo\u00eb\\gang_001.bvh,zoe\n", encoding="utf-8")
+    assert MotionLibrary(tmp_path).entry("gang_001").subject == "zoe"
+
+
+def test_an_amc_file_that_lost_its_last_frames_is_refused(folder: Path) -> None:
+    (folder / "manifest.csv").write_text(INDEX.replace(",24,", ",25,"))
+    with pytest.raises(BadFile, match="24 frames; expected 25, as manifest.csv says"):
+        MotionLibrary(folder).load("91_01")
