@@ -92,15 +92,16 @@ def require_positions(residual_m: Mapping[str, Floats], factor: float, heading_r
     """
     size_m = {name: float(np.median(np.linalg.norm(rest, axis=1))) for name, rest in residual_m.items() if len(rest)}
     far = [name for name, middle_m in size_m.items() if not middle_m <= MOST_PLACE_M * max(1.0, abs(factor))]
+    most_m = max(size_m.values(), default=0.0)
     if far and len(far) < len(size_m):
         raise BadInput(
-            f"Positions of {', '.join(far)} disagree with the reference by {max(size_m[name] for name in far):.2g} m in the "
-            "middle; those of the other stations agree.",
+            f"Positions of {', '.join(far)} disagree with the reference by {most_m:.2g} m in the middle; those of the "
+            "other stations agree.",
             "Likely cause: bodies of the reference are in different units, of different times, or exchanged.",
         )
     if far or not abs(heading_rad) <= MOST_HEADING_RAD:
         raise BadInput(
-            f"Positions of the reference disagree with its orientations, by {max(size_m.values()):.2g} m in the middle "
+            f"Positions of the reference disagree with its orientations, by {most_m:.2g} m in the middle "
             f"and a heading of {math.degrees(heading_rad):.0f} deg.",
             "Likely cause: positions or quaternions were converted to other axes or a left-handed frame and the others "
             "were not, one axis has another scale, or they are of different times.",

@@ -127,7 +127,7 @@ def test_orientations_that_disagree_by_little_are_those_of_a_tracker(rng: np.ran
 def test_positions_that_do_not_follow_are_named(rng: np.random.Generator) -> None:
     small, large = 0.004 * rng.normal(size=(100, 3)), 0.2 * rng.normal(size=(100, 3))
     require_positions({"head": small, "hand": 1000.0 * small}, 1000.0, 0.1)
-    with pytest.raises(BadInput, match="Positions of hand .* those of the other stations agree"):
+    with pytest.raises(BadInput, match=r"Positions of hand .* those of the other stations agree"):
         require_positions({"head": small, "hand": large}, 1.0, 0.0)
     for heading_rad, residual in ((0.0, large), (-1.5, small), (np.nan, small)):
         with pytest.raises(BadInput, match="disagree with its orientations"):
