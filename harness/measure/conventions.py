@@ -19,6 +19,8 @@ MOST_PLACE_M = 0.05
 """Largest median error of a station's positions with which a registration is believed [m] [choice]."""
 MOST_HEADING_RAD = math.radians(30.0)
 """Largest heading error that counts as one of a tracker [rad] [choice]."""
+MOST_CLOCK_ERROR = 500e-6
+"""Largest relative error of a clock's rate that counts as one of a device; quartz errs by less than 200e-6 [choice]."""
 UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,
@@ -105,4 +107,17 @@ def require_positions(residual_m: Mapping[str, Floats], factor: float, heading_r
             f"and a heading of {math.degrees(heading_rad):.0f} deg.",
             "Likely cause: positions or quaternions were converted to other axes or a left-handed frame and the others "
             "were not, one axis has another scale, or they are of different times.",
+        )
+
+
+def require_clock(ratio: float, deviation: float) -> None:
+    """Raise BadInput if the device's clock is faster or slower than the reference's by more than a clock errs.
+
+    `ratio` is the relative error of its rate, `deviation` the standard deviation of that.
+    """
+    if abs(ratio) - 2.0 * deviation > MOST_CLOCK_ERROR:
+        raise BadInput(
+            f"The clock of the capture runs {1.0 + ratio:.5f} times as fast as that of the reference.",
+            "Likely cause: the frame rate of the reference is another one than its file says (29.97 Hz is not 30 Hz), "
+            "or frames were left out. Correct its times.",
         )

@@ -11,6 +11,7 @@ from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.conventions import (
     MOST_PLACE_M,
+    require_clock,
     require_orientations,
     require_positions,
     require_same_hand,
@@ -208,6 +209,7 @@ def register(
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named))
+    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])))
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
 
 

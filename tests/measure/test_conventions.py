@@ -8,7 +8,13 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.measure.conventions import require_orientations, require_positions, require_same_hand, require_scale
+from harness.measure.conventions import (
+    require_clock,
+    require_orientations,
+    require_positions,
+    require_same_hand,
+    require_scale,
+)
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.measure.registration import register
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
@@ -132,3 +138,11 @@ def test_positions_that_do_not_follow_are_named(rng: np.random.Generator) -> Non
     for heading_rad, residual in ((0.0, large), (-1.5, small), (np.nan, small)):
         with pytest.raises(BadInput, match="disagree with its orientations"):
             require_positions({"head": residual}, 1.0, heading_rad)
+
+
+def test_a_frame_rate_of_television_is_no_error_of_a_clock() -> None:
+    for ratio, deviation in ((20e-6, 1e-6), (-200e-6, 5e-6), (1e-3, 4e-4)):
+        require_clock(ratio, deviation)
+    for ratio in (1.0 / 1001.0, -1.0 / 1001.0, 0.01):
+        with pytest.raises(BadInput, match="frame rate of the reference is another one"):
+            require_clock(ratio, 10e-6)
