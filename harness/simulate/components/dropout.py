@@ -9,7 +9,6 @@ from harness.core.arrays import Floats
 from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
-
 MOST_PER_S = 100.0
 """Most gaps of one station in a second, on average [choice]; each is drawn."""
 

@@ -9,7 +9,6 @@ from harness.core.arrays import Floats
 from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
-
 MOST_AT_ONCE = 1000.0
 """Most excursions of one station at once, on average [choice]; each is drawn."""
 

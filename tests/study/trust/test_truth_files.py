@@ -100,6 +100,7 @@ def test_labels_are_the_station_and_a_number_or_a_letter(labels: list[str]) -> N
         (markers(names(3, "hand")), "0 marker"),
         (markers(names(3), shape_m=np.outer([0.0, 0.1, 0.2], [1.0, 0.0, 0.0])), "on one line"),
         (markers(names(3), np.arange(3) < np.full((FRAMES, 1), 2)), "no frame with all markers"),
+        (markers(names(4), noise_m=0.1), "fit a rigid body to .* mm .* only"),
     ],
 )
 def test_markers_that_fix_no_pose_are_refused(clip: MarkerClip, words: str) -> None:
@@ -300,3 +301,12 @@ def test_two_poses_at_one_time_and_a_row_that_is_too_long_are_refused(tmp_path: 
     file.write_text(head + "".join(rows) + "0.4,head,1e160,0,1,1,0,0,0\n")
     with pytest.raises(BadInput, match="farther than"):
         read_csv(file)
+
+
+def test_poses_at_the_origin_among_others_are_gaps(tmp_path: Path) -> None:
+    file = tmp_path / "frames.csv"
+    rows = "".join(f"{0.1 * k:g},head,{k % 3},0,0,1,0,0,0\n" for k in range(9))
+    file.write_text(f"time_s,station,x_m,y_m,z_m,qw,qx,qy,qz\n{rows}")
+    truth = read_truth_file(file, ["head"])
+    assert np.flatnonzero(np.isnan(truth.bodies["head"].position_m[:, 0])).tolist() == [0, 3, 6]
+    assert truth.notes == ("3 poses of head at exactly (0, 0, 0) count as not seen.",)
