@@ -16,8 +16,7 @@ from harness.compare.margins import GATED_METRICS, margin_of
 from harness.compare.paired_statistics import MIN_CLIPS
 from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
 from harness.core.arrays import Floats
-from harness.core.number_format import count_noun
-from harness.core.split import performer_of
+from harness.core.split import count_performers
 
 ClipValues = Mapping[str, Mapping[str, float]]
 """Metric -> clip -> mean value over the cells of the clip."""
@@ -40,8 +39,7 @@ class MethodRanking:
     @property
     def performers(self) -> str:
         """How many performers the clips are of, such as "3 performers"; empty where a clip's name does not tell it."""
-        names = {performer_of(clip) for clip in self.clips}
-        return count_noun(len(names), "performer") if None not in names else ""
+        return count_performers(self.clips)
 
     @property
     def lowest(self) -> str:

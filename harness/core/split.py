@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from harness.core.number_format import count_noun
 from harness.errors import BadInput
 
 Split = Literal["block", "sequence", "subject"]
@@ -56,6 +57,12 @@ def performer_of(clip: str) -> str | None:
     """The performer that a clip's name tells: "p1" of walking_p1_01, "13" of CMU's 13_17; None for other names."""
     match = re.fullmatch(r"(?:.*: )?(?:\w+_(p\d+)_\d+|(\d+)_\d+)(?:@.*)?", clip)
     return (match[1] or match[2]) if match else None
+
+
+def count_performers(clips: Iterable[str]) -> str:
+    """How many performers clips are of, such as "3 performers"; empty where a clip's name does not tell it."""
+    names = {performer_of(clip) for clip in clips}
+    return count_noun(len(names), "performer") if names and None not in names else ""
 
 
 def _format_share(share: float) -> str:
