@@ -53,6 +53,8 @@ def read_npz(
                     for info in archive.infolist()
                     if info.filename.endswith(".npy") and (names is None or info.filename[:-4] in names)
                 ]
+                if len({info.filename for info in wanted}) < len(wanted):
+                    raise BadFile(path, "an archive that has an array twice", expected, advice)
                 if sum(info.file_size for info in wanted) > limit_bytes:
                     limit = f"{expected} of at most {limit_bytes // MEGABYTE} MB"
                     raise BadFile(path, "an archive that unpacks to more than that", limit, advice)

@@ -4,7 +4,7 @@ A tracker's scale error is a few thousandths. A larger one, or a mirrored motion
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,12 @@ MOST_SCALE_ERROR = 0.2
 """Largest relative error of positions that counts as one of a tracker [choice]."""
 MOST_TURN_RAD = math.radians(15.0)
 """Largest median error of orientations with which a registration is believed [choice]."""
+MOST_PLACE_M = 0.05
+"""Largest median error of a station's positions with which a registration is believed [m] [choice]."""
+MOST_HEADING_RAD = math.radians(30.0)
+"""Largest heading error that counts as one of a tracker [rad] [choice]."""
+MOST_CLOCK_ERROR = 500e-6
+"""Largest relative error of a clock's rate that counts as one of a device; quartz errs by less than 200e-6 [choice]."""
 UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,
@@ -61,10 +67,13 @@ def require_scale(factor: float) -> None:
     units = {("reference", unit): metres for unit, metres in UNITS_M.items()}
     units |= {("capture", unit): 1.0 / metres for unit, metres in UNITS_M.items()}
     whose, unit = min(units, key=lambda key: abs(math.log(factor / units[key])))
+    which = f"the {whose}"
+    cause = f"{which} is in {unit} instead of metres, the nearest unit ({units[whose, unit]:.4g})"
+    if abs(factor / units[whose, unit] - 1.0) > MOST_SCALE_ERROR:
+        cause, which = "one of both is scaled, by no usual unit of length", "both"
     raise BadInput(
-        f"Lengths of the capture are {factor:.4g} times those of the reference. Likely cause: the {whose} is in {unit} "
-        f"instead of metres, the nearest unit ({units[whose, unit]:.4g}).",
-        f"Give the {whose} in metres. A scale error above {100.0 * MOST_SCALE_ERROR:g} % is not measured.",
+        f"Lengths of the capture are {factor:.4g} times those of the reference. Likely cause: {cause}.",
+        f"Give {which} in metres. A scale error above {100.0 * MOST_SCALE_ERROR:g} % is not measured.",
     )
 
 
@@ -75,4 +84,40 @@ def require_orientations(residual_rad: Sequence[Floats]) -> None:
         raise BadInput(
             f"Orientations of capture and reference disagree by {math.degrees(middle_rad):.0f} deg in the middle.",
             "Quaternions of the reference may be of left-handed axes, inverted, or in another order than w, x, y, z.",
+        )
+
+
+def require_positions(residual_m: Mapping[str, Floats], factor: float, heading_rad: float) -> None:
+    """Raise BadInput if positions do not follow the reference; `residual_m` holds errors (N, 3) by station.
+
+    `factor` is the ratio of reported lengths to those of the reference, `heading_rad` the heading error.
+    """
+    size_m = {name: float(np.median(np.linalg.norm(rest, axis=1))) for name, rest in residual_m.items() if len(rest)}
+    far = [name for name, middle_m in size_m.items() if not middle_m <= MOST_PLACE_M * max(1.0, abs(factor))]
+    most_m = max(size_m.values(), default=0.0)
+    if far and len(far) < len(size_m):
+        raise BadInput(
+            f"Positions of {', '.join(far)} disagree with the reference by {most_m:.2g} m in the middle; those of the "
+            "other stations agree.",
+            "Likely cause: bodies of the reference are in different units, of different times, or exchanged.",
+        )
+    if far or not abs(heading_rad) <= MOST_HEADING_RAD:
+        raise BadInput(
+            f"Positions of the reference disagree with its orientations, by {most_m:.2g} m in the middle "
+            f"and a heading of {math.degrees(heading_rad):.0f} deg.",
+            "Likely cause: positions or quaternions were converted to other axes or a left-handed frame and the others "
+            "were not, one axis has another scale, or they are of different times.",
+        )
+
+
+def require_clock(ratio: float, deviation: float) -> None:
+    """Raise BadInput if the device's clock is faster or slower than the reference's by more than a clock errs.
+
+    `ratio` is the relative error of its rate, `deviation` the standard deviation of that.
+    """
+    if abs(ratio) - 2.0 * deviation > MOST_CLOCK_ERROR:
+        raise BadInput(
+            f"The clock of the capture runs {1.0 + ratio:.5f} times as fast as that of the reference.",
+            "Likely cause: the frame rate of the reference is another one than its file says (29.97 Hz is not 30 Hz), "
+            "or frames were left out. Correct its times.",
         )

@@ -12,6 +12,8 @@ from harness.errors import BadInput
 
 _LONGEST_STEP = 4.0
 """Longest step of a reference that is interpolated, in median steps; a longer one is a gap."""
+_FARTHEST_M = 1e9
+"""Largest coordinate of a reference [m]; that of an orbit is smaller."""
 _SHORTEST_STEP_S = 0.02
 """Steps up to this length are never a gap [s]."""
 
@@ -53,6 +55,10 @@ class TruthPoses:
         if not np.all(np.diff(self.time_s) > 0.0):
             raise BadInput("Times of the reference do not rise.", "Sort its poses by time.")
         require_seconds(self.time_s, "The reference")
+        if np.any(np.abs(self.position_m) > _FARTHEST_M):
+            raise BadInput(
+                f"A position of the reference is farther than {_FARTHEST_M:g} m.", "Give metres; repair that row."
+            )
 
 
 class TruthSpline:

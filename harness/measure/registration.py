@@ -9,7 +9,14 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
-from harness.measure.conventions import require_orientations, require_same_hand, require_scale
+from harness.measure.conventions import (
+    MOST_PLACE_M,
+    require_clock,
+    require_orientations,
+    require_positions,
+    require_same_hand,
+    require_scale,
+)
 from harness.measure.correlated_errors import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
 from harness.measure.measured import NORMAL_QUANTILE, Measured
@@ -195,9 +202,14 @@ def register(
     fit = fit_registration(list(grids.values()), list(splines.values()), start)
     require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
     factor = 1.0 + fit.state.scale
+    places_m = {name: rest[grid.known, :3] for rest, (name, grid) in zip(fit.residuals, grids.items(), strict=True)}
+    if max(np.nanstd(truths[body].position_m, axis=0).max() for body in named.values()) > MOST_PLACE_M:
+        known = np.sqrt(fit.covariance[HEADING, HEADING]) <= MOST_DEVIATION["rad"]
+        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0)
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named))
+    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])))
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
 
 

@@ -82,7 +82,8 @@ def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], of
             continue
         before, after = (spline.poses(middle_s[rows] + sign * 0.5 * step_s[rows])[1] for sign in (-1.0, 1.0))
         expected = _angle(before, after) / step_s[rows]
-        pair = np.corrcoef(measured[rows], expected)[0, 1]
+        with np.errstate(invalid="ignore"):  # of a body that does not turn
+            pair = np.corrcoef(measured[rows], expected)[0, 1]
         out.append(float(pair) if np.isfinite(pair) else 0.0)
     return out
 

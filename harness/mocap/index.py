@@ -1,11 +1,13 @@
 """The index of a motion library: `manifest.csv` at the top of its folder, which says what motion files do not record.
 
-Columns: path (relative to the folder), subject, trial, behaviour, frames, fps and note. Only path is required.
+Columns: path (relative to the folder), subject, trial, behaviour, frames, fps and note. Only path is required. Paths
+are compared in Unicode's composed form (NFC), with slashes.
 """
 
 import csv
 import io
-from pathlib import Path
+import unicodedata
+from pathlib import Path, PurePath
 
 from harness.core.csv_text import unescape_formula
 from harness.core.input_file import read_input_file
@@ -17,7 +19,10 @@ _LIMIT_BYTES = 16 * 2**20
 
 
 def read_index(path: Path) -> dict[str, dict[str, str]]:
-    """Rows of an index by the path of their file; {} if there is no index. BadFile if it cannot be read."""
+    """Rows of an index by `index_key` of their file; {} if there is no index.
+
+    BadFile if it cannot be read, and for different rows of one file.
+    """
     if not path.exists():
         return {}
     check_size(path, "an index of motion files", _LIMIT_BYTES)
@@ -37,7 +42,19 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
                 raise BadFile(path, f"the control character in {text[:60]!r}", "texts of one line", "Remove it.", line)
         for column, kind in (("frames", int), ("fps", float)):
             _check_number(path, row.get(column) or "", column, kind, line)
-    return {row["path"]: row for _, row in rows}
+    found: dict[str, dict[str, str]] = {}
+    for line, row in rows:
+        row["path"] = index_key(row["path"])
+        if found.setdefault(row["path"], row) != row:
+            raise BadFile(
+                path, f"{row['path']} twice, with different values", "a row for each file", "Repair it.", line
+            )
+    return found
+
+
+def index_key(path: PurePath | str) -> str:
+    """A path relative to the folder, as the index compares it."""
+    return PurePath(unicodedata.normalize("NFC", str(path)).replace("\\", "/")).as_posix()
 
 
 def _unescaped(row: dict[str, str]) -> dict[str, str]:
@@ -53,7 +70,7 @@ def rate_from_index(path: Path, folders: tuple[Path, ...] = ()) -> float | None:
     above = [folder for folder in file.parents if (folder / INDEX_NAME).exists()]
     for folder in [folder.resolve() for folder in folders] or above[:1]:
         if file.is_relative_to(folder):
-            row = read_index(folder / INDEX_NAME).get(file.relative_to(folder).as_posix(), {})
+            row = read_index(folder / INDEX_NAME).get(index_key(file.relative_to(folder)), {})
             if row.get("fps"):
                 return float(row["fps"])
     return None

@@ -10,16 +10,16 @@ A clip's name is the stem of its file, such as "13_17". Where several takes have
 library: "Anna/take_001", "Bert/take_001".
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from filecmp import cmp
 from pathlib import Path
 
 from harness.core.motion import Clip
-from harness.errors import BadInput, UnknownName, shorten
+from harness.errors import BadFile, BadInput, UnknownName, shorten
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
 from harness.mocap.folder_scan import scan_folder
-from harness.mocap.index import INDEX_NAME, read_index
+from harness.mocap.index import INDEX_NAME, index_key, read_index
 
 LibraryFolders = Path | str | Sequence[Path | str]
 """One folder, or several."""
@@ -107,7 +107,8 @@ class MotionLibrary:
             if name not in named:
                 self._choices[name] = tuple(sorted(named))
         self._takes = dict(sorted(self._takes.items()))
-        self._entries = {name: _make_entry(name, take) for name, take in self._takes.items()}
+        performers = {Path(name).parent.as_posix() for names in self._choices.values() for name in names}
+        self._entries = {name: _make_entry(name, take, performers) for name, take in self._takes.items()}
         self.ignored_paths = tuple(ignored)
         """Symbolic links that lead outside their library folder or to nothing, folders that cannot be read, and files
         with a control character in their path."""
@@ -139,6 +140,9 @@ class MotionLibrary:
         entry = self.entry(name)
         folder = self._takes[name][0].folder
         clip = read_library_file(entry.path, folder.resolve(), entry.rate_hz or self._rate_hz)
+        if entry.format == "amc" and entry.frames not in (None, len(clip)):  # the other formats have a count or an end
+            expected, advice = f"{entry.frames}, as {INDEX_NAME} says", "The file is truncated, or its row is wrong."
+            raise BadFile(entry.path, f"{len(clip)} frames", expected, advice)
         return replace(
             clip,
             name=entry.name,
@@ -210,7 +214,7 @@ def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
         if not str(inside).isprintable():  # no command line could name it
             ignored.append(path)
             continue
-        row = index.get(inside.as_posix()) or rows.get(path.resolve(), {})
+        row = index.get(index_key(inside)) or rows.get(path.resolve(), {})
         files.append(_File(path, folder, inside.with_name(clip_name(path)).as_posix(), row))
     return files, tuple(ignored)
 
@@ -260,9 +264,12 @@ def _name_takes(name: str, takes: list[list[_File]]) -> dict[str, list[_File]]:
     return named
 
 
-def _make_entry(name: str, take: Sequence[_File]) -> LibraryEntry:
+def _make_entry(name: str, take: Sequence[_File], performers: Collection[str]) -> LibraryEntry:
+    """The entry of a take; `performers` are folders that tell takes of one name apart, and so the performers."""
     best, row, short = take[0], take[0].row, clip_name(take[0].path)
-    folder = Path(name).parent.as_posix() if name != short and not CMU_NAME.fullmatch(short) else "."
+    folder = Path(best.place).parent.as_posix()
+    if CMU_NAME.fullmatch(short) or not (folder in performers or best.format == "npz"):
+        folder = "."
     return LibraryEntry(
         name=name,
         format=best.format,

@@ -89,3 +89,12 @@ def test_an_archive_of_very_many_files_is_refused(tmp_path: Path) -> None:
             archive.writestr(f"{number}", b"")
     with pytest.raises(BadFile, match="an archive of very many files"):
         _read(tmp_path / "x.npz", 100_000_000)
+
+
+def test_an_array_that_stands_twice_in_an_archive_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "twice.npz"
+    np.savez(path, allow_pickle=False, a=np.arange(3.0))
+    with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate name"):
+        archive.writestr("a.npy", archive.read("a.npy"))
+    with pytest.raises(BadFile, match="an array twice"):
+        _read(path)

@@ -8,7 +8,13 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.measure.conventions import require_orientations, require_same_hand, require_scale
+from harness.measure.conventions import (
+    require_clock,
+    require_orientations,
+    require_positions,
+    require_same_hand,
+    require_scale,
+)
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.measure.registration import register
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
@@ -18,6 +24,7 @@ NAMES = ("hand", "head")
 NOISY = Tracker(scale=1e-3, ahead_s=0.002, offset_s=7.0, white=(0.00075, 0.0009), drift=(0.0015, 0.006))
 MIRROR = np.array([1.0, -1.0, 1.0])
 MIRROR_TURN = np.array([1.0, -1.0, 1.0, -1.0])
+QUARTER_TURN = rotations.to_matrix(rotations.about_z(np.pi / 2.0))
 INVERSE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -30,7 +37,11 @@ def capture() -> tuple[dict[str, MeasuredPoses], dict[str, TruthPoses]]:
 
 def changed(truths: dict[str, TruthPoses], place: Floats | float, turn: Floats | float) -> dict[str, TruthPoses]:
     return {
-        name: replace(one, position_m=place * one.position_m, world_from_body=turn * one.world_from_body)
+        name: replace(
+            one,
+            position_m=one.position_m @ place.T if np.ndim(place) == 2 else place * one.position_m,
+            world_from_body=turn * one.world_from_body,
+        )
         for name, one in truths.items()
     }
 
@@ -45,9 +56,11 @@ def changed(truths: dict[str, TruthPoses], place: Floats | float, turn: Floats |
         (
             1.0,
             MIRROR_TURN,
-            "quaternions of the reference are of left-handed|Quaternions of the reference|Not observable",
+            "Quaternions of the reference|disagree with its orientations|Positions of h",
         ),
-        (1.0, INVERSE, "Quaternions of the reference|Not observable"),
+        (QUARTER_TURN, 1.0, "Positions of the reference disagree with its orientations"),
+        (np.array([1.0, 1.0, 0.5]), 1.0, "Positions of"),
+        (1.0, INVERSE, "Quaternions of the reference|Positions of"),
         (1.0 / 0.3048, 1.0, "reference is in feet"),
         (1.0 / 0.0254, 1.0, "reference is in inches"),
         (100.0, 1.0, "reference is in centimetres"),
@@ -83,6 +96,7 @@ def test_the_nearest_unit_is_named() -> None:
         (0.29, "reference is in feet"),
         (39.0, "capture is in inches"),
         (1e-6, "reference is in micrometres"),
+        (0.75, "scaled, by no usual unit"),
     ):
         with pytest.raises(BadInput, match=words):
             require_scale(factor)
@@ -114,3 +128,21 @@ def test_orientations_that_disagree_by_little_are_those_of_a_tracker(rng: np.ran
     require_orientations([turns, turns])
     with pytest.raises(BadInput, match="disagree by 180 deg"):
         require_orientations([np.tile([np.pi, 0.0, 0.0], (300, 1)), turns])
+
+
+def test_positions_that_do_not_follow_are_named(rng: np.random.Generator) -> None:
+    small, large = 0.004 * rng.normal(size=(100, 3)), 0.2 * rng.normal(size=(100, 3))
+    require_positions({"head": small, "hand": 1000.0 * small}, 1000.0, 0.1)
+    with pytest.raises(BadInput, match=r"Positions of hand .* those of the other stations agree"):
+        require_positions({"head": small, "hand": large}, 1.0, 0.0)
+    for heading_rad, residual in ((0.0, large), (-1.5, small), (np.nan, small)):
+        with pytest.raises(BadInput, match="disagree with its orientations"):
+            require_positions({"head": residual}, 1.0, heading_rad)
+
+
+def test_a_frame_rate_of_television_is_no_error_of_a_clock() -> None:
+    for ratio, deviation in ((20e-6, 1e-6), (-200e-6, 5e-6), (1e-3, 4e-4)):
+        require_clock(ratio, deviation)
+    for ratio in (1.0 / 1001.0, -1.0 / 1001.0, 0.01):
+        with pytest.raises(BadInput, match="frame rate of the reference is another one"):
+            require_clock(ratio, 10e-6)

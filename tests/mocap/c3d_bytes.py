@@ -26,12 +26,13 @@ def c3d_bytes(
     rest: bytes | None = None,
     units: str = "m",
     numbers: dict[str, float] | None = None,
+    labels: Sequence[str] = (),
 ) -> bytes:
     """Frames of markers (T, M, 3) in metres; negative `scale` for floats.
 
     `analog` is the number of channels and of their samples in a frame, `last` the header's last frame, `frames` the
     parameter POINT:FRAMES, `rest` what follows the last frame (by default the padding of its block), and `numbers`
-    are other values of POINT's parameters.
+    are other values of POINT's parameters. `labels` are bar_1, bar_2, ... by default.
     """
     count, markers = points.shape[:2]
     big, code = (">", ">f4") if processor == MIPS else ("<", "<f4")
@@ -49,7 +50,7 @@ def c3d_bytes(
         body = struct.pack("bB", size, len(shape)) + bytes(shape) + data + b"\0"
         return struct.pack("bb", len(name), group) + name.encode() + words(2 + len(body)) + body
 
-    labels = [f"bar_{marker + 1}" for marker in range(markers)]
+    labels = labels or [f"bar_{marker + 1}" for marker in range(markers)]
     width = max(map(len, labels))
     point = {"RATE": 100.0, "SCALE": scale} | (numbers or {})
     block = b"".join(

@@ -172,6 +172,7 @@ def test_two_performers_with_one_file_name_are_two_clips(tmp_path: Path, index: 
     assert library.names() == ("Anna/take_001", "Bert/take_001", "take_002")
     assert [len(library.load(name)) for name in library.names()] == [12, 15, 18]
     assert [library.entry(f"{who}/take_001").subject.lower() for who in ("Anna", "Bert")] == ["anna", "bert"]
+    assert library.entry("take_002").subject == "Bert"  # his folder, as for his other take
     assert [entry.copies for entry in library.entries()] == [(), (), ()]
     known = [LibrarySource(library).performer(name) for name in library.names()]
     assert known == (["anna", "bert", ""] if index else ["", "", ""]), "a part of a path is no known performer"
@@ -306,3 +307,20 @@ def test_the_staged_library_is_whole(mocap: Path) -> None:
     boxing = library.entry("13_17")
     assert (boxing.format, boxing.behaviour, boxing.rate_hz, boxing.frames) == ("amc", "boxing", 120.0, 4840)
     assert [copy.suffix for copy in library.entry("02_01").copies] == [".bvh", ".c3d"]
+
+
+def test_a_file_that_the_index_names_twice_is_refused_and_forms_of_its_path_are_one(tmp_path: Path) -> None:
+    write_takes(tmp_path, {"Zoe\u0308/gang_001": 12})
+    index = tmp_path / "manifest.csv"
+    rows = "path,subject\nZo\u00eb\\gang_001.bvh,zoe\n./Zo\u00eb/gang_001.bvh,zoe\n"
+    index.write_text(rows, encoding="utf-8")
+    assert MotionLibrary(tmp_path).entry("gang_001").subject == "zoe"
+    index.write_text(f"{rows}Zoe\u0308/gang_001.bvh,anna\n", encoding="utf-8")
+    with pytest.raises(BadFile, match="twice, with different values"):
+        MotionLibrary(tmp_path)
+
+
+def test_an_amc_file_that_lost_its_last_frames_is_refused(folder: Path) -> None:
+    (folder / "manifest.csv").write_text(INDEX.replace(",24,", ",25,"))
+    with pytest.raises(BadFile, match=r"24 frames; expected 25, as manifest\.csv says"):
+        MotionLibrary(folder).load("91_01")

@@ -83,6 +83,8 @@ REFUSED: dict[str, Callable[[], object]] = {
     "no number": lambda: WhiteNoise(position_m=float("nan")),
     "bursts of nothing": lambda: Echo(burst_records=(0, 0)),
     "descending": lambda: Excursion(stay_s=(5.0, 1.0)),
+    "ten million excursions at once": lambda: Excursion(onsets_per_min=600.0, stay_s=(1e6, 1e6)),
+    "a thousand gaps a second": lambda: Dropout(share=0.99, gap_s=(0.001, 0.001)),
     "negative size": lambda: Echo(size_m=(-0.1, 0.3)),
     "negative rate": lambda: Excursion(onsets_per_min=-1.0),
     "negative ramp": lambda: Excursion(ramp_s=-0.1),

@@ -131,6 +131,8 @@ def _rate_hz(path: Path, arrays: Mapping[str, NDArray[Any]]) -> float:
     if not present:
         raise BadFile(path, "no frame rate", " or ".join(_RATE_KEYS), "Is it another kind of npz?")
     rate = _numbers(path, arrays, present[0])
+    if any(not np.array_equal(_numbers(path, arrays, key), rate) for key in present):
+        raise BadFile(path, f"{' and '.join(present)} that differ", "one rate", "Remove the wrong one.")
     if rate.size != 1 or not 0.0 < float(rate.flat[0]) < 1e5:
         raise BadFile(path, f"{present[0]} of {rate.tolist()!s:.40}", "one rate above 0 Hz", "Fetch it again.")
     return float(rate.flat[0])

@@ -38,7 +38,7 @@ class MarkerClip:
     name: str
     subject: str
     labels: tuple[str, ...]
-    """(M,) names without the subject's prefix ("LFHD")."""
+    """(M,) names without the subject's prefix ("LFHD"), or with it where several subjects have one name."""
     rate_hz: float
     position_m: Floats
     """(T, M, 3) positions [m]; NaN where a marker was not seen."""
@@ -85,10 +85,11 @@ def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
         (f"{empty.sum()} positions at exactly (0, 0, 0) count as markers that were not seen.",) if empty.any() else ()
     )
     position: Floats = np.where(seen[..., None], at, np.nan)
+    names = tuple(label.split(":")[-1] for label in labels)
     return MarkerClip(
         name=path.stem,
         subject=path.stem.split("_", 1)[0],
-        labels=tuple(label.split(":")[-1] for label in labels),
+        labels=names if len(set(names)) == len(names) else tuple(labels),
         rate_hz=header.rate_hz,
         position_m=position * unit @ _WORLD_FROM_FILE[screen].T,
         unit_m=unit,

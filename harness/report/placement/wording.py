@@ -11,6 +11,7 @@ from harness.core.number_format import (
     format_interval,
     format_share,
 )
+from harness.core.split import count_performers
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
@@ -77,8 +78,10 @@ def sentence(findings: PlacementFindings) -> str:
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
+    performers = count_performers({clip for tried in findings.tried for clip in tried.errors}, None)
+    chosen = [f"Sets were chosen on clips of {performers}."] if performers else []
     if findings.sizes:
-        return " ".join(_size_sentence(findings, size) for size in findings.sizes)
+        return " ".join([*(_size_sentence(findings, size) for size in findings.sizes), *chosen])
     best = smallest_sufficient_set(findings)
     if best is None:
         return "No set of stations was measured."
@@ -89,7 +92,7 @@ def sentence(findings: PlacementFindings) -> str:
     if best.ties:
         sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
         sentences.append(f"{sets} tied with it.")
-    return " ".join(sentences)
+    return " ".join([*sentences, *chosen])
 
 
 def _size_sentence(findings: PlacementFindings, size: int) -> str:

@@ -9,6 +9,9 @@ from harness.core.arrays import Floats
 from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
+MOST_PER_S = 100.0
+"""Most gaps of one station in a second, on average [choice]; each is drawn."""
+
 
 @dataclass(frozen=True)
 class Dropout:
@@ -29,6 +32,7 @@ class Dropout:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        check_fields(self, share=Range(0.0, MOST_PER_S * 0.5 * sum(self.gap_s)))
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = np.zeros(readings.time_s.shape, bool)

@@ -9,6 +9,9 @@ from harness.core.arrays import Floats
 from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
+MOST_AT_ONCE = 1000.0
+"""Most excursions of one station at once, on average [choice]; each is drawn."""
+
 
 @dataclass(frozen=True)
 class Excursion:
@@ -29,6 +32,8 @@ class Excursion:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        longest_min = (self.stay_s[1] + self.ramp_s) / 60.0
+        check_fields(self, onsets_per_min=Range(0.0, MOST_AT_ONCE / max(longest_min, 1e-3)))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)

@@ -97,9 +97,10 @@ def run_trust_study(
     plan, digest = load_plan(path), plan_digest(path)
     if not captures or (clips and len(clips) != len(captures)):
         raise BadInput(f"{len(clips)} clips for {len(captures)} captures.", "Name one clip for each capture, or none.")
-    if len(set(captures)) < len(captures):
-        raise BadInput("A capture is named twice.", "Name each once.")
     carried = [_carried_plans(capture) for capture in captures]
+    digests = [_sha256(capture) for capture in captures]
+    if len(set(digests)) < len(digests):
+        raise BadInput("A capture is named twice, or a copy of it.", "Name each once.")
     for capture, found in zip(captures, carried, strict=True):
         if found != (digest,) and not exploratory:
             raise OtherPlan(str(capture), found, digest)
@@ -125,7 +126,7 @@ def run_trust_study(
     clear_caches()
     if len({find_stations(each) for each in tasks}) > 1:
         raise BadInput("The captures have different stations.", "Name captures of one session.")
-    identity = {"study": "trust", "plan": digest, "captures": [_sha256(capture) for capture in captures]}
+    identity = {"study": "trust", "plan": digest, "captures": digests}
     with open_study(out, identity):
         (out / "cells").mkdir(exist_ok=True)
         results = _run_tasks(tasks, executor, progress)

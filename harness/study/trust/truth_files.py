@@ -6,11 +6,14 @@
   is `time x y z qx qy qz qw`; `#` begins a comment.
 - CSV: columns time_s (or measured_s, as `harness replay --frames` writes it), station, x_m, y_m, z_m, qw, qx, qy, qz,
   in any order; others are ignored. Rows without a time are left out, those without a pose are gaps.
+
+Poses at exactly (0, 0, 0) among others are gaps too, which some programs write for a body that was not seen.
 """
 
 import csv
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +33,8 @@ MAX_TEXT_BYTES = 512 * MEGABYTE
 CSV_COLUMNS = ("time_s", "station", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _LABEL_END = re.compile(r"[\s_.\-:]*(?:\d+|[A-Za-z])$")
 _UNIT_TOLERANCE = 1e-2
+_MOST_RESIDUAL_M = 0.02
+"""Largest RMS residual of the markers of a rigid body [m] [choice]."""
 _LEAST_SPREAD_M = 0.005
 """Least distance of the markers of a body from their common line [m]."""
 
@@ -41,7 +46,13 @@ def read_truth_file(path: Path, stations: Sequence[str]) -> TruthMotion:
         if suffix == ".c3d":
             return truth_of_markers(path, read_c3d(path), stations)
         bodies = read_tum(path, stations) if path.is_dir() or suffix == ".tum" else read_csv(path)
-    return TruthMotion(f"the trajectories of {path.name}", bodies, common_names(stations, bodies))
+    notes = []
+    for name, body in bodies.items():
+        empty = np.all(body.position_m == 0.0, axis=1)
+        if 0 < empty.sum() < len(empty):
+            bodies[name] = replace(body, position_m=np.where(empty[:, None], np.nan, body.position_m))
+            notes.append(f"{empty.sum()} poses of {name} at exactly (0, 0, 0) count as not seen.")
+    return TruthMotion(f"the trajectories of {path.name}", bodies, common_names(stations, bodies), notes=tuple(notes))
 
 
 def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -> TruthMotion:
@@ -57,6 +68,10 @@ def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -
             found = f"{len(rows)} marker(s) of station {station!r} among {', '.join(markers.labels[:12])}"
             raise BadFile(path, found, "three or more", f"Label them {station}_1, {station}_2, {station}_3.")
         place, turn, residual_m = fit_rigid_body(path, station, markers.position_m[:, rows])
+        if residual_m > _MOST_RESIDUAL_M:
+            found = f"markers of {station!r} that fit a rigid body to {1e3 * residual_m:.0f} mm (RMS) only"
+            advice = "Are labels exchanged or twice, or are markers on different bodies?"
+            raise BadFile(path, found, f"{1e3 * _MOST_RESIDUAL_M:g} mm at most", advice)
         bodies[station] = TruthPoses(time_s, place, turn)
         notes.append(f"The {len(rows)} markers of {station} fit one rigid body to {1e3 * residual_m:.2g} mm (RMS).")
     return TruthMotion(
@@ -149,8 +164,8 @@ def read_csv(path: Path) -> dict[str, TruthPoses]:
     for number, row in enumerate(lines[1:], 2):
         if not row:
             continue
-        if len(row) < len(head):
-            raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "")
+        if len(row) < len(head) or any(row[len(head) :]):
+            raise BadFile(path, f"line {number} has {len(row)} of {len(head)} values", expected, "Look at that line.")
         values = [row[column].strip() for column in place]
         if not values[0]:
             continue
@@ -191,8 +206,12 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
         raise BadFile(
             path, "a quaternion that is not of length 1", "unit quaternions", "Is the order of columns right?"
         )
-    _, rows = np.unique(time_s, return_index=True)
-    return TruthPoses(time_s[rows], position_m[rows], quaternion[rows] / length[rows, None])
+    poses = np.column_stack([position_m, quaternion / length[:, None]])
+    unique_s, rows, row_of = np.unique(time_s, return_index=True, return_inverse=True)
+    if not np.array_equal(poses[rows][row_of], poses, equal_nan=True):
+        twice = unique_s[row_of][np.flatnonzero((poses[rows][row_of] != poses).any(axis=1))[0]]
+        raise BadFile(path, f"two poses at {twice:.10g} s", "one pose at each time", "Give times with more digits.")
+    return TruthPoses(unique_s, poses[rows, :3], poses[rows, 3:])
 
 
 def _is_marker_of(label: str, station: str) -> bool:

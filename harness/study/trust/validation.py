@@ -18,6 +18,7 @@ from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
     Registration,
+    StationResiduals,
     coarse_offset,
     record_period_s,
     register,
@@ -47,6 +48,8 @@ SESSION_KEYS = ("scale", "heading_rad", "latency_s")
 """Numbers that hold for a session of the device; a unit file keeps them in [session]."""
 _DEFAULT_LATENCY_S, _DEFAULT_BAUD = 0.004, 115200
 """Latency and baud rate of the simulated tracker (`simulate.link.TrackerConfig`)."""
+_MOST_LEFT_OUT = 0.15
+"""Share of a station's readings that excursions and echoes are left out for at most [choice]."""
 _NO_HOST_CLOCK = "reference not on the host's clock"
 _LOOPED_CORRELATION = 0.8
 """Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
@@ -191,6 +194,7 @@ def validate_capture(
             int(errors.valid.sum()),
             float(np.mean(readings[station].quality == 0.0)),
         )
+    notes = (*notes, *describe_left_out(registration.errors))
     checks = _checks(numbers, registration, truth, pairs, expected, reader)
     host_s = np.concatenate([one.received_s for one in readings.values()])
     progress("", 3, 3)
@@ -206,6 +210,17 @@ def validate_capture(
         float(host_s.max() - host_s.min()) if len(host_s) else 0.0,
         sum(map(len, readings.values())),
         notes,
+    )
+
+
+def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]:
+    """A sentence for each station of which the registration left out more readings than a tracker's errors explain."""
+    shares = {station: 1.0 - one.used[one.valid].mean(axis=0) for station, one in errors.items() if one.valid.any()}
+    return tuple(
+        f"{station}: {100.0 * place:.0f} % of the positions and {100.0 * turn:.0f} % of the orientations lie far from "
+        "the others and were left out. Likely causes: long excursions, or a reference that stood still or lost frames."
+        for station, (place, turn) in shares.items()
+        if max(place, turn) > _MOST_LEFT_OUT
     )
 
 

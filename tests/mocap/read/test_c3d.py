@@ -240,3 +240,13 @@ def test_the_joints_in_a_c3d_are_those_of_the_amc(mocap: Path) -> None:
     spread = {s.label: s.spread_m for s in measure_marker_spreads(markers, MotionLibrary(mocap).load("05_13"))}
     for label in ("LFE0", "RFE0", "LTI0", "RTI0", "LBK0", "TRX0", "HED0", "LHU0", "LHN0"):
         assert spread[label] < 0.001
+
+
+def test_markers_of_two_subjects_with_one_label_keep_their_prefix(tmp_path: Path) -> None:
+    file = tmp_path / "two.c3d"
+    for labels, read in (
+        (["Anna:h1", "Anna:h2"], ("h1", "h2")),
+        (["Anna:h1", "Bert:h1"], ("Anna:h1", "Bert:h1")),
+    ):
+        file.write_bytes(c3d_bytes(np.ones((4, 2, 3)), labels=labels))
+        assert read_c3d(file).labels == read

@@ -203,6 +203,7 @@ def test_a_bent_elbow_bends_the_elbow(tmp_path: Path) -> None:
         ({"poses": None}, "no array poses"),
         ({"mocap_framerate": None}, "no frame rate"),
         ({"mocap_framerate": np.array(0.0)}, "mocap_framerate of 0.0"),
+        ({"mocap_frame_rate": np.array(60.0)}, "mocap_framerate and mocap_frame_rate that differ"),
         ({"trans": np.zeros((5, 3))}, "poses (24, 156) and trans (5, 3)"),
         ({"trans": np.array(1.0)}, "trans ()"),
         ({"poses": np.zeros((24, 63))}, "poses (24, 63)"),

@@ -142,3 +142,9 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
         "1 of 10 pairs changes its order (too few clips or too many sets to test): first"
     )
     assert changes_sentence(findings, replace(pair, changes=0, changed=())) == "no pair of 10 changes its order"
+
+
+def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
+    clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
+    for sizes in ((), (2,)):
+        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on clips of 3 performers.")

@@ -309,6 +309,12 @@ def test_captures_that_are_refused(
         run_trust_study(small_study.plan, given, tmp_path / "out", clips=clips)
 
 
+def test_a_copy_of_a_capture_is_refused(small_study: SmallStudy, tmp_path: Path) -> None:
+    copy = shutil.copy(small_study.captures[0], tmp_path / "copy.rec")
+    with pytest.raises(BadInput, match="or a copy of it"):
+        run_trust_study(small_study.plan, [small_study.captures[0], Path(copy)], tmp_path / "out")
+
+
 def test_a_folder_of_another_study_is_refused(finished: Path, small_study: SmallStudy) -> None:
     with pytest.raises(BadInput, match="another study"):
         run_trust_study(small_study.plan, small_study.captures[:3], finished)

@@ -100,6 +100,7 @@ def test_labels_are_the_station_and_a_number_or_a_letter(labels: list[str]) -> N
         (markers(names(3, "hand")), "0 marker"),
         (markers(names(3), shape_m=np.outer([0.0, 0.1, 0.2], [1.0, 0.0, 0.0])), "on one line"),
         (markers(names(3), np.arange(3) < np.full((FRAMES, 1), 2)), "no frame with all markers"),
+        (markers(names(4), noise_m=0.1), "fit a rigid body to .* mm .* only"),
     ],
 )
 def test_markers_that_fix_no_pose_are_refused(clip: MarkerClip, words: str) -> None:
@@ -285,3 +286,27 @@ def test_times_that_are_no_seconds_are_refused_before_any_array_is_made(
     with pytest.raises(BadInput, match=cause) as refused:
         read_truth_file(path, ["bar"])
     assert str(refused.value).startswith(str(path))
+
+
+def test_two_poses_at_one_time_and_a_row_that_is_too_long_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "frames.csv"
+    head = "time_s,station,x_m,y_m,z_m,qw,qx,qy,qz\n"
+    rows = [f"{0.1 * k:g},head,{k},0,1,1,0,0,0\n" for k in range(4)]
+    file.write_text(head + "".join([*rows, rows[2]]))
+    assert len(read_csv(file)["head"].time_s) == 4  # the same pose twice
+    for more, found in (("0.2,head,9,0,1,1,0,0,0\n", "two poses at 0.2 s"), ("0.4,head,9,0,1,1,0,0,0,7\n", "10 of 9")):
+        file.write_text(head + "".join(rows) + more)
+        with pytest.raises(BadFile, match=found):
+            read_csv(file)
+    file.write_text(head + "".join(rows) + "0.4,head,1e160,0,1,1,0,0,0\n")
+    with pytest.raises(BadInput, match="farther than"):
+        read_csv(file)
+
+
+def test_poses_at_the_origin_among_others_are_gaps(tmp_path: Path) -> None:
+    file = tmp_path / "frames.csv"
+    rows = "".join(f"{0.1 * k:g},head,{k % 3},0,0,1,0,0,0\n" for k in range(9))
+    file.write_text(f"time_s,station,x_m,y_m,z_m,qw,qx,qy,qz\n{rows}")
+    truth = read_truth_file(file, ["head"])
+    assert np.flatnonzero(np.isnan(truth.bodies["head"].position_m[:, 0])).tolist() == [0, 3, 6]
+    assert truth.notes == ("3 poses of head at exactly (0, 0, 0) count as not seen.",)

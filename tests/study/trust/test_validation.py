@@ -9,6 +9,8 @@ import pytest
 
 from harness.errors import BadInput, NotComparable, Outcome, UnknownName
 from harness.experiment.playback import Playback, prepare_playback
+from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.registration import StationResiduals
 from harness.measure.unit_file import UnitFile
 from harness.simulate.simulation import TrackerConfig
 from harness.stream.recording.recording import record_capture
@@ -17,7 +19,13 @@ from harness.study.trust import validation
 from harness.study.trust.expected_values import preset_components
 from harness.study.trust.reconstruction_scores import measured_calibration, score_registered
 from harness.study.trust.truth_motion import TruthMotion, read_stations
-from harness.study.trust.validation import Validation, load_truth, session_unit, validate_capture
+from harness.study.trust.validation import (
+    Validation,
+    describe_left_out,
+    load_truth,
+    session_unit,
+    validate_capture,
+)
 
 pytestmark = pytest.mark.long
 CLIP = "boxing_p1_01"
@@ -200,3 +208,15 @@ def test_what_names_no_reference_is_refused(boxing: Path, tmp_path: Path) -> Non
     with pytest.raises(BadInput, match="--scenario"):
         load_truth(unnamed, CLIP)
     assert load_truth(unnamed, CLIP, scenario="builtin_boxing").playback is not None
+
+
+def test_stations_of_which_many_readings_were_left_out_are_named() -> None:
+    """Excursions are a twentieth of the readings; a reference that stands still for a fifth of the time is not."""
+    quiet, noise = np.zeros((100, 3)), ErrorProcess(1e-3, 1e-3, 1.0)
+    used = np.ones((100, 2), bool)
+    used[:5] = False
+    head = StationResiduals(np.arange(100.0), quiet, quiet, np.ones(100, bool), used, (noise, noise, noise))
+    assert describe_left_out({"head": head}) == ()
+    used[:21, 0] = False
+    (said,) = describe_left_out({"head": head, "hand": replace(head, used=used)})
+    assert said.startswith("hand: 21 % of the positions and 5 % of the orientations lie far from the others")
