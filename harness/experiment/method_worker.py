@@ -7,6 +7,7 @@ the program that started it (`worker_process`).
 import os
 import signal
 import sys
+import tempfile
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -124,7 +125,7 @@ def _stable_options(method: Method, name: str) -> str:
     """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
     made, again = describe_state(method, name), describe_state(registry.resolve(name), name)
     if made == again:
-        return made
+        return made.replace(tempfile.gettempdir(), "<TMPDIR>")  # each process has its own
     differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)
     at = next(differ, min(len(made), len(again)))
     found = " and then ".join(shorten(text[max(at - 40, 0) :], 60) for text in (made, again))
