@@ -21,7 +21,7 @@ from harness.core.messages import MessageError, read_message, write_message
 from harness.core.object_state import describe_state
 from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, HarnessError, SystemFault, shorten
-from harness.experiment.file_audit import FileAudit
+from harness.experiment.file_audit import FileAudit, UndeclaredInput
 from harness.experiment.method_messages import (
     MAX_TEXT,
     Arrays,
@@ -62,7 +62,8 @@ class MethodWorker:
             known = known and (refusal or isinstance(error, SystemFault))
             fields = [list(f) if isinstance(f, tuple) else f for f in error.args] if known else []
             text = "".join(traceback.format_exception(error))[-MAX_TEXT:]
-            return {"error": type(error).__name__, "text": text, "message": str(error), "fields": fields}, {}
+            message = str(error) if isinstance(error, UndeclaredInput) else ""  # `str` of another may fail
+            return {"error": type(error).__name__, "text": text, "message": message, "fields": fields}, {}
         return answer
 
     def operations(self) -> dict[str, Callable[[Header, Arrays], Message]]:
