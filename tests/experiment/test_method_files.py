@@ -432,6 +432,9 @@ def test_a_declared_variable_is_part_of_the_key(folder: Path, monkeypatch: pytes
         f"os.environ.setdefault('{VARIABLE}', '1')",
         f"os.environb.get(b'{VARIABLE}')",
         "dict(os.environ)",
+        f"os.path.expandvars('$HOME/${VARIABLE}')",
+        f"from collections import ChainMap; ChainMap(os.environ, {{}})['{VARIABLE}']",
+        f"from string import Template; Template('${VARIABLE}').substitute(os.environ)",
     ],
 )
 def test_an_undeclared_variable_fails_the_cell(folder: Path, monkeypatch: pytest.MonkeyPatch, read: str) -> None:
