@@ -97,9 +97,9 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
+    items = args.items or tracker.items
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or args.overload or tracker.overload):
-        items = args.items or tracker.items
         check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     with ExitStack() as opened:
         with defer_interrupts():
