@@ -95,6 +95,15 @@ def test_what_a_method_prints_is_talk_and_its_interrupt_a_failed_cell(
     assert json.loads(capfd.readouterr().out)["outcome"] == "incomplete"
 
 
+@pytest.mark.long
+def test_characters_that_the_output_cannot_encode_are_escaped(tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-m", "harness", "list", "metrics"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii:strict"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert r"[m/s\xb3]" in done.stdout
+
+
 def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "harness.cli", "list"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:

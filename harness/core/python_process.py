@@ -15,6 +15,7 @@ from harness.core.package_data import PACKAGE_FOLDER
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables by which every verb gives the libraries one thread: times are of one core, --jobs uses the others."""
 _SAFE_PATH = "PYTHONSAFEPATH"
+_HASH_SEED = "PYTHONHASHSEED"
 _SITE_FOLDERS = ("site-packages", "dist-packages")
 
 
@@ -24,12 +25,15 @@ def python_command(*arguments: str) -> list[str]:
 
 
 def python_environment() -> dict[str, str]:
-    """The environment of such a process: it imports this harness, and nothing from relative folders of PYTHONPATH."""
+    """The environment of such a process: it imports this harness, and nothing from relative folders of PYTHONPATH.
+
+    Hashes of texts, hence the order of sets, are the same in all of them, so that a method computes the same.
+    """
     root = PACKAGE_FOLDER.parent
     folders = [folder for folder in os.environ.get("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(folder)]
     if root.name not in _SITE_FOLDERS and str(root) not in folders:
         folders.append(str(root))  # a checkout that is not installed
-    return {**os.environ, _SAFE_PATH: "1", "PYTHONPATH": os.pathsep.join(folders)}
+    return {**os.environ, _SAFE_PATH: "1", _HASH_SEED: "0", "PYTHONPATH": os.pathsep.join(folders)}
 
 
 @contextmanager

@@ -1,4 +1,7 @@
-"""The standard streams of the program: closed ones are replaced, and messages that nobody can read stop no work."""
+"""The standard streams of the program: closed ones are replaced, and messages that nobody can read stop no work.
+
+Characters that the encoding of a stream lacks are printed as escapes, such as \\xb1 for the sign of plus or minus.
+"""
 
 import io
 import os
@@ -18,6 +21,8 @@ def repair_streams() -> None:
             os.open(os.devnull, os.O_RDWR)  # the lowest free number, which is this one
     if sys.stdout is None:
         sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     raw = _MessageFile(2, "w", closefd=False)
     encoding = getattr(sys.stderr, "encoding", "utf-8")
     sys.stderr = io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True, write_through=True)

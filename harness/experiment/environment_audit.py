@@ -5,15 +5,17 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-_PASSED_THROUGH = ("os", "collections.abc", "_collections_abc", __name__)
-"""Modules whose functions read a variable for somebody else, such as `os.getenv`."""
+_PASSED_THROUGH = ("os", "collections", "collections.abc", "_collections_abc", "string", "configparser", __name__)
+"""Modules whose functions read a variable for somebody else, such as `os.getenv`; so does `os.path.expandvars`."""
 _listeners: list[Callable[[str, str], None]] = []
 
 
 class _AuditedEnvironment(os._Environ):  # type: ignore[type-arg]  # generic in type stubs alone
     def __getitem__(self, key: Any) -> Any:
         frame: Any = sys._getframe(1)
-        while frame.f_back is not None and frame.f_globals.get("__name__") in _PASSED_THROUGH:
+        while frame.f_back is not None and (
+            frame.f_globals.get("__name__") in _PASSED_THROUGH or frame.f_code.co_name == "expandvars"
+        ):
             frame = frame.f_back
         for hear in _listeners:
             hear(os.fsdecode(key), frame.f_code.co_filename)

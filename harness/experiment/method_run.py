@@ -121,4 +121,5 @@ def describe_failure(error: BaseException) -> str:
         raise KeyboardInterrupt from error
     if fault := find_system_fault(error):
         raise fault from (None if fault is error else error)
-    return str(error) if isinstance(error, HarnessError) else "".join(traceback.format_exception(error))
+    text = str(error) if isinstance(error, HarnessError) else "".join(traceback.format_exception(error))
+    return text.encode(errors="backslashreplace").decode()  # a name of a file may be no Unicode

@@ -7,6 +7,7 @@ the program that started it (`worker_process`).
 import os
 import signal
 import sys
+import tempfile
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,7 +21,7 @@ from harness.core.messages import MessageError, read_message, write_message
 from harness.core.object_state import describe_state
 from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, HarnessError, SystemFault, shorten
-from harness.experiment.file_audit import FileAudit
+from harness.experiment.file_audit import FileAudit, UndeclaredInput
 from harness.experiment.method_messages import (
     MAX_TEXT,
     Arrays,
@@ -61,7 +62,8 @@ class MethodWorker:
             known = known and (refusal or isinstance(error, SystemFault))
             fields = [list(f) if isinstance(f, tuple) else f for f in error.args] if known else []
             text = "".join(traceback.format_exception(error))[-MAX_TEXT:]
-            return {"error": type(error).__name__, "text": text, "message": str(error), "fields": fields}, {}
+            message = str(error) if isinstance(error, UndeclaredInput) else ""  # `str` of another may fail
+            return {"error": type(error).__name__, "text": text, "message": message, "fields": fields}, {}
         return answer
 
     def operations(self) -> dict[str, Callable[[Header, Arrays], Message]]:
@@ -125,7 +127,7 @@ def _stable_options(method: Method, name: str) -> str:
     """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
     made, again = describe_state(method, name), describe_state(registry.resolve(name), name)
     if made == again:
-        return made
+        return made.replace(tempfile.gettempdir(), "<TMPDIR>")  # each process has its own
     differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)
     at = next(differ, min(len(made), len(again)))
     found = " and then ".join(shorten(text[max(at - 40, 0) :], 60) for text in (made, again))

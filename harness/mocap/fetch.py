@@ -202,15 +202,20 @@ def _parse_file(path: Path, folder: Path) -> AsfFile | Clip:
 
 
 def _write_index(top: Path, names: list[str]) -> None:
-    """Add the motions to the folder's index, with their rate where it is known. The index is replaced in one step."""
-    rows = read_index(top / INDEX_NAME)
-    listed = shipped_sha256()
-    for name in names:
-        if name.endswith(".amc"):
-            subject, trial = Path(name).stem.split("_")
-            fps = f"{SHIPPED_RATE_HZ:g}" if name in listed else ""
-            rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
-    columns = list(dict.fromkeys(column for row in rows.values() for column in row))
-    with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        file.write(csv_line(columns))
-        file.writelines(csv_line([row.get(name) for name in columns]) for row in rows.values())
+    """Add the motions to the folder's index, with their rate where it is known.
+
+    The index is replaced in one step. Another fetch into this folder waits, so that no rows are lost.
+    """
+    listed, lock = shipped_sha256(), top / f"{FETCHED}{INDEX_NAME}.lock"
+    with FileLock(lock):
+        rows = read_index(top / INDEX_NAME)
+        for name in names:
+            if name.endswith(".amc"):
+                subject, trial = Path(name).stem.split("_")
+                fps = f"{SHIPPED_RATE_HZ:g}" if name in listed else ""
+                rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
+        columns = list(dict.fromkeys(column for row in rows.values() for column in row))
+        with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+            file.write(csv_line(columns))
+            file.writelines(csv_line([row.get(name) for name in columns]) for row in rows.values())
+    lock.unlink(missing_ok=True)

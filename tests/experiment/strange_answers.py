@@ -1,6 +1,8 @@
 """Methods whose answers are no poses, or poses in an unusual form; all begin with the T-pose."""
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -63,6 +65,20 @@ class RefusesToStep(Strange):
         raise BadInput("There is no way.", "Go home.")
 
 
+class NamesAFileThatIsNoUnicode(Strange):
+    def answer(self, pose: Floats, number: int) -> Any:
+        return Path(os.fsdecode(b"/nowhere/caf\xe9")).read_text()
+
+
+class RaisesAnErrorWithoutText(Strange):
+    def answer(self, pose: Floats, number: int) -> Any:
+        class Untold(BaseException):
+            def __str__(self) -> str:
+                raise TypeError
+
+        raise Untold
+
+
 class IsSingle(Strange):
     def answer(self, pose: Floats, number: int) -> Any:
         return plain(pose.astype(np.float32))
@@ -80,6 +96,8 @@ FAILING: dict[type[Strange], str] = {
     IsComplex: "complex128",
     StatesTooLittle: "hinge 0 is 1e-50 rad",
     IsOfAnotherSize: r"\(1, 55\)",
+    NamesAFileThatIsNoUnicode: r"FileNotFoundError: .*/nowhere/caf",
+    RaisesAnErrorWithoutText: "Untold: <exception str",
     RefusesToStep: "There is no way. Go home.",
 }
 SCORED: list[type[Strange]] = [IsSingle, IsUndefinedAtTimes]

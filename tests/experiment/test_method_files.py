@@ -16,7 +16,13 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment import engine, remote_method
 from harness.experiment.isolation import Isolation
 from harness.experiment.method_process import MethodFailure
-from harness.experiment.remote_method import RemoteMethod, close_methods, hash_method, resolve_method
+from harness.experiment.remote_method import (
+    RemoteMethod,
+    close_methods,
+    describe_options,
+    hash_method,
+    resolve_method,
+)
 from harness.results.storage import read_cells, read_summary
 from tests.experiment.test_isolation import ONE_CLIP
 
@@ -230,6 +236,17 @@ def test_options_are_those_of_another_process(folder: Path) -> None:
     assert texts[0].startswith("plain.Plain(angle=0.1, gain=plain.Plain.__init__.<locals>.<lambda>(")
 
 
+@pytest.mark.long
+def test_hashes_of_texts_and_the_temporary_folder_are_those_of_another_server(folder: Path) -> None:
+    parts = "(hash('left'), list({*'abcdefgh'}), tempfile.gettempdir() + '/tables')"
+    write_plain(folder, 0.1, f"import tempfile; self.parts = {parts}")
+    texts = set()
+    for _ in range(2):
+        texts.add(describe_options(resolve_method("plain:Plain", Isolation())))
+        close_methods()
+    assert len(texts) == 1
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
@@ -431,6 +448,9 @@ def test_a_declared_variable_is_part_of_the_key_and_may_be_read(folder: Path, mo
         "os.environ.copy()",
         "list(os.environ.values())",
         "dict(os.environ)",
+        f"os.path.expandvars('$HOME/${VARIABLE}')",
+        f"from collections import ChainMap; ChainMap(os.environ, {{}})['{VARIABLE}']",
+        f"from string import Template; Template('${VARIABLE}').substitute(os.environ)",
     ],
 )
 def test_an_undeclared_variable_fails_the_cell(folder: Path, monkeypatch: pytest.MonkeyPatch, read: str) -> None:

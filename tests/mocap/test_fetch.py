@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from harness.errors import BadFile, BadInput
 from harness.mocap import fetch
 from harness.mocap.fetch import fetch_cmu, sha256_of, shipped_sha256
+from harness.mocap.index import read_index
 from harness.mocap.library import MotionLibrary
 from tests.mocap.sample_files import clip, write_clip
 
@@ -174,6 +176,25 @@ def test_an_index_that_is_there_is_added_to(site: Site, tmp_path: Path) -> None:
         rows = {row["path"]: row for row in csv.DictReader(file)}
     assert list(rows) == ["91/91_01.amc", "other.bvh", "91/91_02.amc"]
     assert (rows["91/91_01.amc"]["behaviour"], rows["91/91_01.amc"]["fps"]) == ("walking", "60")
+
+
+def test_two_fetches_at_once_add_to_one_index(site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_clip(site.folder / "subjects", replace(clip(name="92_01"), subject="92"))
+    others = []
+
+    def read_while_another_fetches(path: Path) -> dict[str, dict[str, str]]:
+        rows = read_index(path)
+        if not others:
+            others.append(threading.Thread(target=fetch_cmu, args=(["92"], tmp_path), kwargs={"base_url": site.url}))
+            others[0].start()
+            others[0].join(1.0)
+        return rows
+
+    monkeypatch.setattr(fetch, "read_index", read_while_another_fetches)
+    fetch_cmu(["91"], tmp_path, base_url=site.url)
+    others[0].join()
+    assert set(read_index(tmp_path / "manifest.csv")) == {"91/91_01.amc", "91/91_02.amc", "92/92_01.amc"}
+    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("subject", ["../13", "13;14", "", "all", "1234"])
