@@ -1,6 +1,5 @@
 """Comparison of two results on the cells that they share. A is the reference; differences are B - A."""
 
-from collections import ChainMap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,7 +145,7 @@ def _count_performers(differences: Sequence[Difference], a: Manifest, b: Manifes
     """The performers of the clips of the gated lines, as either side knows them."""
     sides = [side.performers for side in (a, b) if side.performers is not None]
     clips = {clip for line in differences if line.gated for clip in line.clips}
-    return count_performers(clips, dict(ChainMap(*sides)) if sides else None)
+    return count_performers(clips, {clip: who for side in sides for clip, who in side.items()} if sides else None)
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:

@@ -49,9 +49,12 @@ class Manifest:
         advice = "Is this a folder written by `harness run`? If so, restore it, or run again with another --out."
         content = read_result_json(path, "the manifest of a run", advice)
         try:
-            parts = [dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")]
+            inputs, versions, circumstances = (
+                dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")
+            )
             performers = content.get("performers")
-            return cls(*parts, None if performers is None else {str(k): str(v) for k, v in performers.items()})
+            known = None if performers is None else {str(clip): str(who) for clip, who in performers.items()}
+            return cls(inputs, versions, circumstances, known)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             advice = "Is this a folder written by `harness run`?"
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error

@@ -230,7 +230,9 @@ def test_options_are_those_of_another_process(folder: Path) -> None:
     texts = []
     for angle in (0.1, 0.1, 0.2):
         write_plain(folder, angle)
-        texts.append(resolve_method("plain:Plain", Isolation()).options)
+        method = resolve_method("plain:Plain", Isolation())
+        assert isinstance(method, RemoteMethod)
+        texts.append(method.options)
         end_methods()
     assert texts[0] == texts[1] != texts[2]
     assert texts[0].startswith("plain.Plain(angle=0.1, gain=plain.Plain.__init__.<locals>.<lambda>(")

@@ -12,7 +12,7 @@ from harness.results.index import CellIndex
 from harness.results.integrity import check_folder
 from tests.results.rewrite import write_json
 
-FILES = {
+FILES: dict[str, dict[str, dict[str, object]]] = {
     "trust": {"study.json": {"study": "trust"}, "findings.json": {"plan_digest": "0"}},
     "placement": {"study.json": {"placement": "where"}, "findings.json": {"kind": "placement"}},
     "paper": {"study.json": {"paper": "liu2011"}, "findings.json": {"paper": "liu2011"}},
