@@ -39,7 +39,9 @@ def changed(truths: dict[str, TruthPoses], place: Floats | float, turn: Floats |
     return {
         name: replace(
             one,
-            position_m=one.position_m @ place.T if np.ndim(place) == 2 else place * one.position_m,
+            position_m=one.position_m @ place.T
+            if isinstance(place, np.ndarray) and place.ndim == 2
+            else place * one.position_m,
             world_from_body=turn * one.world_from_body,
         )
         for name, one in truths.items()
