@@ -5,12 +5,12 @@ copies objects; nothing is restored from it.
 """
 
 import copyreg
+import functools
 import hashlib
 import re
 import types
 from collections.abc import Mapping, Set
 from enum import Enum
-from functools import cached_property
 from pathlib import PurePath
 from typing import Any
 
@@ -70,6 +70,8 @@ class _StateText:
             return _array_text(np.asarray(value), kind)
         if isinstance(function := getattr(value, "py_func", value), types.FunctionType):  # compiled by numba, or plain
             return self._function(function, where)
+        if isinstance(value, functools._lru_cache_wrapper):
+            return f"cached {self.describe(value.__wrapped__, where)}"
         if isinstance(value, types.BuiltinFunctionType | types.MethodType):
             function, owner = getattr(value, "__func__", None), value.__self__
             bound = "" if isinstance(owner, types.ModuleType) else f" of {self.describe(owner, where)}"
@@ -113,7 +115,10 @@ class _StateText:
             state = {**(state[0] or {}), **state[1]}
         if isinstance(state, dict):
             computed = {
-                name for base in kind.__mro__ for name, v in vars(base).items() if isinstance(v, cached_property)
+                name
+                for base in kind.__mro__
+                for name, v in vars(base).items()
+                if isinstance(v, functools.cached_property)
             }
             names = sorted(name for name in state if name not in computed)
             parts += [f"{name}={self.describe(state[name], f'{where}.{name}')}" for name in names]
