@@ -11,6 +11,7 @@ import re
 import types
 from collections.abc import Mapping, Set
 from enum import Enum
+from functools import cached_property
 from pathlib import PurePath
 from typing import Any
 
@@ -115,10 +116,7 @@ class _StateText:
             state = {**(state[0] or {}), **state[1]}
         if isinstance(state, dict):
             computed = {
-                name
-                for base in kind.__mro__
-                for name, v in vars(base).items()
-                if isinstance(v, functools.cached_property)
+                name for base in kind.__mro__ for name, v in vars(base).items() if isinstance(v, cached_property)
             }
             names = sorted(name for name in state if name not in computed)
             parts += [f"{name}={self.describe(state[name], f'{where}.{name}')}" for name in names]
