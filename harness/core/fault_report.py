@@ -85,7 +85,7 @@ def describe_fault(error: BaseException) -> tuple[str, str]:
         case SystemFault():
             cause, advice = error.what, error.advice
         case MemoryError():
-            cause, advice = f"not enough memory ({error or 'MemoryError'}).", _ADVICE[errno.ENOMEM]
+            cause, advice = f"not enough memory ({str(error) or 'MemoryError'}).", _ADVICE[errno.ENOMEM]
         case OSError() if error.errno is not None:
             names = " to ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
             cause = f"{error.strerror or type(error).__name__}{f' ({names})' if names else ''}."

@@ -5,6 +5,7 @@ copies objects; nothing is restored from it.
 """
 
 import copyreg
+import functools
 import hashlib
 import re
 import types
@@ -70,6 +71,8 @@ class _StateText:
             return _array_text(np.asarray(value), kind)
         if isinstance(function := getattr(value, "py_func", value), types.FunctionType):  # compiled by numba, or plain
             return self._function(function, where)
+        if isinstance(value, functools._lru_cache_wrapper):
+            return f"cached {self.describe(value.__wrapped__, where)}"
         if isinstance(value, types.BuiltinFunctionType | types.MethodType):
             function, owner = getattr(value, "__func__", None), value.__self__
             bound = "" if isinstance(owner, types.ModuleType) else f" of {self.describe(owner, where)}"

@@ -33,6 +33,11 @@ def test_an_error_of_a_library_names_its_variables(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(("text", "cause"), [("", "(MemoryError)"), ("1 TiB", "(1 TiB)")])
+def test_a_lack_of_memory_is_named(text: str, cause: str) -> None:
+    assert describe_fault(MemoryError(text))[0] == f"not enough memory {cause}."
+
+
 def test_a_command_says_so() -> None:
     environment = {**os.environ, "NUMBA_NUM_THREADS": "0"}
     command = [sys.executable, "-m", "harness", "list"]

@@ -242,7 +242,7 @@ def test_options_are_those_of_another_process(folder: Path) -> None:
 def test_hashes_of_texts_and_the_temporary_folder_are_those_of_another_server(folder: Path) -> None:
     parts = "(hash('left'), list({*'abcdefgh'}), tempfile.gettempdir() + '/tables')"
     write_plain(folder, 0.1, f"import tempfile; self.parts = {parts}")
-    texts = set()
+    texts = set[str]()
     for _ in range(2):
         texts.add(describe_options(resolve_method("plain:Plain", Isolation())))
         close_methods()

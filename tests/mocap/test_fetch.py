@@ -180,7 +180,7 @@ def test_an_index_that_is_there_is_added_to(site: Site, tmp_path: Path) -> None:
 
 def test_two_fetches_at_once_add_to_one_index(site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_clip(site.folder / "subjects", replace(clip(name="92_01"), subject="92"))
-    others = []
+    others: list[threading.Thread] = []
 
     def read_while_another_fetches(path: Path) -> dict[str, dict[str, str]]:
         rows = read_index(path)
