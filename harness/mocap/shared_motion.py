@@ -165,7 +165,7 @@ def _compare(first: Clip, first_runs: Sequence[range], second: Clip, second_runs
     return out
 
 
-def _nearest(poses: Floats, path: Floats) -> tuple[Ints, Floats]:
+def _nearest(poses: Singles, path: Singles) -> tuple[Ints, Floats]:
     """(N,) the row of a path (T, D) that is nearest to each pose (N, D), and their root mean square difference."""
     squared = np.sum(path**2, axis=1) - 2.0 * (poses @ path.T)
     nearest = np.argmin(squared, axis=1)
@@ -173,7 +173,7 @@ def _nearest(poses: Floats, path: Floats) -> tuple[Ints, Floats]:
     return nearest, np.sqrt(np.maximum(least, 0.0) / poses.shape[1])
 
 
-def _squared_distance_to_path(poses: Floats, path: Floats, nearest: Ints) -> Floats:
+def _squared_distance_to_path(poses: Singles, path: Singles, nearest: Ints) -> Floats:
     """(N,) mean squared difference of poses to the two segments of a path that meet in the nearest row."""
     least = np.full(len(poses), np.inf)
     for other in (np.maximum(nearest - 1, 0), np.minimum(nearest + 1, len(path) - 1)):
@@ -184,14 +184,14 @@ def _squared_distance_to_path(poses: Floats, path: Floats, nearest: Ints) -> Flo
     return least
 
 
-def _window_mean(values: Floats | Bools, window: int) -> Floats:
+def _window_mean(values: Floats | Singles | Bools, window: int) -> Floats:
     """(N - window + 1, ...) means of values (N, ...) over each window."""
     sums = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
     out: Floats = (sums[window:] - sums[:-window]) / window
     return out
 
 
-def _window_spread(samples: Floats, window: int) -> Floats:
+def _window_spread(samples: Singles, window: int) -> Floats:
     """(N - window + 1,) root mean square deviation of descriptions (N, D) in each window from their mean."""
     variance = _window_mean(samples**2, window) - _window_mean(samples, window) ** 2
     out: Floats = np.sqrt(np.maximum(np.mean(variance, axis=1), 0.0))

@@ -208,7 +208,9 @@ def hidden(clip: Clip, length_s: float) -> Clip:
     pieces = take_rows(other, np.arange(middle)), part, take_rows(other, np.arange(middle, len(clip)))
     return replace(
         clip,
-        **{k: np.concatenate([getattr(c, k) for c in pieces]) for k in ("root_m", "world_from_root", "angles_rad")},
+        root_m=np.concatenate([piece.root_m for piece in pieces]),
+        world_from_root=np.concatenate([piece.world_from_root for piece in pieces]),
+        angles_rad=np.concatenate([piece.angles_rad for piece in pieces]),
     )
 
 
