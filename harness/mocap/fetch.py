@@ -218,4 +218,4 @@ def _write_index(top: Path, names: list[str]) -> None:
         with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
             file.write(csv_line(columns))
             file.writelines(csv_line([row.get(name) for name in columns]) for row in rows.values())
-    lock.unlink(missing_ok=True)
+        lock.unlink(missing_ok=True)  # while it is held: a lock on a removed file does not count
