@@ -217,7 +217,8 @@ def _waves(size: int) -> Floats:
     """(S, C, F) orthonormal directions: each component in the lowest modes of the cosine transform over a window."""
     modes = np.cos(np.pi / size * np.outer(np.arange(size) + 0.5, np.arange(min(size, _MODES))))
     modes /= np.sqrt(np.sum(modes**2, axis=0))
-    return np.einsum("sm,cd->scmd", modes, np.eye(_COMPONENTS)).reshape(size, _COMPONENTS, -1)
+    out: Floats = np.einsum("sm,cd->scmd", modes, np.eye(_COMPONENTS)).reshape(size, _COMPONENTS, -1)
+    return out
 
 
 def _along(values: Singles, components: Floats, directions: Floats, step: int) -> tuple[Floats, Floats]:
