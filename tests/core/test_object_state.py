@@ -98,7 +98,7 @@ CHANGES: dict[str, Callable[[], tuple[Any, Any]]] = {
     "a lambda": lambda: (lambda x: x + 1, lambda x: x + 2),
     "what a function captures": lambda: (scaled_by(2.0), scaled_by(3.0)),
     "arguments of a function": lambda: (functools.partial(power, exponent=2), functools.partial(power, exponent=3)),
-    "arguments of a cached function": lambda: tuple(functools.cache(scaled_by(by)) for by in (2, 3)),
+    "arguments of a cached function": lambda: (functools.cache(scaled_by(2.0)), functools.cache(scaled_by(3.0))),
     "a method of an object": lambda: (Plain(a=1).gain, Plain(a=2).gain),
     "a compiled function": lambda: (doubled, tripled),
     "a function of numpy": lambda: (np.tanh, np.sinh),
