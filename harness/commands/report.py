@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.core.progress import ProgressBar, show_steps
-from harness.errors import BadInput, Outcome
+from harness.errors import Outcome
 
 
 def add_report(verbs: Verbs) -> None:
@@ -24,10 +24,9 @@ def run_report(args: argparse.Namespace) -> Outcome:
     from harness.results.folder_kind import require_kind
 
     kind = require_kind(args.run, "run", "sweep", "placement", "paper")
-    if args.readme and kind != "paper":
-        raise BadInput(f"--readme with {args.run}, a {kind}.", "Name the folder that `harness paper` wrote.")
-    if args.movie and kind != "run":
-        raise BadInput(f"--movie with {args.run}, a {kind}.", "Movies show cells of a run: name the folder of a run.")
+    for option, needed in ((args.readme, "paper"), (args.movie, "run")):
+        if option:
+            require_kind(args.run, needed)
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
     from harness.report.run.writer import write_run_page

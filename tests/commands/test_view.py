@@ -113,7 +113,7 @@ def test_a_recording_of_an_unknown_room_shows_its_stations(
     [
         (["nothing.bvh"], "nothing.bvh: no such file or folder"),
         (["nothing"], "There is no file, folder or built-in take 'nothing', and no library was named."),
-        (["{tmp}"], "manifest.json: no such file"),
+        (["{tmp}"], "no results of the harness; expected a run"),
         (["{text}"], "no recording; expected a recording"),
         (["{empty}"], "an empty file"),
         (["{markers}"], "which holds markers"),

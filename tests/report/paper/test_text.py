@@ -172,8 +172,9 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
     assert "kim2012-cmu" in readme.read_text()
     assert (folder / "report.html").is_file()
     assert main(["report", str(folder), "--movie"]) == 2
+    assert "the study of a paper; expected a run." in capsys.readouterr().err
     assert main(["report", str(tmp_path), "--readme", str(readme)]) == 2
-    assert "where no findings.json is" in capsys.readouterr().err
+    assert "no results of the harness; expected" in capsys.readouterr().err
 
 
 def test_the_results_page_has_its_markers() -> None:
