@@ -220,7 +220,7 @@ def test_saved_errors_are_those_of_the_method_and_its_commit(
     capsys.readouterr()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_quick_run_compares_the_same_clips_and_resumes(
     mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
