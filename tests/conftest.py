@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from harness.core.seeds import generator
 
@@ -16,10 +16,10 @@ for number in (signal.SIGINT, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") els
 
 pytest_plugins = ["tests.scored_run"]
 
-settings.register_profile("fixed", derandomize=True)
+settings.register_profile("fixed", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("fixed")
-"""The same examples in every run, so that a change is judged by what it changed; `--hypothesis-profile=default`, as
-`make test-slow` has it, seeks new ones."""
+"""The same examples in every run, so that a change is judged by what it changed, and no limit of time, so that a busy
+machine fails nothing. `--hypothesis-profile=default`, as `make test-slow` has it, seeks new ones."""
 
 
 @pytest.fixture

@@ -185,6 +185,7 @@ def test_keys_step_and_play(page: Any) -> None:
     after = page.evaluate(CAMERA)
     assert after[1] == pytest.approx(before[1] + 0.1)
     assert after[2] == pytest.approx(0.9 * before[2])
+    page.evaluate("player.player.speed.value = 0.25")  # on a busy machine the end must not come before the second key
     stage.press(" ")
     page.wait_for_function("() => player.player.frame > 4")
     stage.press(" ")
