@@ -74,7 +74,7 @@ def add_emulate(verbs: Verbs) -> None:
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
     from harness.experiment.playback import prepare_playback
-    from harness.stream.codec.items import SINCE_FIRMWARE
+    from harness.stream.codec.items import missing_items
     from harness.stream.emulator.capacity import check_capacity, check_range
     from harness.stream.emulator.server import open_port, play_samples
     from harness.stream.emulator.udp_port import LOOPBACK, parse_udp_address
@@ -113,24 +113,22 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         )
         print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {names}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
-        lacking = any(
-            float(config.firmware[:4]) < SINCE_FIRMWARE.get(code, 0.0) for code in args.items or tracker.items
-        )
-        print_status(f"next, in another terminal: {shlex.join(_following(args, port.name, lacking))}")
+        quality = not missing_items(items, float(config.firmware[:4]))
+        print_status(f"next, in another terminal: {shlex.join(_following(args, port.name, quality=quality))}")
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
         counts = play_samples(samples, config, port, udp[0] if udp else LOOPBACK)
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
 
 
-def _following(args: argparse.Namespace, port: str, lacking: bool) -> list[str]:
+def _following(args: argparse.Namespace, port: str, *, quality: bool) -> list[str]:
     """The command that uses the emulated device: a calibration for its poses, else a live session.
 
-    `lacking`: the firmware has no item for the quality.
+    `quality`: records can report it, which needs an item that older firmware does not have.
     """
     verb, use = (["calibrate", "--live"], ["--out", "me.toml"]) if args.poses else (["live"], ["--view", "browser"])
     flags = repeat_flags(args, "stations", "clip", "rate", "items", "mocap", *([] if args.poses else ["seed"]))
-    flags += ["--quality", "mp"] if lacking else []
+    flags += [] if quality else ["--quality", "mp"]
     return ["harness", *verb, "--port", str(args.pty or port), "--scenario", args.scenario, *flags, *use]
 
 

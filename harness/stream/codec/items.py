@@ -4,6 +4,7 @@ A record is a row of a structured numpy type with one field per item, whether it
 binary layout itself; `ascii_records` converts text to the same rows.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -93,6 +94,11 @@ ITEMS: dict[int, OutputItem] = {
 and 76, whose ranges are known, have the layout of 40."""
 UNDOCUMENTED_ITEMS = (68, 69, 70, 71)
 """The auxiliary inputs. Their sizes are on pages of the manual that are illegible."""
+
+
+def missing_items(items: Iterable[int], firmware: float) -> list[int]:
+    """The items that firmware of this version does not have yet."""
+    return [code for code in items if firmware < SINCE_FIRMWARE.get(code, 0.0)]
 
 
 @lru_cache(maxsize=64)

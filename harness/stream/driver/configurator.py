@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from harness.errors import BadInput
 from harness.stream.codec import commands
-from harness.stream.codec.items import SINCE_FIRMWARE
+from harness.stream.codec.items import SINCE_FIRMWARE, missing_items
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.replies import OutputList, StatusRecord, SystemRecord, TrackingStatus
 from harness.stream.driver.capacity import check_capacity, required_bit_rate
@@ -32,13 +32,12 @@ def select_items(port: str, status: StatusRecord, config: DriverConfig) -> tuple
         return tuple(code for code in config.items if code not in QUALITY_ITEMS)
     match = re.match(r"\d+\.\d+", status.firmware)
     version = float(match[0]) if match else float("inf")  # unknown: the device itself accepts or refuses the list
-    for code in config.items:
-        if version < SINCE_FIRMWARE.get(code, 0.0):
-            raise BadInput(
-                f"Port {port}: firmware {status.firmware} has no item {code} (quality), "
-                f"which needs {SINCE_FIRMWARE[code]} or newer.",
-                "Use quality 'mp' (--quality mp), which queries the device once a second, or install newer firmware.",
-            )
+    for code in missing_items(config.items, version):
+        raise BadInput(
+            f"Port {port}: firmware {status.firmware} has no item {code} (quality), "
+            f"which needs {SINCE_FIRMWARE[code]} or newer.",
+            "Use quality 'mp' (--quality mp), which queries the device once a second, or install newer firmware.",
+        )
     return config.items
 
 

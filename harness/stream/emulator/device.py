@@ -5,7 +5,7 @@ sources are silent it follows section 14.
 """
 
 from harness.stream.codec.commands import Command, CommandReader
-from harness.stream.codec.items import SINCE_FIRMWARE
+from harness.stream.codec.items import missing_items
 from harness.stream.codec.replies import DeviceError
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN_COMMAND, CommandArgument, CommandError
@@ -77,5 +77,5 @@ class Device(DeviceState):
     def _check_items(self, argument: CommandArgument) -> None:
         """Raise CommandError for items that this firmware does not have yet."""
         for index, code in enumerate(argument.numbers()):
-            if float(self.firmware[:4]) < SINCE_FIRMWARE.get(int(code), 0.0):
+            if missing_items([int(code)], float(self.firmware[:4])):
                 raise CommandError(OUT_OF_RANGE, index + 2)
