@@ -13,6 +13,7 @@ least their correlation (inequality of Cauchy and Schwarz). Pairs whose bound is
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +30,8 @@ _COMPONENTS, _MODES = 8, 8
 transform over the window."""
 _ROUNDING = 1e-5
 """More than the error of a bound, which is computed in single precision."""
-_TOGETHER = 256
-"""Pairs of windows that are correlated at a time."""
+_TOGETHER, _BOUNDED = 256, 4_000_000
+"""Pairs of windows that are correlated at a time, and that are bounded at a time (16 MB)."""
 
 
 class Part(NamedTuple):
@@ -169,21 +170,24 @@ def _better_match(
         return None
     samples = np.arange(size)
 
-    def correlations(pairs: Ints) -> Floats:
-        b, a = np.divmod(pairs, len(start))
+    def correlations(block: Ints, pairs: Ints) -> Floats:
+        b, a = block[pairs // len(start)], pairs % len(start)
         x, y = mine[start[a, None] + EVERY * samples], theirs[mirrored[b, None], row[b, None] + samples]
         energies = bound.energy[start[a]] * energy[mirrored[b], row[b]]
         out: Floats = np.einsum("nke,nke->n", x, y, dtype=float) / np.sqrt(energies)
         return out
 
-    bounds = _with_rest(along[mirrored, row]) @ bound.features[start].T
-    correlation, pair = _largest(bounds.ravel(), correlations, 1.0 - limit * window.largest_loss)
-    share = (1.0 - correlation) / window.largest_loss
-    if share >= limit:
+    largest, pair = 1.0 - limit * window.largest_loss, None
+    for block in np.array_split(np.arange(len(row)), 1 + len(row) * len(start) // _BOUNDED):
+        bounds = _with_rest(along[mirrored[block], row[block]]) @ bound.features[start].T
+        found, number = _largest(bounds.ravel(), partial(correlations, block), largest)
+        if found > largest:
+            largest, pair = found, (block[number // len(start)], number % len(start))
+    if pair is None:
         return None
-    b, a = divmod(pair, len(start))
+    b, a = pair
     times_s = int(start[a]) / GRID_HZ, int(row[b]) * EVERY / GRID_HZ, size * EVERY / GRID_HZ
-    return Match(share, *times_s, bool(mirrored[b]))
+    return Match((1.0 - largest) / window.largest_loss, *times_s, bool(mirrored[b]))
 
 
 def _largest(bounds: Singles, values: Callable[[Ints], Floats], least: float) -> tuple[float, int]:

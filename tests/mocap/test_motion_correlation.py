@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Singles
+from harness.mocap import motion_correlation
 from harness.mocap.motion_correlation import EVERY, WINDOWS, FirstClip, best_match
 
 WIDTH = 24
@@ -32,8 +33,12 @@ def least_share(first: Singles, second: Singles) -> float:
     return min(shares)
 
 
+@pytest.mark.parametrize("at_a_time", [4_000_000, 500])
 @pytest.mark.parametrize("noise", [0.0, 0.02, 1.0])
-def test_the_best_match_is_that_of_all_pairs(rng: np.random.Generator, noise: float) -> None:
+def test_the_best_match_is_that_of_all_pairs(
+    rng: np.random.Generator, noise: float, at_a_time: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motion_correlation, "_BOUNDED", at_a_time)
     moments = 340
     first, other = smooth_changes(rng, moments), smooth_changes(rng, 420)
     other[:moments] = (1.0 - noise) * first + noise * other[:moments]
