@@ -168,7 +168,7 @@ def test_the_system_discards_what_waits_in_a_line_that_is_unplugged(tmp_path: Pa
     line.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_short_soak(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Half a minute of the faults with fixed times: burst, stall, disconnection."""
     check_result(run_soak(36.0, tmp_path, seed=1), capsys)

@@ -17,6 +17,9 @@ is known to 10 %."""
 MAX_STAMP_S = 1e7
 """Stamps beyond this are damaged: 32-bit milliseconds have a step of one second there [s]."""
 
+MAX_RATE_DIFFERENCE = 1e-3
+"""The host's and the device's clock differ in rate by less than this share; crystals differ by 1e-4 [choice]."""
+
 _FIRST_CHUNK = 32
 """Number of records in the first chunk that is checked at once; each further chunk is twice as long."""
 
@@ -28,10 +31,10 @@ class ClockUnwrapper:
     """Converts stamps to seconds that continue where the clock was set back.
 
     A stamp is ahead when it has advanced since its station's last stamp by more than a period and by more than the
-    host's clock. A stamp that is ahead, or that steps back by more than `CLOCK_TOLERANCE_S`, is damaged (NaN), unless
-    the next stamp agrees with it. Time then goes on, or it continues by the host's clock where the device has reset its
-    own. A smaller step back is returned as it is, since the stamp before it may be the wrong one; `TimeOrder` removes
-    it.
+    host's clock, unless other records were read as soon after their stamps: then the host read the last one late. A
+    stamp that is ahead, or that steps back by more than `CLOCK_TOLERANCE_S`, is damaged (NaN), unless the next stamp
+    agrees with it. Time then goes on, or it continues by the host's clock where the device has reset its own. A smaller
+    step back is returned as it is, since the stamp before it may be the wrong one; `TimeOrder` removes it.
     """
 
     def __init__(self, period_s: float, zeroed_s: float | None = None) -> None:
@@ -48,6 +51,8 @@ class ClockUnwrapper:
         """The last accepted record of each station, unwrapped."""
         self._rejected: _Moment | None = None
         """The latest record with its raw stamp, if it was not accepted."""
+        self._least_lag_s = np.inf
+        """Least `_lag_s` of the accepted records, which is that of the records that were read at once [s]."""
         self.resets = 0
         """Number of times the clock was reset."""
 
@@ -71,6 +76,7 @@ class ClockUnwrapper:
                 at = int(np.flatnonzero(station == row)[-1])
                 self._last_of[row] = float(out[at]), float(received_s[at])
             self._last = float(out[-1]), float(received_s[-1])
+            self._least_lag_s = min(self._least_lag_s, float(_lag_s(out, received_s).min()))
             return out
         for i, record in enumerate(zip(stamp_s.tolist(), received_s.tolist(), station.tolist(), strict=True)):
             out[i] = self._unwrap_one(*record)
@@ -121,16 +127,28 @@ class ClockUnwrapper:
     def _follows(self, previous: _Moment, current: _Moment, own: _Moment | None = None) -> bool:
         """Whether a record may follow the previous one of any station, and the last of its own station if given."""
         device_s, host_s = (a - b for a, b in zip(current, own or previous, strict=True))
-        return previous[0] <= current[0] and device_s < max(host_s, self._period_s) + AHEAD_SHARE * self._period_s
+        if device_s >= max(host_s, self._period_s) + AHEAD_SHARE * self._period_s:
+            return own is not None and previous[0] <= current[0] and self._is_read_late(current)
+        return previous[0] <= current[0]
+
+    def _is_read_late(self, now: _Moment) -> bool:
+        """Whether other records were read as soon after their stamps, so that this stamp is not ahead."""
+        return bool(_lag_s(*now) >= self._least_lag_s - AHEAD_SHARE * self._period_s)
 
     def _accept(self, now: _Moment, station: int) -> float:
         self._last, self._last_of[station], self._rejected = now, now, None
+        self._least_lag_s = min(self._least_lag_s, float(_lag_s(*now)))
         return now[0]
 
     def _reject(self, stamp_s: float, now: _Moment, station: int) -> float:
         self._rejected = stamp_s, now[1]
         self._last_of.pop(station, None)  # the wrong one may be the station's last, which the host may have read late
         return float("nan")
+
+
+def _lag_s(measured_s: Floats | float, received_s: Floats | float) -> Floats | float:
+    """Host time minus device time, by a host's clock that is certainly the slower one [s]."""
+    return (1.0 - MAX_RATE_DIFFERENCE) * received_s - measured_s
 
 
 class TimeOrder:

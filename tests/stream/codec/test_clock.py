@@ -133,15 +133,33 @@ def test_a_stamp_that_is_ahead_by_less_than_the_hosts_delays_is_damaged(ahead_s:
     assert np.flatnonzero(np.isnan(out)).tolist() == [102]
 
 
-def test_a_lost_record_read_early_costs_one_stamp_at_most() -> None:
-    """The round before was read 20 ms late, then a round is missing: two periods by the device, one by the host."""
-    stamp_s, late_s = stamps_s(50), np.zeros(200)
-    late_s[96:100] = 0.020
-    kept = np.delete(np.arange(200), np.arange(100, 104))
+@pytest.mark.parametrize("chunks", [1, 7, 196])
+@pytest.mark.parametrize("late_s", [0.020, 0.2])
+@pytest.mark.parametrize("lost", [[98], [100, 101, 102, 103], [97, 102]])
+def test_a_lost_record_after_one_that_was_read_late_costs_no_further_stamp(
+    lost: list[int], late_s: float, chunks: int
+) -> None:
+    """The rounds 23 and 24 were read late: a busy host. By the device's clock the next record is two periods after its
+    station's last one, and by the host's clock less than one.
+    """
+    stamp_s = stamps_s(50)
+    read_s = np.maximum.accumulate(stamp_s + np.where(np.arange(200) // 4 == 23, late_s, 0.0))
+    kept = np.delete(np.arange(200), lost)
     clock = ClockUnwrapper(1.0 / RATE_HZ)
-    out = clock.unwrap(stamp_s[kept], (stamp_s + 1000.0 + late_s)[kept], kept % 4)
-    assert int(np.isnan(out).sum()) <= 1
+    columns = (np.array_split(column, chunks) for column in (stamp_s[kept], 1000.0 + read_s[kept], kept % 4))
+    out = np.concatenate([clock.unwrap(*part) for part in zip(*columns, strict=True)])
+    np.testing.assert_array_equal(out, stamp_s[kept])
     assert clock.resets == 0
+
+
+@pytest.mark.parametrize("rate", [1.0 - 5e-4, 1.0, 1.0 + 5e-4])
+def test_a_stamp_ahead_is_damaged_whatever_the_clocks_rates(rate: float) -> None:
+    """The host's earliest reading is that of the last seconds, so that a drift of the clocks hides nothing."""
+    stamp_s = stamps_s(2400)
+    received_s = 1000.0 + rate * stamp_s
+    stamp_s[9402] += 0.032
+    out, _ = unwrap(stamp_s, received_s)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [9402]
 
 
 def test_times_that_do_not_advance_are_removed() -> None:
