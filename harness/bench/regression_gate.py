@@ -16,7 +16,7 @@ from scipy import special
 from harness.bench.null_errors import METRICS, ErrorPopulation, load_population
 from harness.bench.rows import BenchmarkRow
 from harness.compare.margins import margin_of
-from harness.compare.paired_statistics import bootstrap_interval
+from harness.compare.paired_statistics import mean_interval
 from harness.compare.significance import SIGNIFICANCE, decide_verdicts, holm, sign_flip_p
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
@@ -40,7 +40,7 @@ class SimulatedComparison:
         """(L,) which lines are called worse: as `decide_verdicts`, but without intervals that cannot change this."""
         p_holm = holm([sign_flip_p(line) for line in self.differences])
         lines = zip(self.differences, self.margins, p_holm, strict=True)
-        return np.array([p <= SIGNIFICANCE and d.mean() > m and bootstrap_interval(d)[0] > 0.0 for d, m, p in lines])
+        return np.array([p <= SIGNIFICANCE and d.mean() > m and mean_interval(d)[0] > 0.0 for d, m, p in lines])
 
     @property
     def verdicts(self) -> list[str]:
@@ -112,7 +112,7 @@ def interval_coverage(population: ErrorPopulation, clips: int, studies: int, see
     for n in range(studies):
         picked = generator(seed, "gate", "covered", clips, n).integers(0, len(population.clips), clips)
         for line in difference.reshape(-1, len(population.clips)):
-            low, high = bootstrap_interval(line[picked])
+            low, high = mean_interval(line[picked])
             contained.append(low <= line.mean() <= high)
     return float(np.mean(contained))
 

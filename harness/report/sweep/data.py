@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.margins import GATED_METRICS
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
 from harness.compare.ranking import ClipValues
 from harness.core.arrays import Bools, Floats, Ints
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
@@ -111,7 +111,7 @@ class SweepData:
         if not len(means):
             return Statistic(None, 0)
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
-        low, high = bootstrap_interval(means) if with_interval and len(means) >= MIN_CLIPS else (None, None)
+        low, high = mean_interval(means) if with_interval and len(means) >= MIN_CLIPS else (None, None)
         return Statistic(float(means.mean()), len(means), sd, low, high)
 
 

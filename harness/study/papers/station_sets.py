@@ -11,7 +11,7 @@ from harness.compare.paired_statistics import (
     CONFIDENCE_LEVEL,
     MIN_CLIPS,
     PairedDifference,
-    bootstrap_interval,
+    mean_interval,
 )
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, Claim, ClaimKind, FindingsTable, LineChart
@@ -176,7 +176,7 @@ def ranked_bars(title: str, sets: ErrorsBySet, caption: str) -> BarChart:
     """A bar for each set, the best first, with the 95 % interval of its mean where there are enough clips."""
     order = sorted((name for name in sets if sets[name]), key=lambda name: _mean_error(sets[name]))
     enough = [np.array(list(sets[name].values())) if len(sets[name]) >= MIN_CLIPS else None for name in order]
-    ends = [(None, None) if values is None else bootstrap_interval(values) for values in enough]
+    ends = [(None, None) if values is None else mean_interval(values) for values in enough]
     return BarChart(
         title,
         "deg",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, compare_paired
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, compare_paired
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
@@ -322,7 +322,7 @@ def _with_held_out_error(best: BestSet, costs: Costs, sign: float) -> BestSet:
     values = np.array([sign * value for value in costs.values() if value is not None])
     if not len(values) or len(values) < len(costs):
         return best
-    low, high = bootstrap_interval(values) if len(values) >= MIN_CLIPS else (None, None)
+    low, high = mean_interval(values) if len(values) >= MIN_CLIPS else (None, None)
     mean = float(values.mean())
     return replace(best, held_out=mean, held_out_low=low, held_out_high=high, held_out_clips=len(values))
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, compare_paired
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, compare_paired
 from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -118,7 +118,7 @@ def min_clips(comparisons: int) -> int:
 def summarise_set(names: StationNames, rate_hz: float, errors: Costs) -> StationSetResult:
     """Summarise a set, with the interval of the mean where there are enough clips."""
     measured = {clip: value for clip, value in errors.items() if value is not None}
-    low, high = bootstrap_interval(np.array(list(measured.values()))) if len(measured) >= MIN_CLIPS else (None, None)
+    low, high = mean_interval(np.array(list(measured.values()))) if len(measured) >= MIN_CLIPS else (None, None)
     return StationSetResult(names, rate_hz, dict(errors), mean_cost(measured) if measured else None, low, high)
 
 

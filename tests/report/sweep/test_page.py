@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.cli import main
-from harness.compare.paired_statistics import bootstrap_interval
+from harness.compare.paired_statistics import mean_interval
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
 from harness.report.sweep import page as sweep_page
@@ -85,7 +85,7 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
     assert (found.clips, len(rows)) == (7, 14)
     assert found.mean == pytest.approx(np.mean(means))
     assert found.sd == pytest.approx(np.std(means, ddof=1))
-    assert (found.low, found.high) == pytest.approx(bootstrap_interval(np.array(means)))
+    assert (found.low, found.high) == pytest.approx(mean_interval(np.array(means)))
 
 
 def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> None:
