@@ -13,16 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from harness.bench.interval_coverage import coverage_rows, earlier_interval
 from harness.bench.null_errors import METRICS, ErrorPopulation, load_population
 from harness.bench.rows import BenchmarkRow
 from harness.compare.margins import margin_of
-from harness.compare.paired_statistics import mean_interval
+from harness.compare.paired_statistics import CONFIDENCE_LEVEL, mean_interval
 from harness.compare.significance import SIGNIFICANCE, decide_verdicts, holm, sign_flip_p
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
 
 COMPARISONS, CHANGED_COMPARISONS, COVERAGE_COMPARISONS = 1000, 200, 100
 RELATIVE_CHANGE = 0.03
+Interval = Callable[[Floats, float], tuple[float, float]]
+"""The interval of (n,) differences at a level."""
 Resampler = Callable[[ErrorPopulation, int, np.random.Generator], Floats]
 """Draws errors (M, K, n, 2) of a comparison with n clips."""
 
@@ -34,13 +37,18 @@ class SimulatedComparison:
     differences: list[Floats]
     """(n,) differences of each line; an increase is worse."""
     margins: list[float]
+    interval: Interval = mean_interval
 
     @property
     def worse(self) -> Bools:
         """(L,) which lines are called worse: as `decide_verdicts`, but without intervals that cannot change this."""
         p_holm = holm([sign_flip_p(line) for line in self.differences])
         lines = zip(self.differences, self.margins, p_holm, strict=True)
-        return np.array([p <= SIGNIFICANCE and d.mean() > m and mean_interval(d)[0] > 0.0 for d, m, p in lines])
+        found = [p <= SIGNIFICANCE and d.mean() > m and self._low(d) > 0.0 for d, m, p in lines]
+        return np.array(found)
+
+    def _low(self, difference: Floats) -> float:
+        return self.interval(difference, CONFIDENCE_LEVEL)[0]
 
     @property
     def verdicts(self) -> list[str]:
@@ -48,11 +56,11 @@ class SimulatedComparison:
         return [result.verdict for result in decide_verdicts(self.differences, self.margins)]
 
 
-def make_comparison(errors: Floats, margin: float = 1.0) -> SimulatedComparison:
+def make_comparison(errors: Floats, margin: float = 1.0, interval: Interval = mean_interval) -> SimulatedComparison:
     """Make the lines of errors (M, K, n, 2) with K `METRICS`; margins are multiplied by `margin`."""
     lines = [(errors[m, k], metric) for m in range(len(errors)) for k, metric in enumerate(METRICS)]
     margins = [margin * margin_of(metric).of(float(line[:, 0].mean())) for line, metric in lines]
-    return SimulatedComparison([line[:, 1] - line[:, 0] for line, _ in lines], margins)
+    return SimulatedComparison([line[:, 1] - line[:, 0] for line, _ in lines], margins, interval)
 
 
 def exchanged(population: ErrorPopulation, clips: int, rng: np.random.Generator) -> Floats:
@@ -85,7 +93,12 @@ def count_false_alarms(
 
 
 def detect_changes(
-    population: ErrorPopulation, clips: int, studies: int, seed: int, change: float = RELATIVE_CHANGE
+    population: ErrorPopulation,
+    clips: int,
+    studies: int,
+    seed: int,
+    change: float = RELATIVE_CHANGE,
+    interval: Interval = mean_interval,
 ) -> Bools:
     """(studies,) whether the changed line is called worse; each line is changed in turn."""
     lines = len(population.methods) * len(METRICS)
@@ -94,7 +107,7 @@ def detect_changes(
         errors = exchanged(population, clips, generator(seed, "gate", "changed", clips, n))
         method, metric = divmod(n % lines, len(METRICS))
         errors[method, metric, :, 1] *= 1.0 + change
-        detected.append(make_comparison(errors).worse[n % lines])
+        detected.append(make_comparison(errors, interval=interval).worse[n % lines])
     return np.array(detected)
 
 
@@ -154,7 +167,7 @@ def bench_regression_gate(seed: int = 1) -> list[BenchmarkRow]:
                 f"intervals that contain the mean of all stored clips, {clips} clips", share, "%", reference, ""
             )
         )
-    return rows
+    return [*rows, *coverage_rows(seed)]
 
 
 def _false_alarm_row(
@@ -170,9 +183,11 @@ def _detection_row(
     name: str, population: ErrorPopulation, clips: int, seed: int, *, gated: bool = False
 ) -> BenchmarkRow:
     detected = detect_changes(population, clips, CHANGED_COMPARISONS, seed)
+    earlier = detect_changes(population, clips, CHANGED_COMPARISONS, seed, interval=earlier_interval)
     share_by_metric = {metric: float(detected[k :: len(METRICS)].mean()) for k, metric in enumerate(METRICS)}
     by_metric = ", ".join(f"{metric} {share:.0%}" for metric, share in share_by_metric.items())
     count = int(detected.sum())
     limit = 100.0 * lower_confidence_rate(count, CHANGED_COMPARISONS)
-    reference = f"{count} of {CHANGED_COMPARISONS} studies, at least {limit:.0f} % with 95 % confidence; {by_metric}"
+    reference = f"{count} of {CHANGED_COMPARISONS} studies, at least {limit:.0f} % with 95 % confidence; {by_metric}; "
+    reference += f"earlier version {earlier.mean():.1%}"
     return BenchmarkRow(name, 100.0 * count / CHANGED_COMPARISONS, "%", reference, ">= 90" if gated else "")

@@ -28,7 +28,6 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
     from harness.compare.comparison import compare_runs
-    from harness.compare.margins import GATED_METRICS
     from harness.core.files import to_json_types
     from harness.core.options import split_outside_brackets
     from harness.report.comparison.writer import text, write_comparison_page
@@ -42,7 +41,7 @@ def run_compare(args: argparse.Namespace) -> Outcome:
         args.a,
         args.b,
         methods=(methods[0], methods[-1]) if methods else None,
-        metrics=args.metrics.split(",") if args.metrics else GATED_METRICS,
+        metrics=args.metrics.split(",") if args.metrics else None,
         allow=args.allow.split(",") if args.allow else None,
     )
     with show_steps("parts of the report"):

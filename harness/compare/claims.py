@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from harness.compare.margins import margin_of
-from harness.compare.paired_statistics import MIN_CLIPS, compare_paired
+from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.results.findings import Claim, ClaimKind, ClaimVerdict, Reading
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -183,7 +183,7 @@ def _with_correction(claim: Claim, p: float, statements: int) -> Claim:
 def _paired_p(more: Errors, less: Errors, clips: Iterable[str]) -> float | None:
     """p of the paired differences by sign flips; None with too few clips for an interval."""
     difference = np.array([more[clip] - less[clip] for clip in clips])
-    return sign_flip_p(difference) if len(difference) >= MIN_CLIPS else None
+    return sign_flip_p(difference) if len(difference) >= MIN_UNITS else None
 
 
 def claim_published_value(

@@ -26,8 +26,8 @@ from harness.compare.matching import (
     pair_cells,
 )
 from harness.compare.significance import Verdict
+from harness.compare.units import Performers
 from harness.core.files import to_json_types
-from harness.core.split import count_performers
 from harness.errors import Outcome
 from harness.results.manifest import Manifest, flatten
 from harness.results.reader import ResultSet, load_results
@@ -64,8 +64,6 @@ class Comparison:
     """Groups in which the sides cover different shares of the frames, or less than 95 %."""
     failed: tuple[str, ...] = ()
     """Planned cells that failed on either side, such as "A: ik on walking_p1_01"."""
-    performers: str = ""
-    """How many performers the clips of the gated lines are of, such as "3 performers"; "" where one is not known."""
 
 
 def compare_results(
@@ -73,12 +71,13 @@ def compare_results(
     b: ResultSet,
     *,
     methods: tuple[str, str] | None = None,
-    metrics: Sequence[str] = GATED_METRICS,
+    metrics: Sequence[str] | None = None,
     allow: Sequence[str] | None = None,
 ) -> Comparison:
     """Pair the cells, check that they are comparable, and test every gated metric of every group.
 
-    `methods` compares the first of them in A with the second in B. `allow` may hold
+    `methods` compares the first of them in A with the second in B. `metrics` are by default `GATED_METRICS`, without
+    times where different methods are compared: a slower method is another choice, not a regression. `allow` may hold
 
     - names of inputs that may differ, with all inputs inside them;
     - names of `RELAXABLE_KEYS` in which the cells of a pair may differ;
@@ -89,6 +88,9 @@ def compare_results(
     or a gated line is undecided; PASS. Times are gated only where both sides were measured on the same processor.
     UnknownName for metrics, methods and allowances that do not exist; BadInput for duplicate cells.
     """
+    between_methods = methods is not None and len({name.partition("[")[0] for name in methods}) > 1
+    if metrics is None:
+        metrics = [metric for metric in GATED_METRICS if not (between_methods and metric in TIME_METRICS)]
     metrics = tuple(dict.fromkeys(metrics))
     for metric in metrics:
         margin_of(metric)
@@ -100,8 +102,9 @@ def compare_results(
     allowed = summarise_differences({name: text for name, text in differing.items() if is_allowed(allowance, name)})
     groups = [] if refused else group_pairs(matched.pairs)
     gated = _gated_metrics(metrics, a.manifest, b.manifest)
-    informed = [metric for metric in (*metrics, *INFORMATIVE_METRICS) if metric not in gated]
-    differences = compare_groups(groups, gated, dict.fromkeys(informed))
+    informed = [metric for metric in (*metrics, *GATED_METRICS, *INFORMATIVE_METRICS) if metric not in gated]
+    performers = _merge_performers(a.manifest, b.manifest)
+    differences = compare_groups(groups, gated, dict.fromkeys(informed), performers)
     faults = {"coverage": find_coverage_faults(groups, metrics), "cells": find_unpaired_cells(matched)}
     faults_refused = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
     missing = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
@@ -120,7 +123,6 @@ def compare_results(
         why=why,
         coverage=tuple(faults["coverage"]),
         failed=missing,
-        performers=_count_performers(differences, a.manifest, b.manifest),
     )
 
 
@@ -129,7 +131,7 @@ def compare_runs(
     b: Path | str | None = None,
     *,
     methods: tuple[str, str] | None = None,
-    metrics: Sequence[str] = GATED_METRICS,
+    metrics: Sequence[str] | None = None,
     allow: Sequence[str] | None = None,
 ) -> Comparison:
     """Load two results and compare them, A as the reference; without B, two methods of A (see `compare_results`).
@@ -141,11 +143,10 @@ def compare_runs(
     return compare_results(reference, other, methods=methods, metrics=metrics, allow=allow)
 
 
-def _count_performers(differences: Sequence[Difference], a: Manifest, b: Manifest) -> str:
-    """The performers of the clips of the gated lines, as either side knows them."""
+def _merge_performers(a: Manifest, b: Manifest) -> Performers | None:
+    """The performers that either side knows; None where neither stored any, so that names tell them."""
     sides = [side.performers for side in (a, b) if side.performers is not None]
-    clips = {clip for line in differences if line.gated for clip in line.clips}
-    return count_performers(clips, {clip: who for side in sides for clip, who in side.items()} if sides else None)
+    return {clip: who for side in sides for clip, who in side.items()} if sides else None
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:

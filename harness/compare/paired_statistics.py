@@ -37,7 +37,7 @@ class PairedDifference:
     mean: float | None
     """Mean difference; None without clips."""
     low: float | None = None
-    """Lower end of the 95 % interval; None with fewer than `MIN_CLIPS` clips."""
+    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` clips."""
     high: float | None = None
     """Upper end."""
 
@@ -56,7 +56,7 @@ class PairedDifference:
         if not self.clips:
             return "no clip was measured on both sides"
         if self.low is None:
-            return f"too few clips: {len(self.clips)}, of at least {MIN_CLIPS}"
+            return f"too few clips: {len(self.clips)}, of at least {MIN_UNITS}"
         return {"cannot tell": "the interval contains zero", "not reproduced": "the difference has the other sign"}.get(
             self.verdict, ""
         )
@@ -76,7 +76,7 @@ def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None])
     if not clips:
         return PairedDifference((), None)
     mean = float(difference.mean())
-    if len(clips) < MIN_CLIPS:
+    if len(clips) < MIN_UNITS:
         return PairedDifference(clips, mean)
     return PairedDifference(clips, mean, *mean_interval(difference))
 

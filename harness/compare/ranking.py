@@ -1,8 +1,9 @@
-"""Ranking of methods on the same clips, with the statistics of `compare_runs`.
+"""Ranking of methods on the same clips, with the statistics of `compare_runs` over units.
 
 The method with the lowest mean is compared with each other one, as `harness compare RUN --methods OTHER,LOWEST` does.
-The lines of all these pairs are tested together: the ranked metric and the gated ones. Holm's correction therefore
-covers at least the lines of each of those comparisons, and a ranking never says *better* where they cannot tell.
+The lines of all these pairs are tested together: the ranked metric and the gated ones but for times, which are not
+gated between methods. Holm's correction therefore covers at least the lines of each of those comparisons, and a ranking
+never says *better* where they cannot tell.
 
 Methods with different lags are never ranked together: one that waits for later frames solves another task.
 """
@@ -12,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.margins import GATED_METRICS, margin_of
-from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.margins import GATED_METRICS, TIME_METRICS, margin_of
+from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
+from harness.compare.units import Performers, average_units
 from harness.core.arrays import Floats
 
 ClipValues = Mapping[str, Mapping[str, float]]
@@ -28,12 +30,14 @@ class MethodRanking:
     metric: str
     clips: tuple[str, ...]
     """(C,) clips on which all methods were measured, sorted."""
+    units: tuple[str, ...]
+    """(U,) their units, sorted (see `units`)."""
     values: Mapping[str, Floats]
-    """Method -> (C,) values, the lowest mean first."""
+    """Method -> (U,) values, the lowest mean first."""
     results: Mapping[str, SignificanceResult]
-    """Other method -> verdict on the first one against it, over the clips on which both were measured."""
+    """Other method -> verdict on the first one against it, over the units on which both were measured."""
     differences: Mapping[str, float]
-    """Other method -> its mean minus that of the first one, over the clips on which both were measured."""
+    """Other method -> its mean minus that of the first one, over the units on which both were measured."""
 
     @property
     def lowest(self) -> str:
@@ -42,7 +46,7 @@ class MethodRanking:
 
     @property
     def means(self) -> dict[str, float]:
-        """Method -> mean over the clips, the lowest first."""
+        """Method -> mean over the units, the lowest first."""
         return {name: float(values.mean()) for name, values in self.values.items()}
 
     @property
@@ -66,42 +70,49 @@ def split_by_lag(values: Mapping[str, ClipValues], lags: Mapping[str, int]) -> d
     return parts
 
 
-def rank_methods(values: Mapping[str, ClipValues], metric: str) -> MethodRanking | None:
+def rank_methods(
+    values: Mapping[str, ClipValues], metric: str, performers: Performers | None = None
+) -> MethodRanking | None:
     """Rank methods by a metric with a margin, of which lower values are better; None when they share no clip.
 
-    Methods without a value of the metric are left out.
+    Methods without a value of the metric are left out. `performers` are those of `unit_of`.
     """
     measured = {name: by_metric for name, by_metric in values.items() if by_metric.get(metric)}
     clips = shared_clips(by_metric[metric] for by_metric in measured.values())
     if not clips:
         return None
-    columns = {name: np.array([of[metric][clip] for clip in clips]) for name, of in measured.items()}
+    by_unit = {
+        name: average_units({clip: of[metric][clip] for clip in clips}, performers) for name, of in measured.items()
+    }
+    columns = {name: np.array(list(of_unit.values())) for name, of_unit in by_unit.items()}
+    units = tuple(next(iter(by_unit.values())))
     lowest, *others = sorted(columns, key=lambda name: float(columns[name].mean()))
-    metrics = dict.fromkeys((metric, *GATED_METRICS))
+    metrics = dict.fromkeys((metric, *(each for each in GATED_METRICS if each not in TIME_METRICS)))
     pairs = [(name, each) for each in metrics for name in others]
-    lines = [_paired(measured[name], measured[lowest], each) for name, each in pairs]
+    lines = [_paired(measured[name], measured[lowest], each, performers) for name, each in pairs]
     kept = [(line, margin) for line, margin in lines if len(line)]
     results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
     ordered = {name: columns[name] for name in (lowest, *others)}
     differences = {name: -float(line.mean()) for name, (line, _) in zip(others, kept, strict=False)}
-    return MethodRanking(metric, clips, ordered, dict(zip(others, results, strict=True)), differences)
+    return MethodRanking(metric, clips, units, ordered, dict(zip(others, results, strict=True)), differences)
 
 
-def find_best(values: Mapping[str, ClipValues], metric: str) -> str | None:
+def find_best(values: Mapping[str, ClipValues], metric: str, performers: Performers | None = None) -> str | None:
     """The method that is better than every other one by this metric, as `MethodRanking.best`; None when there is none.
 
     It computes intervals only where no single p already excludes this.
     """
     measured = {name: of[metric] for name, of in values.items() if of.get(metric)}
     clips = shared_clips(measured.values())
-    if len(measured) < 2 or len(clips) < MIN_CLIPS:
+    by_unit = {name: average_units({clip: of[clip] for clip in clips}, performers) for name, of in measured.items()}
+    if len(measured) < 2 or len(next(iter(by_unit.values()))) < MIN_UNITS:
         return None
-    lowest = min(measured, key=lambda name: np.mean([measured[name][clip] for clip in clips]))
+    lowest = min(measured, key=lambda name: np.mean(list(by_unit[name].values())))
     for name in measured:
-        line, _ = _paired(values[name], values[lowest], metric)
+        line, _ = _paired(values[name], values[lowest], metric, performers)
         if name != lowest and sign_flip_p(line) > SIGNIFICANCE:
             return None
-    ranking = rank_methods(values, metric)
+    ranking = rank_methods(values, metric, performers)
     return ranking.best if ranking else None
 
 
@@ -111,10 +122,13 @@ def shared_clips(values: Iterable[Mapping[str, float]]) -> tuple[str, ...]:
     return tuple(sorted(set.intersection(*sets))) if sets else ()
 
 
-def _paired(a: ClipValues, b: ClipValues, metric: str) -> tuple[Floats, float]:
-    """Differences b - a over the clips that both have, an increase being worse, and the margin for a reference a."""
+def _paired(a: ClipValues, b: ClipValues, metric: str, performers: Performers | None) -> tuple[Floats, float]:
+    """Differences b - a over the units that both have, an increase being worse, and the margin for a reference a."""
     clips: Sequence[str] = shared_clips((a.get(metric, {}), b.get(metric, {})))
-    before, after = (np.array([side[metric][clip] for clip in clips], dtype=float) for side in (a, b))
+    before, after = (
+        np.array(list(average_units({clip: side[metric][clip] for clip in clips}, performers).values()))
+        for side in (a, b)
+    )
     margin = margin_of(metric)
     difference: Floats = after - before if margin.rise_is_worse else before - after
     return difference, margin.of(float(before.mean())) if clips else 0.0

@@ -1,13 +1,14 @@
 """Verdicts on paired differences: sign-flip test, Holm's correction, practical importance.
 
-If A and B were equally good, the difference of each clip could equally have the other sign. The p of a line is the
+If A and B were equally good, the difference of each unit could equally have the other sign. The p of a line is the
 share of all sign flips whose mean is at least as far from zero as the observed mean (Fisher's randomisation test). It
-is exact for up to 16 clips; for more it uses 20,000 draws of a named generator. Holm 1979 corrects for the number of
-gated lines. A line whose sides agree on every clip can never differ significantly and is not counted (Tarone 1990).
-Nor is a line of fewer than `MIN_CLIPS` clips. Such a line can still be shown to be *same*, since equivalence needs an
+is exact for up to 16 units; for more it uses 20,000 draws of a named generator. Holm 1979 corrects for the number of
+gated lines. A line whose sides agree on every unit can never differ significantly and is not counted (Tarone 1990).
+Nor is a line of fewer than `MIN_UNITS` units. Such a line can still be shown to be *same*, since equivalence needs an
 interval within the margin and no p.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,15 +16,15 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, round_to_grid
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval, round_to_grid
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
 Verdict = Literal["better", "same", "worse", "cannot tell"]
 SIGNIFICANCE = 0.05
-_EXACT_CLIPS, _DRAWS = 16, 20_000
-_MAX_CACHED_CLIPS, _DRAWS_AT_ONCE = 64, 500
-"""Flips of more clips are drawn anew, a part at a time, so that thousands of clips fit into memory."""
+_EXACT_UNITS, _DRAWS = 16, 20_000
+_MAX_CACHED_UNITS, _DRAWS_AT_ONCE = 64, 500
+"""Flips of more units are drawn anew, a part at a time, so that thousands of units fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,10 @@ class SignificanceResult:
     verdict: Verdict
     why: str
     low: float | None = None
-    """Lower end of the 95 % interval of the mean; None with fewer than two clips, unless they have no difference."""
+    """Lower end of the 95 % interval of the mean; None with fewer than two units, unless they have no difference."""
     high: float | None = None
     p: float | None = None
-    """None, as `p_holm`, with fewer than `MIN_CLIPS` clips."""
+    """None, as `p_holm`, with fewer than `MIN_UNITS` units."""
     p_holm: float | None = None
     """`p` corrected for the number of lines."""
 
@@ -44,13 +45,13 @@ class SignificanceResult:
 def decide_verdicts(
     lines: Sequence[Floats], margins: Sequence[float], decided: Collection[int] | None = None
 ) -> list[SignificanceResult]:
-    """Decide on lines that are tested together; each has (clips,) differences and a margin; an increase is worse.
+    """Decide on lines that are tested together; each has (units,) differences and a margin; an increase is worse.
 
     *Worse* and *better*: p after Holm is at most 0.05, the interval excludes zero, and the mean exceeds the margin.
-    *Same*: the whole interval lies within the margin, or no clip differs. Anything else is undecided ("cannot tell").
+    *Same*: the whole interval lies within the margin, or no unit differs. Anything else is undecided ("cannot tell").
     `decided` names the lines whose results are needed, by default all; the others count in the correction alone.
     """
-    tested = [at for at, line in enumerate(lines) if len(line) >= MIN_CLIPS]
+    tested = [at for at, line in enumerate(lines) if len(line) >= MIN_UNITS]
     p = {at: sign_flip_p(lines[at]) for at in tested}
     counted = [at for at in tested if np.any(lines[at])]
     corrected = dict(zip(counted, holm([p[at] for at in counted]), strict=True))
@@ -58,7 +59,7 @@ def decide_verdicts(
     for at in range(len(lines)) if decided is None else decided:
         line, margin = lines[at], margins[at]
         if at not in p:
-            results.append(_decide_on_few_clips(line, margin))
+            results.append(_decide_on_few_units(line, margin))
             continue
         low, high = mean_interval(line)
         p_holm = corrected.get(at, 1.0)
@@ -67,14 +68,14 @@ def decide_verdicts(
     return results
 
 
-def _decide_on_few_clips(line: Floats, margin: float) -> SignificanceResult:
-    """*Same* or undecided: no p of fewer than `MIN_CLIPS` clips is small enough for a difference."""
+def _decide_on_few_units(line: Floats, margin: float) -> SignificanceResult:
+    """*Same* or undecided: no p of fewer than `MIN_UNITS` units is small enough for a difference."""
     if len(line) and not np.any(line):
-        return SignificanceResult("same", "no clip differs", 0.0, 0.0)
+        return SignificanceResult("same", "no unit differs", 0.0, 0.0)
     low, high = mean_interval(line) if len(line) > 1 else (None, None)
     if low is not None and high is not None and -margin <= low and high <= margin:
         return SignificanceResult("same", "the whole interval lies within the margin", low, high)
-    return SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}", low, high)
+    return SignificanceResult("cannot tell", f"too few units: {len(line)}, of at least {MIN_UNITS}", low, high)
 
 
 def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lines: int) -> tuple[Verdict, str]:
@@ -84,12 +85,23 @@ def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lin
     if -margin <= low and high <= margin:
         return "same", "the whole interval lies within the margin"
     if lines * smallest_possible_p(line) > SIGNIFICANCE:
-        return "cannot tell", f"too few clips: {len(line)} cannot show a difference among {lines} lines"
+        return "cannot tell", _describe_too_few(line, lines)
     if p > SIGNIFICANCE and excludes_zero:
         return "cannot tell", f"the difference is not significant among {lines} lines"
     if excludes_zero:
         return "cannot tell", "the sides differ, perhaps by more than the margin"
     return "cannot tell", "the interval contains zero and exceeds the margin"
+
+
+def _describe_too_few(line: Floats, lines: int) -> str:
+    differing, needed = int(np.count_nonzero(line)), count_needed(lines)
+    those = f"{differing} differ" if differing < len(line) else f"{len(line)}"
+    return f"too few units: {those}, and among {lines} lines a difference needs {needed}"
+
+
+def count_needed(lines: int = 1) -> int:
+    """The least number of units that differ, all in one direction, with which one of `lines` can be significant."""
+    return max(MIN_UNITS, math.ceil(1.0 + math.log2(max(lines, 1) / SIGNIFICANCE)))
 
 
 def sign_flip_p(difference: Floats) -> float:
@@ -99,7 +111,7 @@ def sign_flip_p(difference: Floats) -> float:
     values = round_to_grid(difference)
     least = abs(values.sum())
     extreme = sum(int(np.count_nonzero(np.abs(flips @ values) >= least)) for flips in _sign_flips(len(values)))
-    if len(values) <= _EXACT_CLIPS:
+    if len(values) <= _EXACT_UNITS:
         return extreme / float(2 ** (len(values) - 1))
     return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips
 
@@ -111,13 +123,13 @@ def smallest_possible_p(difference: Floats) -> float:
 
 def _sign_flips(count: int) -> Iterable[Floats]:
     """All flips or `_DRAWS` of them, as arrays (F, count) of signs -1 and 1."""
-    return (_cached_sign_flips(count),) if count <= _MAX_CACHED_CLIPS else _drawn_sign_flips(count)
+    return (_cached_sign_flips(count),) if count <= _MAX_CACHED_UNITS else _drawn_sign_flips(count)
 
 
 @lru_cache(maxsize=32)
 def _cached_sign_flips(count: int) -> Floats:
     """(F, count) signs. Where all are enumerated, the last is never flipped; the other half is symmetric."""
-    if count > _EXACT_CLIPS:
+    if count > _EXACT_UNITS:
         return np.concatenate(list(_drawn_sign_flips(count)))
     flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
     return 1.0 - 2.0 * flips.astype(float)

@@ -1,13 +1,12 @@
 """Splits: which motion a method may learn from (docs/notes/traps.md F1). A test clip is never among its examples."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from harness.core.number_format import count_noun
 from harness.errors import BadInput
 
 Split = Literal["block", "sequence", "subject"]
@@ -57,17 +56,6 @@ def performer_of(clip: str) -> str | None:
     """The performer that a clip's name tells: "p1" of walking_p1_01, "13" of CMU's 13_17; None for other names."""
     match = re.fullmatch(r"\w+_(p\d+)_\d+|(\d+)_\d+", clip)
     return (match[1] or match[2]) if match else None
-
-
-def count_performers(clips: Iterable[str], performers: Mapping[str, str] | None) -> str:
-    """How many performers clips are of, such as "3 performers"; "" where one of them is not known.
-
-    `clips` may be parts, and have a scenario before them ("demo: 13_17@0.20-0.40"). `performers` has the performer of
-    each clip whose performer is known (see `results.manifest.Manifest`); with None the names of the clips tell it.
-    """
-    names = {clip.rpartition(": ")[2].partition("@")[0] for clip in clips}
-    found = {performer_of(name) if performers is None else performers.get(name) for name in names}
-    return count_noun(len(found), "performer") if found and None not in found else ""
 
 
 def _format_share(share: float) -> str:

@@ -34,7 +34,6 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     `baseline_method`. `metrics` names what must not become worse. With --harness-save the result becomes the baseline
     instead; a new baseline is measured on `scenario` (a shipped one or a file).
     """
-    from harness.compare.margins import GATED_METRICS
     from harness.core.working_folder import serve_folder
     from harness.errors import HarnessError
     from harness.testing.regression_gate import RegressionGate
@@ -49,7 +48,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
         *,
         baseline_method: str | None = None,
         scenario: str | None = None,
-        metrics: tuple[str, ...] = GATED_METRICS,
+        metrics: tuple[str, ...] | None = None,
     ) -> None:
         __tracebackhide__ = True
         serve_folder(str(root))  # as on the command line, methods may lie there

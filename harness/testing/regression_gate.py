@@ -11,7 +11,7 @@ from pathlib import Path
 
 from harness.compare import baseline
 from harness.compare.comparison import Comparison, compare_results
-from harness.compare.margins import GATED_METRICS, margin_of
+from harness.compare.margins import margin_of
 from harness.core.fields import build
 from harness.core.files import content_key
 from harness.core.progress import ProgressCallback
@@ -70,7 +70,7 @@ class RegressionGate:
     """Called as cells end."""
 
     def check(
-        self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] = GATED_METRICS
+        self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] | None = None
     ) -> GateResult:
         """Run `method` (such as "my_module:MyMethod") on the scenario of baseline `name`, and compare.
 
@@ -80,7 +80,7 @@ class RegressionGate:
         """
         reference = self._read(name)
         methods = list(dict.fromkeys(cell.method for cell in reference.cells))
-        for metric in metrics:
+        for metric in metrics or ():
             margin_of(metric)  # refuses an unknown metric before the run
         baseline_method = against or (method if method in methods else methods[0] if len(methods) == 1 else None)
         if baseline_method is None:

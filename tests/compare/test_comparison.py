@@ -9,7 +9,8 @@ import pytest
 from harness.compare.comparison import EVERYTHING, Comparison, compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
-from harness.report.comparison.wording import sentence
+from harness.report.comparison.text import text
+from harness.report.comparison.wording import describe_parts, sentence
 from harness.results.reader import ResultSet
 from harness.score.metrics import DEFINITIONS
 from tests.compare.sides import SIZES, cell, manifest, side
@@ -82,7 +83,7 @@ def test_a_result_beside_itself_differs_by_exactly_nothing() -> None:
 def test_six_clips_show_a_difference_and_five_do_not() -> None:
     for clips, outcome in ((6, Outcome.REGRESSED), (5, Outcome.NOT_COMPARABLE)):
         assert found(side(methods={"ik": 2.0}, clips=clips), side(clips=clips)).outcome == outcome
-    assert "too few clips: 5, of at least 6" in found(side(methods={"ik": 2.0}, clips=5), side(clips=5)).why
+    assert "too few units: 5, of at least 6" in found(side(methods={"ik": 2.0}, clips=5), side(clips=5)).why
 
 
 @pytest.mark.parametrize("clips", [1, 2, 5])
@@ -114,12 +115,56 @@ def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:
     assert line.mean_a == pytest.approx(np.mean(line.a))
 
 
-def test_known_and_new_performers_inputs_and_protocols_are_never_pooled() -> None:
+def test_inputs_and_splits_are_never_pooled_and_known_and_new_performers_are_parts() -> None:
     parts = [side(), side(performer="new", seed=2), side(inputs="pos"), side(split="block")]
     run = ResultSet("A", manifest(), tuple(c for part in parts for c in part.cells), 32)
-    groups = [line.group for line in found(run, run).differences if line.gated]
-    texts = ["pos+ori, sequence, known", "pos+ori, sequence, new", "pos, sequence, known", "pos+ori, block, known"]
-    assert groups == texts
+    lines = found(run, run).differences
+    assert [line.group for line in lines if line.gated] == ["pos+ori, sequence", "pos, sequence", "pos+ori, block"]
+    assert [(line.group, line.part) for line in lines if line.part and line.metric == ANGLE] == [
+        ("pos+ori, sequence", "known performers"),
+        ("pos+ori, sequence", "new performers"),
+    ]
+
+
+def test_a_line_names_the_behaviour_that_decides_it() -> None:
+    """Eight performers box better by a fifth; eight others walk as before."""
+    clips = [f"{what}_p{n}_01" for what, first in (("walking", 1), ("boxing", 9)) for n in range(first, first + 8)]
+    sides = []
+    for times in (1.0, 0.8):
+        cells = [cell(clip, times=times + 0.01 * n if "boxing" in clip else 1.0) for n, clip in enumerate(clips)]
+        sides.append(
+            ResultSet("A", manifest(), tuple(replace(c, behaviour=c.clip.partition("_")[0]) for c in cells), 16)
+        )
+    comparison = found(sides[1], sides[0])
+    (line,) = [line for line in comparison.differences if line.gated]
+    assert (len(line.units), line.verdict) == (16, "better")
+    assert describe_parts(comparison, line) == "better for boxing (8 performers), the same elsewhere"
+    assert f"✓ ik {ANGLE}: better for boxing (8 performers), the same elsewhere" in text(comparison)
+    again = found(sides[0], sides[0])
+    assert describe_parts(again, again.differences[0]) == "the same in each part"
+
+
+def test_clips_of_one_performer_count_once() -> None:
+    """Eight clips of two performers are worse by 10 to 17 %, which two units cannot show."""
+    of_two = {f"walk_{n:02}": "Anna" if n < 4 else "Bert" for n in range(8)}
+    a, b = (
+        replace(each, manifest=replace(each.manifest, performers=of_two))
+        for each in (side(), side(methods={"ik": STEADY}))
+    )
+    comparison = found(b, a)
+    assert comparison.outcome == Outcome.NOT_COMPARABLE
+    (line,) = [line for line in comparison.differences if line.gated]
+    assert (line.units, len(line.clips)) == (("performer Anna", "performer Bert"), 8)
+    assert line.mean_b == pytest.approx(np.mean(line.b))
+
+
+def test_times_are_gated_between_versions_of_a_method_and_not_between_methods() -> None:
+    run = side(methods={"ik": 1.0, "ik[damping=2]": 1.0, "mean_pose": 1.0}, metrics={"step_relative": 2.0})
+    for other, gated in (("ik[damping=2]", True), ("ik", True), ("mean_pose", False)):
+        lines = compare_results(run, run, methods=("ik", other)).differences
+        assert {line.gated for line in lines if line.metric == "step_relative"} == {gated}
+    asked = compare_results(run, run, methods=("ik", "mean_pose"), metrics=["step_relative"]).differences
+    assert next(line for line in asked if line.metric == "step_relative").gated
 
 
 def test_a_metric_that_should_rise_is_worse_when_it_falls() -> None:
@@ -190,7 +235,7 @@ def test_what_one_side_alone_measured_is_told() -> None:
     b = replace(side(), cells=(replace(cells[0], metrics={**cells[0].metrics, ANGLE: None}), *cells[1:]))
     comparison = found(b)
     assert comparison.outcome == Outcome.NOT_COMPARABLE
-    assert comparison.why == f"ik (pos+ori, sequence, known): {ANGLE} was measured on one side only in 1 of 8 cells"
+    assert comparison.why == f"ik (pos+ori, sequence): {ANGLE} was measured on one side only in 1 of 8 cells"
     assert comparison.differences[0].clips == tuple(f"walk_{n:02}" for n in range(1, 8))
 
 
@@ -211,15 +256,13 @@ def test_circumstances_that_differ_are_listed() -> None:
 @pytest.mark.parametrize(
     ("known", "said"),
     [
-        ([{"walk_00": "Anna", "walk_01": "Bert", "walk_02": "Anna"}] * 2, "3 clips (2 performers)"),
-        ([None, {"walk_00": "Anna", "walk_01": "Anna", "walk_02": "Anna"}], "3 clips (1 performer)"),
-        ([{"walk_00": "Anna", "walk_01": "Anna"}] * 2, "3 clips:"),
-        ([None, None], "3 clips:"),
+        ([{"walk_00": "Anna", "walk_01": "Bert", "walk_02": "Anna"}] * 2, "on 2 performers:"),
+        ([None, {"walk_00": "Anna", "walk_01": "Anna", "walk_02": "Anna"}], "on 1 performer:"),
+        ([{"walk_00": "Anna", "walk_01": "Anna"}] * 2, "on 2 units:"),
+        ([None, None], "on 3 takes:"),
     ],
 )
-def test_the_headline_states_how_many_performers_its_clips_are_of(
-    known: list[dict[str, str] | None], said: str
-) -> None:
+def test_the_headline_states_how_many_units_it_is_about(known: list[dict[str, str] | None], said: str) -> None:
     sides = [side(title, clips=3) for title in "AB"]
     a, b = (replace(s, manifest=replace(s.manifest, performers=who)) for s, who in zip(sides, known, strict=True))
     assert said in sentence(found(b, a))

@@ -6,7 +6,6 @@ import pytest
 from harness.compare.comparison import compare_results
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, split_by_lag
 from harness.core.seeds import generator
-from harness.report.kit.ranking import describe_ranking
 from harness.results.reader import ResultSet
 from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.compare.sides import side
@@ -120,21 +119,22 @@ def test_each_lag_is_a_part_of_its_own() -> None:
     assert split_by_lag({}, {}) == {}
 
 
-@pytest.mark.parametrize(
-    ("clips", "performers", "said"),
-    [
-        (("walking_p1_01", "boxing_p1_02@0.20-0.40", "walking_p2_01"), None, "2 performers"),
-        (("13_17", "13_18@0.2-0.4"), None, "1 performer"),
-        (("a: 13_17", "b: 14_01"), None, "2 performers"),
-        (("take one", "13_17"), None, ""),
-        (("13_17", "14_01"), {"13_17": "Anna", "14_01": "Anna"}, "1 performer"),
-        (("a: take one@0.20-0.40", "a: two"), {"take one": "Anna", "two": "Bert"}, "2 performers"),
-        (("walking_p1_01", "two"), {"two": "Bert"}, ""),
-    ],
-)
-def test_a_ranking_states_its_performers(clips: tuple[str, ...], performers: dict[str, str] | None, said: str) -> None:
-    values = {name: {"joint_angle_mean_deg": dict.fromkeys(clips, error)} for name, error in (("a", 1.0), ("b", 2.0))}
-    ranking = rank_methods(values, "joint_angle_mean_deg")
+def test_clips_of_one_performer_are_one_unit() -> None:
+    """Twelve clips of three performers: what looks significant over clips is too few over performers."""
+    clips = [f"walking_p{p}_0{take}" for p in (1, 2, 3) for take in (1, 2, 3, 4)]
+    values: dict[str, ClipValues] = {
+        "a": {PRIMARY_METRIC: dict.fromkeys(clips, 1.0)},
+        "b": {PRIMARY_METRIC: {clip: 2.0 + 0.01 * n for n, clip in enumerate(clips)}},
+    }
+    ranking = rank_methods(values, PRIMARY_METRIC)
     assert ranking is not None
-    where = f"clips ({said})" if said else "clips"
-    assert f", 1.0 on {where}, but" in describe_ranking(ranking, "clips", str, performers=performers)
+    assert ranking.units == ("performer p1", "performer p2", "performer p3")
+    assert len(ranking.clips) == 12
+    assert ranking.results["b"].why == "too few units: 3, of at least 6"
+    np.testing.assert_allclose(ranking.values["b"], [2.015, 2.055, 2.095])
+    each_its_own = {clip: clip for clip in clips}
+    apart = rank_methods(values, PRIMARY_METRIC, each_its_own)
+    assert apart is not None
+    assert (len(apart.units), apart.best) == (12, "a")
+    assert find_best(values, PRIMARY_METRIC) is None
+    assert find_best(values, PRIMARY_METRIC, each_its_own) == "a"

@@ -52,7 +52,7 @@ def test_many_clips_are_drawn_as_exactly_as_few_are_counted(
 ) -> None:
     lines = [rng.normal(shift, 1.0, 15) for shift in (0.1, 0.4, 0.7)]
     exact = [sign_flip_p(line) for line in lines]
-    monkeypatch.setattr(significance, "_EXACT_CLIPS", 10)
+    monkeypatch.setattr(significance, "_EXACT_UNITS", 10)
     significance._cached_sign_flips.cache_clear()
     drawn = [sign_flip_p(line) for line in lines]
     significance._cached_sign_flips.cache_clear()
@@ -111,15 +111,15 @@ def told(difference: Floats, margin: float, beside: int = 0) -> SignificanceResu
         (0.1 + 0.01 * SCATTER, "same", "within the margin"),  # surely a difference, of no importance
         (0.18 + 0.1 * SCATTER, "cannot tell", "perhaps by more"),
         (0.5 * SCATTER, "cannot tell", "contains zero"),
-        (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few clips: 5, of at least 6"),
-        (np.zeros(0), "cannot tell", "too few clips: 0"),
-        (np.zeros(5), "same", "no clip differs"),
-        (np.zeros(1), "same", "no clip differs"),
-        (np.array([1e-9]), "cannot tell", "too few clips: 1"),
+        (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few units: 5, of at least 6"),
+        (np.zeros(0), "cannot tell", "too few units: 0"),
+        (np.zeros(5), "same", "no unit differs"),
+        (np.zeros(1), "same", "no unit differs"),
+        (np.array([1e-9]), "cannot tell", "too few units: 1"),
         (0.02 * SCATTER[:5], "same", "within the margin"),
         (0.1 + 0.01 * SCATTER[:3], "same", "within the margin"),
-        (0.5 * SCATTER[:5], "cannot tell", "too few clips: 5"),
-        (np.array([0.1999, 0.1998]), "cannot tell", "too few clips: 2"),
+        (0.5 * SCATTER[:5], "cannot tell", "too few units: 5"),
+        (np.array([0.1999, 0.1998]), "cannot tell", "too few units: 2"),
     ],
 )
 def test_verdicts(difference: Floats, verdict: str, why: str) -> None:

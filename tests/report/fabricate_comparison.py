@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from harness.compare.comparison import Comparison, Difference, Verdict
+from harness.compare.units import unit_of
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import Outcome
@@ -41,14 +42,17 @@ def judged(method: str, group: str, metric: str, unit: str, a: Floats, b: Floats
     low, high = (mean - half, mean + half) if clips >= 6 else (None, None)
     p = None if clips < 6 else 1.0 if mean == 0.0 else 0.0004 if abs(mean) > half else 0.31
     verdict, why = _verdict(mean, low, high, margin, clips)
+    names = tuple(f"walking_p{n + 1}_01" for n in range(clips))
     return Difference(
         method=method,
         group=group,
+        part="",
         metric=metric,
         unit=unit,
-        clips=tuple(f"walking_p{n // 10 + 1}_{n % 10 + 1:02}" for n in range(clips)),
+        clips=names,
         a=tuple(map(float, a)),
         b=tuple(map(float, b)),
+        units=tuple(unit_of(name) for name in names),
         mean_a=float(a.mean()) if clips else 0.0,
         mean_b=float(b.mean()) if clips else 0.0,
         difference=mean,

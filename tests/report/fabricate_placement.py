@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, PairedDifference
+from harness.compare.paired_statistics import MIN_UNITS, PairedDifference
 from harness.core.seeds import generator
 from harness.results.findings import Claim
 from harness.results.placement_findings import (
@@ -205,7 +205,7 @@ def _paired(a: Mapping[str, float], b: Mapping[str, float] | None = None) -> Pai
     """A paired difference with a normal-theory interval, which is faster than the bootstrap."""
     values = np.array([a[clip] - (b[clip] if b else 0.0) for clip in a])
     mean, half = float(values.mean()), 2.3 * float(values.std(ddof=1)) / len(values) ** 0.5
-    enough = len(values) >= MIN_CLIPS
+    enough = len(values) >= MIN_UNITS
     return PairedDifference(tuple(a), mean, mean - half if enough else None, mean + half if enough else None)
 
 

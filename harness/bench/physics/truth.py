@@ -304,7 +304,7 @@ def _is_above_zero(difference: PairedDifference) -> bool:
 
 
 def _intervals(differences: list[PairedDifference]) -> str:
-    """Mean differences with their intervals; fewer than `MIN_CLIPS` seeds have none."""
+    """Mean differences with their intervals; fewer than `MIN_UNITS` seeds have none."""
     return "; ".join(
         f"{d.mean:+.2f} (too few seeds)" if d.low is None else f"{d.mean:+.2f} ({d.low:+.2f} to {d.high:+.2f})"
         for d in differences

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from harness.compare.comparison import Comparison, Difference
-from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.paired_statistics import MIN_UNITS
+from harness.compare.units import count_units
 from harness.report.comparison.tables import clip_tables, differences_section, lines_table, margins_table
 from harness.report.comparison.wording import (
     KINDS,
@@ -15,6 +16,7 @@ from harness.report.comparison.wording import (
     clips_of,
     count_verdicts,
     listed_issues,
+    parts_of,
     sentence,
     sort_by_verdict,
 )
@@ -43,7 +45,7 @@ class ComparisonCharts:
 def comparison_page(comparison: Comparison, pictures: ComparisonCharts, missing: Sequence[str]) -> str:
     """The HTML of the page."""
     lines = sort_by_verdict([line for line in comparison.differences if line.gated])
-    rest = sort_by_verdict([line for line in comparison.differences if not line.gated])
+    rest = sort_by_verdict([line for line in comparison.differences if not (line.gated or line.part)])
     word = tag("span", OUTCOME_TITLES[comparison.outcome], class_=f"big {to_file_name(comparison.outcome.word)}")
     sections: list[Section] = [
         ("Clip by clip", "slopes", _slope_section(lines, pictures.slopes)),
@@ -70,6 +72,7 @@ def _facts(comparison: Comparison) -> Mapping[str, str]:
         "A, the reference": comparison.a,
         "B": comparison.b,
         "Clips": f"{len(clips)}: {list_first(clips, _MOST_NAMED)}" if clips else "none",
+        "Units": count_units(unit for line in comparison.differences for unit in line.units),
         "Cells matched": f"{comparison.matched:,}",
         **{
             title: f"{len(texts):,}: {list_first(texts, _MOST_NAMED)}"
@@ -123,6 +126,9 @@ def _tables_section(comparison: Comparison, lines: Sequence[Difference], rest: S
         return tag("p", "Nothing was compared.")
     return join(
         lines_table(comparison, lines, "gated lines") if lines else None,
+        details("By behaviour and performers", lines_table(comparison, parts, "parts of gated lines"))
+        if (parts := [part for line in lines for part in parts_of(comparison, line)])
+        else None,
         details("Lines that are not gated", lines_table(comparison, rest, "lines that are not gated"))
         if rest
         else None,
@@ -133,14 +139,14 @@ def _tables_section(comparison: Comparison, lines: Sequence[Difference], rest: S
 def _verdict_section(comparison: Comparison) -> Markup:
     meanings = bullet_list([join(verdict_badge(kind, MARKS[kind]), ": ", MEANINGS[kind], ".") for kind in KINDS])
     texts: list[Any] = [
-        "Cells of A and B are paired by scenario, clip, seed, method, inputs, split and noise. Cells of one clip "
-        "are averaged first, because clips are the independent samples. Known and new performers, splits and choices "
-        "of inputs are never pooled.",
-        "The interval is the bias-corrected and accelerated bootstrap over clips; its level is expanded for small "
-        "numbers of clips. p comes from a permutation test that flips the signs of the clips' differences. Holm's "
-        "method corrects it for all gated lines that differ in any clip. Fewer than "
-        f"{MIN_CLIPS} clips cannot show a difference. They can still show that the sides are the same; the interval is "
-        "then that of Student's t.",
+        "Cells of A and B are paired by scenario, clip, seed, method, inputs, split and noise. Cells of one clip are "
+        "averaged first, then clips of one unit. A unit is a performer, or a clip whose performer is not known. "
+        "Splits and choices of inputs are never pooled. Behaviours, and known and new performers, are pooled in a line "
+        "and shown as its parts.",
+        "Each end of the interval is the wider one of Student's t and the studentized bootstrap over units. p comes "
+        "from a permutation test that flips the signs of the units' differences. Holm's method corrects it for all "
+        f"gated lines that differ in any unit. Fewer than {MIN_UNITS} units cannot show a difference. They can still "
+        "show that the sides are the same; the interval is then that of Student's t.",
         "If inputs differ, nothing is compared. The outcome is regressed if one gated line is worse. Otherwise it is "
         "incomplete if cells failed. Otherwise it is not comparable if cells have no partner, coverage differs or a "
         "gated line cannot be decided. Otherwise it is pass.",

@@ -26,17 +26,22 @@ _MOST_CLIPS, _MOST_LISTED, _MOST_OPEN = 200, 200, 12
 def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str) -> Markup:
     """A row for each line, with the reason under its verdict."""
     varied = groups_vary(comparison)
-    head: list[Any] = ["line", "verdict", "A", "B", "B − A", "95 % interval", "p", "margin", "clips"]
+    head: list[Any] = ["line", "verdict", "A", "B", "B − A", "95 % interval", "p", "margin", "units"]
     rows = [_row(line, varied) for line in lines]
     caption = (
-        "A, B: means over clips. Under the difference: its share of A's mean. p: of a test that flips the signs of the "
-        "clips' differences; under it p corrected for all gated lines (Holm)."
+        "A, B: means over units. Under the difference: its share of A's mean. p: of a test that flips the signs of the "
+        "units' differences; under it p corrected for all gated lines, or for the parts of a line (Holm)."
     )
     return html_table(Table(head, rows), caption, label=label)
 
 
 def _row(line: Difference, varied: bool) -> list[Any]:
-    name = join(line.method, tag("small", f"{line.metric} [{line.unit}]"), tag("small", line.group) if varied else None)
+    name = join(
+        line.method,
+        tag("small", f"{line.metric} [{line.unit}]"),
+        tag("small", line.group) if varied else None,
+        tag("small", line.part.replace("_", " ")) if line.part else None,
+    )
     return [
         name,
         stacked_cell(verdict_badge(line.verdict, MARKS[line.verdict]), line.why, "why"),
@@ -46,7 +51,7 @@ def _row(line: Difference, varied: bool) -> list[Any]:
         format_interval(line),
         stacked_cell(format_p_value(line.p), format_p_value(line.p_holm)),
         format_mean(line, line.margin),
-        len(line.clips),
+        len(line.units),
     ]
 
 

@@ -7,11 +7,13 @@ from harness.core.number_format import format_change_percent, format_p_value
 from harness.core.text_table import Table
 from harness.report.comparison.wording import (
     MARKS,
+    describe_parts,
     excerpt_pair,
     format_interval,
     format_mean,
     format_signed,
     groups_vary,
+    line_title,
     listed_issues,
     percent_of_a,
     sentence,
@@ -25,18 +27,30 @@ _MOST_LISTED, _LETTERS = 6, 60
 def text(comparison: Comparison) -> str:
     """The text of a comparison; without tables if nothing was compared."""
     gated = [line for line in comparison.differences if line.gated]
-    rest = [line for line in comparison.differences if not line.gated]
-    lines = [sentence(comparison), f"A: {comparison.a}", f"B: {comparison.b}"]
+    rest = [line for line in comparison.differences if not (line.gated or line.part)]
+    lines = [sentence(comparison), *_deciding_parts(comparison, gated), f"A: {comparison.a}", f"B: {comparison.b}"]
     for title, group in (("", gated), ("not gated", rest)):
         if group:
             lines += ["", *([title] if title else []), *_table(comparison, group)]
     return "\n".join([*lines, *_reasons(gated), *_differences(comparison)])
 
 
+def _deciding_parts(comparison: Comparison, gated: Sequence[Difference]) -> list[str]:
+    """For each gated line that is not the same, in which behaviours and performers its sides differ."""
+    lines = [line for line in sort_by_verdict(gated) if line.verdict != "same"]
+    texts = [
+        f"{MARKS[line.verdict]} {line_title(line)}: {parts}"
+        for line in lines
+        if (parts := describe_parts(comparison, line))
+    ]
+    more = len(texts) - _MOST_LISTED
+    return [*texts[:_MOST_LISTED], *([f"{more} more lines: --html"] if more > 0 else [])]
+
+
 def _table(comparison: Comparison, lines: Sequence[Difference]) -> list[str]:
     varied = groups_vary(comparison)
     names = ["verdict", "method", *(["of"] if varied else []), "metric"]
-    head = [*names, "clips", "A", "B", "B − A", "95 % interval", "of A", "p", "p (Holm)", "margin", "unit"]
+    head = [*names, "units", "A", "B", "B − A", "95 % interval", "of A", "p", "p (Holm)", "margin", "unit"]
     rows = [_row(line, varied) for line in sort_by_verdict(lines)]
     return Table(head, rows, text_columns=len(names)).lines()
 
@@ -54,7 +68,7 @@ def _row(line: Difference, varied: bool) -> list[str]:
         format_p_value(line.p),
         format_p_value(line.p_holm),
     ]
-    return [*names, str(len(line.clips)), *means, *chance, format_mean(line, line.margin), line.unit]
+    return [*names, str(len(line.units)), *means, *chance, format_mean(line, line.margin), line.unit]
 
 
 def _reasons(lines: Sequence[Difference]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import get_args
 
 from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.compare.margins import MARGINS
+from harness.compare.units import count_units
 from harness.core import number_format
 from harness.core.number_format import count_noun, decimals_for, format_change_percent, format_fixed
 from harness.errors import Outcome
@@ -19,9 +20,9 @@ MARKS: Mapping[Verdict, str] = {"worse": "âœ—", "cannot tell": "?", "better": "â
 MEANINGS: Mapping[Verdict, str] = {
     "worse": "Holm-corrected p is at most 0.05, the 95 % interval excludes zero, and the mean is worse by more than "
     "the margin",
-    "cannot tell": "none of the others: there are too few clips, or they vary too much for the margin",
+    "cannot tell": "none of the others: there are too few units, or they vary too much for the margin",
     "better": "the conditions of worse hold in the other direction",
-    "same": "the 95 % interval lies within the margin, or no clip differs",
+    "same": "the 95 % interval lies within the margin, or no unit differs",
 }
 OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",
@@ -35,8 +36,7 @@ def sentence(comparison: Comparison) -> str:
     """The outcome in one sentence."""
     gated = [line for line in comparison.differences if line.gated]
     counts = count_verdicts(gated)
-    lines = f"{count_noun(len(gated), 'gated line')} on {count_noun(len(clips_of(gated)), 'clip')}"
-    lines += f" ({comparison.performers})" if comparison.performers else ""
+    lines = f"{count_noun(len(gated), 'gated line')} on {count_units(unit for line in gated for unit in line.units)}"
     match comparison.outcome:
         case Outcome.REGRESSED:
             worse = [
@@ -49,6 +49,43 @@ def sentence(comparison: Comparison) -> str:
             return f"B is no worse than A in {lines}: {counts['same']} same, {counts['better']} better."
         case _:
             return f"It cannot be decided whether B is worse than A: {comparison.why.rstrip('.')}."
+
+
+def describe_parts(comparison: Comparison, line: Difference) -> str:
+    """What decides a gated line: the behaviours and the kinds of performers in which the sides differ.
+
+    "" where the line has no parts.
+    """
+    parts = parts_of(comparison, line)
+    differing = [part for part in parts if part.verdict in ("worse", "better")]
+    if not parts:
+        return ""
+    if not differing:
+        if all(part.verdict == "same" for part in parts):
+            return "the same in each part"
+        largest = max(parts, key=lambda part: abs(part.difference))
+        change = format_change_percent(percent_of_a(largest, largest.difference))
+        fewest, most = (pick(len(part.units) for part in parts) for pick in (min, max))
+        units = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+        return f"no part of {units} units shows a difference alone; the largest is {_part_name(largest)}, {change}"
+    texts = []
+    for verdict in ("worse", "better"):
+        names = [_part_name(part) for part in differing if part.verdict == verdict]
+        texts += [f"{verdict} for {list_first(names)}"] if names else []
+    rest = [part.verdict for part in parts if part not in differing]
+    if rest:
+        texts.append("the same elsewhere" if set(rest) == {"same"} else "no difference shown elsewhere")
+    return ", ".join(texts)
+
+
+def _part_name(part: Difference) -> str:
+    return f"{part.part.replace('_', ' ')} ({count_units(part.units)})"
+
+
+def parts_of(comparison: Comparison, line: Difference) -> list[Difference]:
+    """The parts of a gated line."""
+    name = line.method, line.group, line.metric
+    return [part for part in comparison.differences if part.part and (part.method, part.group, part.metric) == name]
 
 
 def count_verdicts(lines: Sequence[Difference]) -> dict[Verdict, int]:
@@ -74,7 +111,7 @@ def clips_of(lines: Sequence[Difference]) -> list[str]:
 
 
 def groups_vary(comparison: Comparison) -> bool:
-    """Whether lines differ in inputs, split or performer, so that each must name its group."""
+    """Whether lines differ in inputs or split, so that each must name its group."""
     return len({line.group for line in comparison.differences}) > 1
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
+from harness.compare.units import Performers
 from harness.errors import BadInput, NothingMeasured, UnknownName
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
@@ -37,6 +38,8 @@ class RunCondition:
     """Rows of the summary."""
     methods: tuple[Row, ...]
     """Rows of the summary's methods, which name the series."""
+    performers: Performers | None
+    """Performer of each clip whose performer is known; None in runs of versions that did not store them."""
 
     @property
     def name(self) -> str:
@@ -67,7 +70,7 @@ class RunCondition:
 
     def rank(self, metric: str = PRIMARY_METRIC, behaviour: str | None = None) -> MethodRanking | None:
         """The ranking by one of RANKING_METRICS; None when the series share no clip."""
-        return rank_methods(self.values(behaviour), metric)
+        return rank_methods(self.values(behaviour), metric, self.performers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +81,6 @@ class ConditionSet:
     conditions: tuple[RunCondition, ...]
     finished: int
     planned: int
-    performers: Mapping[str, str] | None = None
-    """Performer of each clip whose performer is known; None in runs of versions that did not store them."""
 
     def select(self, condition: str = "", methods: Sequence[str] = ()) -> "ConditionSet":
         """The conditions that have all parts of a name such as "noise=clean", with these methods, in their order.
@@ -122,14 +123,12 @@ def read_conditions(folder: Path) -> ConditionSet:
     groups = {group for _, group in keys}
     several = [len({getattr(group, name) for group in groups}) > 1 for name in RankingGroup._fields]
     keys.sort(key=lambda key: key[1].lag)
-    conditions = (_condition(*key, several, cells, summary["methods"]) for key in keys)
-    return ConditionSet(
-        folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"], summary.get("performers")
-    )
+    conditions = (_condition(*key, several, summary) for key in keys)
+    return ConditionSet(folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"])
 
 
 def _condition(
-    varied: Mapping[str, Any], group: RankingGroup, several: Sequence[bool], cells: Sequence[Row], rows: Sequence[Row]
+    varied: Mapping[str, Any], group: RankingGroup, several: Sequence[bool], summary: Mapping[str, Any]
 ) -> RunCondition:
     several_performers, several_lags = several
     performers = f"{group.performer} performers" if several_performers and group.performer else ""
@@ -138,8 +137,9 @@ def _condition(
         varied,
         group,
         tuple(part for part in (varied_text(varied), performers, lag) if part),
-        tuple(row for row in cells if (row["varied"], _group_of(row)) == (varied, group)),
-        tuple(row for row in rows if row["performer"] == group.performer),
+        tuple(row for row in summary["cells"] if (row["varied"], _group_of(row)) == (varied, group)),
+        tuple(row for row in summary["methods"] if row["performer"] == group.performer),
+        summary.get("performers"),
     )
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.paired_statistics import MIN_UNITS
 from harness.core.number_format import count_noun
 from harness.errors import NothingMeasured
 from harness.report.kit.metric_labels import quantity
@@ -36,7 +36,7 @@ def placement_figure(folder: Path) -> PrintFigure:
 
 def _caption(findings: PlacementFindings) -> str:
     clips = max(len(measured_errors(tried)) for _, tried in measured_best(findings))
-    few = "" if clips >= MIN_CLIPS else " Differences cannot be shown with so few clips, so all sets count as tied."
+    few = "" if clips >= MIN_UNITS else " Differences cannot be shown with so few clips, so all sets count as tied."
     failed = len(findings.failures)
     return (
         f"Mean {quantity(findings.metric)} of sets of stations on {count_noun(clips, 'clip')} of {findings.motion}. "

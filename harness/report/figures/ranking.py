@@ -1,5 +1,6 @@
 """The figure `ranking`: mean error of each method and its paired difference to the lowest, one panel a condition."""
 
+from harness.compare.units import count_clips
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, check_metric, describe_absent
@@ -32,7 +33,9 @@ def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure
 
 
 def _caption(run: ConditionSet, metric: str, shown: list[RunCondition], panels: list[RankingPanel]) -> str:
-    counts = list(dict.fromkeys(count_noun(len(panel.ranking.clips), "clip") for panel in panels))
+    counts = list(
+        dict.fromkeys(count_clips(panel.ranking.clips, of.performers) for of, panel in zip(shown, panels, strict=True))
+    )
     fewer = any(len(panel.ranking.clips) < len(each.clips) for each, panel in zip(shown, panels, strict=True))
     clips = " and ".join(counts) + (" that all methods were measured on" if fewer else "")
     sentences = [f"Mean {quantity(metric)} on {clips}.", explain_marks(panels)]

@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
+from harness.compare.units import Performers, average_units, count_clips
 from harness.core.number_format import format_number
-from harness.core.split import count_performers
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
 from harness.results.cell import varied_text
@@ -101,11 +101,15 @@ def build_table(
     for each in run.conditions:
         for behaviour in each.behaviours if by_behaviour else (None,):
             values = each.values(behaviour)
-            rankings = {m: rank_methods(values, m) for m in metrics if m in RANKING_METRICS}
-            few |= any(len(ranking.clips) < MIN_CLIPS for ranking in rankings.values() if ranking)
+            rankings = {m: rank_methods(values, m, each.performers) for m in metrics if m in RANKING_METRICS}
+            few |= any(len(ranking.units) < MIN_UNITS for ranking in rankings.values() if ranking)
             texts = tuple(_condition_text(each, name, behaviour) for name in names)
             rows += [
-                ResultsRow(texts, series, tuple(_value(metric, values[series], series, rankings) for metric in metrics))
+                ResultsRow(
+                    texts,
+                    series,
+                    tuple(_value(m, values[series], series, rankings, each.performers) for m in metrics),
+                )
                 for series in each.series
                 if series in values
             ]
@@ -135,15 +139,22 @@ def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -
             return varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
 
 
-def _value(metric: str, values: ClipValues, series: str, rankings: Mapping[str, MethodRanking | None]) -> MetricValue:
-    by_clip = np.array(list(values.get(metric, {}).values()))
-    if not len(by_clip):
+def _value(
+    metric: str,
+    values: ClipValues,
+    series: str,
+    rankings: Mapping[str, MethodRanking | None],
+    performers: Performers | None,
+) -> MetricValue:
+    by_clip = values.get(metric, {})
+    if not by_clip:
         return MetricValue(metric, None)
-    low, high = mean_interval(by_clip) if len(by_clip) > 1 else (None, None)
+    by_unit = np.array(list(average_units(by_clip, performers).values()))
+    low, high = mean_interval(by_unit) if len(by_unit) > 1 else (None, None)
     ranking = rankings.get(metric)
     standing = _standing(ranking, series) if ranking else ""
     bold = standing in ("lowest", "tied") and ranking is not None and bool(ranking.others("better"))
-    return MetricValue(metric, float(by_clip.mean()), low, high, len(by_clip), standing, bold)
+    return MetricValue(metric, float(by_unit.mean()), low, high, len(by_clip), standing, bold)
 
 
 def _standing(ranking: MethodRanking, series: str) -> Standing:
@@ -153,13 +164,11 @@ def _standing(ranking: MethodRanking, series: str) -> Standing:
 
 
 def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
-    sentences = ["Mean over clips and its 95 % interval."]
-    rankings = [ranking for each in run.conditions if (ranking := each.rank()) is not None]
-    counts = dict.fromkeys(count_performers(ranking.clips, run.performers) for ranking in rankings)
-    if performers := " or ".join(filter(None, counts)):
-        sentences.append(f"The clips are of {performers}.")
+    rankings = [(each, ranking) for each in run.conditions if (ranking := each.rank()) is not None]
+    counted = dict.fromkeys(count_clips(ranking.clips, each.performers) for each, ranking in rankings)
+    sentences = [f"Mean over units and its 95 % interval: {' or '.join(counted)}."] if counted else []
     if any(value.bold for row in rows for value in row.values):
         sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")
     if few:
-        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference, so nothing is bold there.")
+        sentences.append(f"Fewer than {MIN_UNITS} units cannot show a difference, so nothing is bold there.")
     return " ".join(sentences) + run.missing_note

@@ -1,12 +1,12 @@
 """A ranking of methods in words, as pages and the terminal print it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
 from harness.compare.ranking import MethodRanking
+from harness.compare.units import count_units
 from harness.core.number_format import count_noun, format_share
-from harness.core.split import count_performers
 from harness.report.kit.text import list_first
 
 BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
@@ -21,25 +21,16 @@ def name_lag(lag: int) -> str:
     return f"a lag of {count_noun(lag, 'frame')}"
 
 
-def describe_ranking(
-    ranking: MethodRanking,
-    where: str,
-    format_error: Callable[[float], str],
-    clips: str = "clip",
-    performers: Mapping[str, str] | None = None,
-) -> str:
+def describe_ranking(ranking: MethodRanking, where: str, format_error: Callable[[float], str]) -> str:
     """Which method is best, or has the lowest error, and what can be told about the others.
 
-    `where` names the motion, such as "5 clips of built-in motion"; `clips` is the noun for what is counted. The number
-    of performers follows where they are known, by `performers` as in `core.split.count_performers`.
+    `where` names the motion, such as "15 clips of 3 performers of built-in motion".
     """
-    counted = count_performers(ranking.clips, performers)
-    where = f"{where} ({counted})" if counted else where
     lowest, error = ranking.lowest, format_error(ranking.means[ranking.lowest])
     if not ranking.results:
         return f"{lowest}: {error} mean joint-angle error on {where}. No other method was measured."
     if ranking.best:
-        return f"{lowest} is best: {error} mean joint-angle error on {where}. {_lead(ranking, format_error, clips)}"
+        return f"{lowest} is best: {error} mean joint-angle error on {where}. {_lead(ranking, format_error)}"
     first = f"{lowest} has the lowest mean joint-angle error, {error} on {where}"
     undecided = ranking.others("cannot tell")
     why = ranking.results[undecided[0]].why if undecided else ""
@@ -56,12 +47,12 @@ def describe_ranking(
     return " ".join(parts)
 
 
-def _lead(ranking: MethodRanking, format_error: Callable[[float], str], clips: str) -> str:
+def _lead(ranking: MethodRanking, format_error: Callable[[float], str]) -> str:
     """The sentence on how much lower the best error is than the next."""
     (_, best), (second, next_lowest), *_ = ranking.values.items()
     difference, wins = float(np.mean(next_lowest - best)), int(np.sum(best < next_lowest))
     share = format_share(difference / float(next_lowest.mean()))
-    counted = count_noun(len(ranking.clips), clips)
+    counted = count_units(ranking.units)
     return (
         f"That is {format_error(difference)} ({share}) less than {second}, the next, and lower on {wins} of {counted}."
     )

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import MethodRanking
-from harness.core.number_format import count_noun
+from harness.compare.units import count_units
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, mark_scale
 
 if TYPE_CHECKING:
@@ -38,10 +38,11 @@ class RankingPanel:
 
     @property
     def heading(self) -> str:
-        """Title and number of clips, and whether they can show a difference."""
-        clips = len(self.ranking.clips)
-        counted = count_noun(clips, "clip")
-        too_few = ": differences cannot be shown" if clips < MIN_CLIPS and self.ranking.results else ""
+        """Title and number of units, and whether they can show a difference."""
+        counted = count_units(self.ranking.units)
+        too_few = (
+            ": differences cannot be shown" if len(self.ranking.units) < MIN_UNITS and self.ranking.results else ""
+        )
         return f"{self.title} ({counted}){too_few}" if self.title else f"{counted}{too_few}"
 
     def wrapped_names(self, letters: int) -> list[str]:
@@ -61,14 +62,14 @@ def wrap_name(name: str, letters: int) -> str:
 
 def explain_marks(panels: Sequence[RankingPanel]) -> str:
     """Sentences of a caption on intervals, differences and ties, as far as the panels have them."""
-    sentences = ["Lines: 95 % intervals over clips."] if any(len(panel.ranking.clips) > 1 for panel in panels) else []
+    sentences = ["Lines: 95 % intervals over units."] if any(len(panel.ranking.units) > 1 for panel in panels) else []
     if any(panel.ranking.results for panel in panels):
         sentences += [
             "Right: paired difference to the method with the lowest mean.",
-            "Tied: no significant difference that exceeds the margin (sign-flip test over clips, Holm's correction).",
+            "Tied: no significant difference that exceeds the margin (sign-flip test over units, Holm's correction).",
         ]
-    if any(len(panel.ranking.clips) < MIN_CLIPS for panel in panels):
-        sentences.append(f"Fewer than {MIN_CLIPS} clips cannot show a difference.")
+    if any(len(panel.ranking.units) < MIN_UNITS for panel in panels):
+        sentences.append(f"Fewer than {MIN_UNITS} units cannot show a difference.")
     return " ".join(sentences)
 
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from harness.compare.paired_statistics import MIN_CLIPS, compare_paired
+from harness.compare.paired_statistics import MIN_UNITS, compare_paired
+from harness.compare.units import count_clips
 from harness.core.number_format import (
     NOT_MEASURED,
     count_noun,
@@ -11,7 +12,6 @@ from harness.core.number_format import (
     format_interval,
     format_share,
 )
-from harness.core.split import count_performers
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
@@ -78,8 +78,8 @@ def sentence(findings: PlacementFindings) -> str:
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
-    performers = count_performers({clip for tried in findings.tried for clip in tried.errors}, None)
-    chosen = [f"Sets were chosen on clips of {performers}."] if performers else []
+    clips = {clip for tried in findings.tried for clip in tried.errors}
+    chosen = [f"Sets were chosen on {count_clips(clips)}."] if clips else []
     if findings.sizes:
         return " ".join([*(_size_sentence(findings, size) for size in findings.sizes), *chosen])
     best = smallest_sufficient_set(findings)
@@ -176,7 +176,7 @@ def _recommendation(findings: PlacementFindings, best: BestSet) -> str:
     most = max(len(other.stations) for other in findings.best)
     noun = count_noun(count, "station")
     clips = max((len(measured_errors(tried)) for tried in findings.tried), default=0)
-    if clips < MIN_CLIPS:
+    if clips < MIN_UNITS:
         return f"The lowest error was measured with {noun}, but {count_noun(clips, 'clip')} are too few to compare sets"
     if count == most:
         return f"Of 1 to {most} stations, {count} have the lowest error" if count > 1 else "One station"

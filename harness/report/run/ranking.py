@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
-from harness.core.number_format import count_noun
+from harness.compare.units import Performers, count_clips
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.run.data import Row, lag_of, last_varied, series_name
 from harness.results.cell import varied_text
@@ -56,11 +56,11 @@ def group_values(
     }
 
 
-def best_series(values: GroupedValues, metric: str) -> set[str]:
+def best_series(values: GroupedValues, metric: str, performers: Performers | None) -> set[str]:
     """The series that is better than every other one by a metric, for each group that has one."""
     if metric in UNRANKED_METRICS or metric not in MARGINS:
         return set()
-    return {best for of_group in values.values() if (best := find_best(of_group, metric))}
+    return {best for of_group in values.values() if (best := find_best(of_group, metric, performers))}
 
 
 def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanking | None]:
@@ -68,7 +68,8 @@ def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanki
 
     Where the scenario varies keys, the last combination of values counts.
     """
-    return {group: rank_methods(of, PRIMARY_METRIC) for group, of in _measured_groups(summary).items()}
+    performers = summary.get("performers")
+    return {group: rank_methods(of, PRIMARY_METRIC, performers) for group, of in _measured_groups(summary).items()}
 
 
 def _measured_groups(summary: Mapping[str, Any]) -> GroupedValues:
@@ -94,7 +95,7 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
             if measured:
                 found.append((f"{', '.join(measured)} share no measured sequence, so they are not ranked.", None))
             continue
-        sequences = count_noun(len(ranking.clips), "sequence")
+        sequences = count_clips(ranking.clips, summary.get("performers"), "sequence")
         if len(ranking.clips) < max(len(of[PRIMARY_METRIC]) for of in measured.values()):
             sequences = f"the {sequences} that all methods were measured on"
         where = f"{sequences} of {motion}" + (
@@ -102,7 +103,7 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
         )
         where += f", with {setting}" if setting else ""
         where += f", with {name_lag(group.lag)}" if group.lag else ""
-        text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°", "sequence", summary.get("performers"))
+        text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°")
         found.append((text, ranking.lowest))
     if len({group.lag for group in groups}) > 1:
         found.append((LAG_NOTE, None))

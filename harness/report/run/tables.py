@@ -62,7 +62,7 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Group
     for column in values:
         by_name = {name: statistics[name, column] for name in run.series if (name, column) in statistics}
         counts[column] = max((s["sequences"] for s in by_name.values()), default=0)
-        best[column] = best_series(values[column], metric)
+        best[column] = best_series(values[column], metric, run.full_summary.get("performers"))
 
     def cell(name: str, column: str | None) -> Markup:
         text = summary_cell(statistics.get((name, column)), unit, column_n=counts[column])

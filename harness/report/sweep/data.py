@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.margins import GATED_METRICS
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import ClipValues
+from harness.compare.units import average_units
 from harness.core.arrays import Bools, Floats, Ints
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -26,7 +27,7 @@ class Statistic:
     clips: int
     sd: float | None = None
     low: float | None = None
-    """Lower end of the 95 % interval; None with fewer than `MIN_CLIPS` clips, or if it was not requested."""
+    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` clips, or if it was not requested."""
     high: float | None = None
     """Upper end of the 95 % interval."""
 
@@ -105,13 +106,17 @@ class SweepData:
         }
 
     def statistic(self, metric: str, selected: Bools, *, with_interval: bool = False) -> Statistic:
-        """Statistic over clips; `with_interval` adds the 95 % interval if there are at least `MIN_CLIPS` clips."""
+        """Statistic over clips; `with_interval` adds the 95 % interval if there are at least `MIN_UNITS` units."""
         means = self.by_clip(metric, selected)
         means = means[np.isfinite(means)]
         if not len(means):
             return Statistic(None, 0)
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
-        low, high = mean_interval(means) if with_interval and len(means) >= MIN_CLIPS else (None, None)
+        low, high = None, None
+        if with_interval:
+            by_unit = average_units(self.clip_values(selected, (metric,))[metric], self.clip_performers)
+            if len(by_unit) >= MIN_UNITS:
+                low, high = mean_interval(np.array(list(by_unit.values())))
         return Statistic(float(means.mean()), len(means), sd, low, high)
 
 

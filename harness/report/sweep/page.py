@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.paired_statistics import MIN_UNITS
 from harness.core.files import write_text
 from harness.report.kit.document import Section, chart_panel, document
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
@@ -85,7 +85,7 @@ def _varied(sweep: SweepData, *, with_intervals: bool, can_draw: bool) -> Markup
         return Markup()
     text = (
         f"Mean {PRIMARY_METRIC} over clips; each clip is first averaged over all other varied values. Bars: 95 % "
-        f"interval, if there are at least {MIN_CLIPS} clips."
+        f"interval, if there are at least {MIN_UNITS} clips."
     )
     charts: list[Markup] = []
     tables: list[Markup] = []

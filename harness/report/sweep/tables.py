@@ -105,7 +105,8 @@ def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]])
         groups.setdefault((sweep.performers[series], sweep.lags[series]), {})[n] = selected
 
     def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
-        return find_best({str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}, metric)
+        values = {str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}
+        return find_best(values, metric, sweep.clip_performers)
 
     # The gated metrics are read only where the lines of this metric alone leave a best row.
     candidates = [cells for cells in groups.values() if best(cells, (metric,))]

@@ -7,8 +7,9 @@ import numpy as np
 
 from harness.compare.margins import GATED_METRICS
 from harness.compare.ranking import ClipValues, rank_methods, split_by_lag
+from harness.compare.units import count_clips
 from harness.core.arrays import Floats
-from harness.core.number_format import count_noun, format_change_percent, format_number
+from harness.core.number_format import format_change_percent, format_number
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
@@ -58,11 +59,11 @@ def _best(sweep: SweepData) -> str:
 
 
 def _best_of(values: Mapping[str, ClipValues], lag: int, performers: Mapping[str, str] | None) -> str:
-    ranking = rank_methods(values, PRIMARY_METRIC)
+    ranking = rank_methods(values, PRIMARY_METRIC, performers)
     if ranking is None:
         return f"{list_first(list(values))} share no measured clip, so they are not ranked."
-    where = count_noun(len(ranking.clips), "clip") + (f", with {name_lag(lag)}" if lag else "")
-    return describe_ranking(ranking, where, _format_error, performers=performers)
+    where = count_clips(ranking.clips, performers) + (f", with {name_lag(lag)}" if lag else "")
+    return describe_ranking(ranking, where, _format_error)
 
 
 def describe_effect(sweep: SweepData, key: VariedKey) -> str:

@@ -76,7 +76,7 @@ class ClockUnwrapper:
                 at = int(np.flatnonzero(station == row)[-1])
                 self._last_of[row] = float(out[at]), float(received_s[at])
             self._last = float(out[-1]), float(received_s[-1])
-            self._least_lag_s = min(self._least_lag_s, float(_lag_s(out, received_s).min()))
+            self._least_lag_s = min(self._least_lag_s, float(np.min(_lag_s(out, received_s))))
             return out
         for i, record in enumerate(zip(stamp_s.tolist(), received_s.tolist(), station.tolist(), strict=True)):
             out[i] = self._unwrap_one(*record)

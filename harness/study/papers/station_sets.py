@@ -9,7 +9,7 @@ from scipy import stats
 from harness.compare.claims import Errors, claim_all, claim_decreasing, claim_lower_error, claim_noninferior
 from harness.compare.paired_statistics import (
     CONFIDENCE_LEVEL,
-    MIN_CLIPS,
+    MIN_UNITS,
     PairedDifference,
     mean_interval,
 )
@@ -148,8 +148,8 @@ def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Cl
         return Claim(text, "order", "not measured", "not run", "one side has no clips", unit="deg")
     ours, fewest = f"{_mean_error(hard):.2f} against {_mean_error(easy):.2f} deg", min(len(hard), len(easy))
     difference = _mean_error(hard) - _mean_error(easy)
-    if fewest < MIN_CLIPS:
-        why = f"too few clips: {fewest}, of at least {MIN_CLIPS}"
+    if fewest < MIN_UNITS:
+        why = f"too few clips: {fewest}, of at least {MIN_UNITS}"
         return Claim(text, "order", ours, "cannot tell", why, fewest, difference, unit="deg")
     welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False)
     interval = welch.confidence_interval(CONFIDENCE_LEVEL)
@@ -175,7 +175,7 @@ def average_by_size(sets: ErrorsBySet) -> dict[int, dict[str, float]]:
 def ranked_bars(title: str, sets: ErrorsBySet, caption: str) -> BarChart:
     """A bar for each set, the best first, with the 95 % interval of its mean where there are enough clips."""
     order = sorted((name for name in sets if sets[name]), key=lambda name: _mean_error(sets[name]))
-    enough = [np.array(list(sets[name].values())) if len(sets[name]) >= MIN_CLIPS else None for name in order]
+    enough = [np.array(list(sets[name].values())) if len(sets[name]) >= MIN_UNITS else None for name in order]
     ends = [(None, None) if values is None else mean_interval(values) for values in enough]
     return BarChart(
         title,

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, compare_paired
+from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
+from harness.compare.significance import count_needed
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
@@ -39,7 +40,7 @@ from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
 from harness.study.placement.power import choose_pilot, estimate_power
 from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
-from harness.study.placement.ranking import Costs, best_by_size, complete_sets, min_clips, summarise_set
+from harness.study.placement.ranking import Costs, best_by_size, complete_sets, summarise_set
 from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
 from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition
@@ -267,7 +268,7 @@ class _PlacementRun:
     def _claims(self, alternatives: Sequence[StationSet], held: Mapping[StationNames, Costs]) -> Iterator[Claim]:
         clips = len(self.study.held_out)
         basis, costs = f"tested on {clips} held-out clips", held
-        if clips < MIN_CLIPS:
+        if clips < MIN_UNITS:
             basis = "tested on the clips on which the best other set was chosen, which favours that set"
             costs = {names_of_places(stations): costs for stations, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
@@ -296,7 +297,7 @@ class _PlacementRun:
         if slow := self.cache.line_loss:
             yield slow
         for ranking in (ranking for mode in modes for ranking in mode.rankings):
-            if clips < (least := min_clips(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
+            if clips < (least := count_needed(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (
                     f"{ranking.title}: {clips} clips cannot show a significant difference between {len(ranking.rows)} "
                     f"sets; at least {least} are needed."
@@ -322,7 +323,7 @@ def _with_held_out_error(best: BestSet, costs: Costs, sign: float) -> BestSet:
     values = np.array([sign * value for value in costs.values() if value is not None])
     if not len(values) or len(values) < len(costs):
         return best
-    low, high = mean_interval(values) if len(values) >= MIN_CLIPS else (None, None)
+    low, high = mean_interval(values) if len(values) >= MIN_UNITS else (None, None)
     mean = float(values.mean())
     return replace(best, held_out=mean, held_out_low=low, held_out_high=high, held_out_clips=len(values))
 

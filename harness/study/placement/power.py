@@ -15,11 +15,11 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from harness.compare.significance import SIGNIFICANCE
+from harness.compare.significance import SIGNIFICANCE, count_needed
 from harness.core.seeds import generator
 from harness.results.placement_findings import StatisticalPower
 from harness.study.placement.candidates import StationSet
-from harness.study.placement.ranking import Costs, min_clips
+from harness.study.placement.ranking import Costs
 
 POWER = 0.8
 """Probability with which a difference that can be shown is found."""
@@ -51,7 +51,7 @@ def estimate_power(
     `cell_s` is the duration of a cell on one worker [s], and `duration_s` that of the study with so many clips [s].
     """
     comparisons = max(sets - 1, 1)
-    least = min_clips(comparisons)
+    least = count_needed(comparisons)
     spread, mean = _pooled_spread(list(pilot.values())), _mean(list(pilot.values()))
     shown = wanted = needed = None
     if spread is not None and mean is not None:
@@ -94,10 +94,11 @@ def _mean(pilot: Sequence[Costs]) -> float | None:
 def smallest_effect(clips: int, comparisons: int) -> float:
     """Smallest difference, in standard deviations of the paired differences, that `clips` clips can show.
 
-    It is infinite with fewer than `min_clips` clips. With that many, or up to two more, few flips may be more extreme,
-    and the test is simulated on fixed draws. With more, the t-test with the same correction differs by 7 % at most.
+    It is infinite with fewer than `count_needed` clips. With that many, or up to two more, few flips may be more
+    extreme, and the test is simulated on fixed draws. With more, the t-test with the same correction differs by 7 % at
+    most.
     """
-    least, level = min_clips(comparisons), SIGNIFICANCE / comparisons
+    least, level = count_needed(comparisons), SIGNIFICANCE / comparisons
     if clips < least:
         return math.inf
     return _sign_flip_effect(clips, level) if clips < min(least + 3, _MOST_FLIPPED) else _t_effect(clips, level)
@@ -129,7 +130,7 @@ def _t_effect(clips: int, level: float) -> float:
 @cache
 def clips_needed(effect: float, comparisons: int) -> int:
     """Least number of clips that show a difference of `effect` standard deviations; at most a million."""
-    least = min_clips(comparisons)
+    least = count_needed(comparisons)
     for clips in range(least, least + 3):
         if smallest_effect(clips, comparisons) <= effect:
             return clips

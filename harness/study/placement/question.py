@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.body.places import select_places
+from harness.compare.significance import count_needed
 from harness.core.names import Name
 from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
@@ -22,7 +23,6 @@ from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig
 from harness.study.placement.candidates import Candidate
 from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
-from harness.study.placement.ranking import min_clips
 
 DEFAULT_METHOD = "expert_map"
 DEFAULT_MINUTES = 10.0
@@ -190,7 +190,7 @@ def plan_within_budget(
     sets = sum(math.comb(places, size) for size in study.sizes)
     one_by_one = sum(places - worn for worn in range(study.sizes[-1]))
     given = len(scenario.motion.test)
-    least = min(given, min_clips(max(math.comb(places, size) for size in study.sizes) - 1))
+    least = min(given, count_needed(max(math.comb(places, size) for size in study.sizes) - 1))
     few = [] if question.clips else [least]
     fewer = [] if question.clips else list(range(given - 1, min(given, LEAST_CLIPS) - 1, -1))
     tested = len(study.sizes) * len(study.held_out)

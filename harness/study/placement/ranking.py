@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, compare_paired
+from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
 from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -110,15 +110,10 @@ def _cost_matrix(order: Sequence[StationNames], costs: Mapping[StationNames, Map
     return np.array([[costs[names][clip] for clip in clips] for names in order]).reshape(len(order), len(clips))
 
 
-def min_clips(comparisons: int) -> int:
-    """Least number of clips with which one of `comparisons` can be significant: at least 2 of 2^n flips are extreme."""
-    return max(MIN_CLIPS, math.ceil(1 + math.log2(max(comparisons, 1) / SIGNIFICANCE)))
-
-
 def summarise_set(names: StationNames, rate_hz: float, errors: Costs) -> StationSetResult:
     """Summarise a set, with the interval of the mean where there are enough clips."""
     measured = {clip: value for clip, value in errors.items() if value is not None}
-    low, high = mean_interval(np.array(list(measured.values()))) if len(measured) >= MIN_CLIPS else (None, None)
+    low, high = mean_interval(np.array(list(measured.values()))) if len(measured) >= MIN_UNITS else (None, None)
     return StationSetResult(names, rate_hz, dict(errors), mean_cost(measured) if measured else None, low, high)
 
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from harness.compare.paired_statistics import compare_paired
-from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
+from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.errors import BadInput
 from harness.results.placement_findings import PlacementSearch, SearchStep, StationPlacement
 from harness.study.placement.candidates import StationSet, mirror_place, placement_fault, station_name
 from harness.study.placement.config import RefineOptions
-from harness.study.placement.ranking import complete_sets, join_names, min_clips, sort_by_cost
+from harness.study.placement.ranking import complete_sets, join_names, sort_by_cost
 from harness.study.placement.search import Measure, names_of_places
 
 MoveGroup = tuple[int, ...]
@@ -55,7 +55,7 @@ def refine_set(
 def check_clip_count(start: StationSet, clips: int) -> None:
     """BadInput when the clips are too few for any move to be significant."""
     moves = 4 * len(find_move_groups(start))
-    if clips < (least := min_clips(moves)):
+    if clips < (least := count_needed(moves)):
         fault = f"refine: with {clips} clips, none of {moves} moves can be significantly better."
         raise BadInput(fault, f"Use {least} clips or more, or refine a smaller set.")
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.paired_statistics import CONFIDENCE_LEVEL, MIN_CLIPS
-from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
+from harness.compare.paired_statistics import CONFIDENCE_LEVEL, MIN_UNITS
+from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.placement_findings import ChangedOrder, PlacementCondition, RankAgreement, StationNames
@@ -15,7 +15,6 @@ from harness.study.placement.ranking import (
     Costs,
     complete_sets,
     mean_cost,
-    min_clips,
     selection_stability,
     sort_by_cost,
 )
@@ -89,7 +88,7 @@ def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paire
     """
     pairs = list(itertools.combinations(range(len(names)), 2))
     corrected: list[float | None] = [None] * len(pairs)
-    if paired and a.shape[1] >= min_clips(len(pairs)) and len(names) <= _MOST_TESTED_SETS:
+    if paired and a.shape[1] >= count_needed(len(pairs)) and len(names) <= _MOST_TESTED_SETS:
         corrected = list(holm([sign_flip_p((a[i] - a[j]) - (b[i] - b[j])) for i, j in pairs]))
     changes = []
     for (i, j), p in zip(pairs, corrected, strict=True):
@@ -115,7 +114,7 @@ def tau_b(a: Floats, b: Floats) -> Floats:
 def _interval(tables: Sequence[Floats], same_clips: bool) -> tuple[float | None, float | None]:
     """Percentile interval over resamples of the clips; both sides share the draws where they have the same clips."""
     counts = [table.shape[1] for table in tables]
-    if min(counts) < MIN_CLIPS:
+    if min(counts) < MIN_UNITS:
         return None, None
     rng = generator(0, "placement", "tau")
     first = rng.integers(0, counts[0], (_RESAMPLES, counts[0]))

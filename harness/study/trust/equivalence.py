@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, mean_interval
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import shared_clips
 from harness.results.trust_findings import Equivalence, EquivalenceVerdict
 
@@ -20,7 +20,7 @@ def judge_equivalence(
     """Judge one metric of one arm; `device` and `simulated` map clips to errors, and clips of both sides count.
 
     *Equivalent*: the whole interval lies within the margin. *Beyond the margin*: it lies outside as a whole. Anything
-    else, and fewer than `MIN_CLIPS` clips, is undecided.
+    else, and fewer than `MIN_UNITS` clips, is undecided.
     """
     clips = shared_clips((device, simulated))
     if not clips:
@@ -28,8 +28,8 @@ def judge_equivalence(
     sides = [np.array([side[clip] for clip in clips]) for side in (device, simulated)]
     difference = sides[1] - sides[0]
     means = float(sides[0].mean()), float(sides[1].mean()), float(difference.mean())
-    if len(clips) < MIN_CLIPS:
-        why = f"too few clips: {len(clips)}, of at least {MIN_CLIPS}"
+    if len(clips) < MIN_UNITS:
+        why = f"too few clips: {len(clips)}, of at least {MIN_UNITS}"
         return Equivalence(arm, metric, margin, len(clips), *means, None, None, "cannot tell", why)
     low, high = mean_interval(difference, 1.0 - 2.0 * level)
     verdict: EquivalenceVerdict = "cannot tell"

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from harness.compare.paired_statistics import MIN_CLIPS
+from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.ranking import shared_clips
 from harness.compare.significance import holm
 from harness.core.arrays import Floats
@@ -36,7 +36,7 @@ def judge_pairs(
     """Judge pairs of arms, by default all, over the clips on which both arms have errors on both sides.
 
     *Agree* and *contradict*: p after Holm is at most `level`, and the signs of the mean differences are equal or
-    opposite. Anything else, and fewer than `MIN_CLIPS` clips, is undecided.
+    opposite. Anything else, and fewer than `MIN_UNITS` clips, is undecided.
     """
     chosen = list(combinations(device, 2)) if pairs is None else list(pairs)
     measured = [_compare_sides(device, simulated, pair, level) for pair in chosen]
@@ -48,7 +48,7 @@ def judge_pairs(
         if at in corrected:
             verdict, why = _verdict(sides, corrected[at], level, len(tested))
         else:
-            verdict, why = "cannot tell", f"too few clips: {clips}, of at least {MIN_CLIPS}"
+            verdict, why = "cannot tell", f"too few clips: {clips}, of at least {MIN_UNITS}"
         judged.append(PairAgreement(a, b, clips, *sides, p.get(at), corrected.get(at), verdict, why))
     return judged
 
@@ -76,7 +76,7 @@ def _compare_sides(
     clips = sorted(set(found[0]) & set(found[1]))
     rows = [[side[clip] for clip in clips] for side in found]
     means = [np.array([row.mean() for row in side]) for side in rows]
-    if len(clips) < MIN_CLIPS:
+    if len(clips) < MIN_UNITS:
         first, second = (SideDifference(float(m.mean()) if len(m) else None, None, None, None) for m in means)
         return len(clips), (first, second)
     of_device = float((means[0] - means[1]).var(ddof=1))
@@ -121,8 +121,8 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
     means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
     arms = [arm for arm in device if means[0][arm] and means[1][arm]]
     clips = shared_clips(side[arm] for side in means for arm in arms)
-    if len(arms) < MIN_ARMS or len(clips) < MIN_CLIPS:
-        why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_CLIPS}"
+    if len(arms) < MIN_ARMS or len(clips) < MIN_UNITS:
+        why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_UNITS}"
         first, second = (RankCorrelation(name, None, None, None, why) for name in names)
         return first, second
     sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]

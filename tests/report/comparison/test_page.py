@@ -57,7 +57,7 @@ def test_the_first_line_is_the_verdict() -> None:
     first, a, b = text(comparison()).splitlines()[:3]
     (worse,) = (found for found in comparison().differences if found.verdict == "worse")
     share = format_change_percent(100.0 * worse.difference / worse.mean_a)
-    assert first == f"B is worse than A in 1 of 6 gated lines on 24 clips: local_pca mpjpe_mm {share}."
+    assert first == f"B is worse than A in 1 of 6 gated lines on 24 performers: local_pca mpjpe_mm {share}."
     assert (a, b) == ("A: baseline gate", "B: results/gate")
 
 
@@ -65,7 +65,7 @@ def test_the_first_line_is_the_verdict() -> None:
 @pytest.mark.parametrize(
     ("shown", "said"),
     [
-        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A in 4 gated lines on 24 clips"),
+        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A in 4 gated lines on 24 performers"),
         (comparison(3), "It cannot be decided whether B is worse than A: 7 lines were judged."),
         (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
         (
