@@ -99,7 +99,7 @@ def test_holm_takes_back_what_is_not_significant_among_the_printed_statements() 
 
 
 def test_enough_clips_that_disagree_are_not_significant() -> None:
-    gains = np.array([1.0] * 10 + [-0.5, -0.6])
+    gains = np.array([*np.linspace(0.4, 1.6, 10), -0.2, -0.3])
     claim = claim_lower_error("a < b", by_clip(6.0 - gains), by_clip(np.full(12, 6.0)))
     assert claim.verdict == "reproduced"
     (first, *_) = correct_claims([claim] * 60)

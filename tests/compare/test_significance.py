@@ -176,7 +176,7 @@ def test_six_clips_can_show_nothing_among_many_lines() -> None:
     assert told(clear, 0.1).verdict == "worse"
     found = told(clear, 0.1, beside=1)
     assert (found.verdict, found.p_holm) == ("cannot tell", 2 * 2 / 64)
-    assert "6 cannot show a difference among 2 lines" in found.why
+    assert "6, and among 2 lines a difference needs 7" in found.why
 
 
 def test_lines_without_any_difference_do_not_count_for_the_others() -> None:
