@@ -40,7 +40,7 @@ database = "behaviour"
 longest_s = 1.5
 behaviours = ["walking"]
 test = ["walking_p[1-8]_01"]
-examples = ["walking_p1_02", "walking_p2_02"]
+examples = ["walking_p[1-8]_02"]
 """
 
 

@@ -8,6 +8,7 @@ from harness.body.humanoid import build_body
 from harness.body.places import NAMED_PLACES
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
+from harness.core.training_data import declared_training_data, training_note
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
@@ -47,7 +48,8 @@ def _describe_method(name: str) -> str:
     """What it does, what it needs, and where it comes from."""
     method = registry.resolve(name)
     examples = "examples" if method.needs_examples else "no examples"
-    said = [method.summary, f"needs {examples}, takes any inputs", registry.origin(name)]
+    note = training_note(declared_training_data(method))
+    said = [method.summary, f"needs {examples}, takes any inputs", note, registry.origin(name)]
     return "; ".join(part for part in said if part)
 
 

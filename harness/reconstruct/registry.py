@@ -29,7 +29,7 @@ GROUP = "harness.methods"
 """Entry-point group of installed packages."""
 _REQUIRED_ATTRIBUTES = ("name", "summary", "needs_examples", "fit")
 """Attributes that every method has."""
-_NO_OPTIONS = (*_REQUIRED_ATTRIBUTES, "files", "environment", "source")
+_NO_OPTIONS = (*_REQUIRED_ATTRIBUTES, "files", "environment", "source", "training_data")
 """Attributes of a method that are no options."""
 
 

@@ -20,6 +20,12 @@ class Theirs(MeanPose):
     source = "Somebody 2031"
 
 
+class Undeclared(MeanPose):
+    """A method that does not say what it learnt from."""
+
+    training_data = "unknown"
+
+
 def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
     methods = build_catalogue()["methods"]
     assert set(methods) == set(registry.methods())
@@ -31,7 +37,9 @@ def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
 def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("theirs", "tests.commands.test_catalogue:Theirs", registry.GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
-    assert build_catalogue()["methods"]["theirs"].endswith("; Somebody 2031")
+    assert build_catalogue()["methods"]["theirs"].endswith("takes any inputs; Somebody 2031")
+    entry = EntryPoint("theirs", "tests.commands.test_catalogue:Undeclared", registry.GROUP)
+    assert build_catalogue()["methods"]["theirs"].endswith("takes any inputs; training data unknown")
 
 
 def test_hinges_are_listed_in_the_order_of_the_model() -> None:

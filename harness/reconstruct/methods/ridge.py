@@ -43,6 +43,7 @@ class Ridge:
     name: str = "ridge"
     summary: str = "ridge regression from readings to hinge angles: a short method to copy and to change"
     needs_examples: bool = True
+    training_data = "examples"
     noise_m: Annotated[float, Range(1e-06, 10.0)] = 0.01
     """Error of a reading that the regression allows for, standard deviation [m]."""
     lever_m: Annotated[float, Range(1e-06, 100.0)] = 0.3

@@ -70,6 +70,7 @@ def _facts(comparison: Comparison) -> Mapping[str, str]:
         "A, the reference": comparison.a,
         "B": comparison.b,
         "Clips": f"{len(clips)}: {list_first(clips, _MOST_NAMED)}" if clips else "none",
+        "Training data": list_first(comparison.training_notes, _MOST_NAMED),
         "Cells matched": f"{comparison.matched:,}",
         **{
             title: f"{len(texts):,}: {list_first(texts, _MOST_NAMED)}"
