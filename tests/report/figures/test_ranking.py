@@ -82,7 +82,7 @@ def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
     with drawn(figure) as shown:
         *_, heading = shown.axes[0].texts  # after the values at the edge
         assert heading.get_text() == "4 clips: differences cannot be shown"
-        assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o"}
+        assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o", ">"}
 
 
 def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
