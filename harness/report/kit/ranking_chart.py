@@ -180,9 +180,10 @@ def _draw_differences(axes: "Axes", ranking: MethodRanking, places: Sequence[flo
 def _write_at_edge(axes: "Axes", text: str, y: float, style: Mapping[str, Any]) -> None:
     """A value beyond the right end of the axis, as an arrow and a number."""
     edge = axes.get_yaxis_transform()
-    arrow = {"marker": ">", "color": style["color"], "markersize": _DOT * mark_scale()}
+    arrow: Mapping[str, Any] = {"marker": ">", "color": style["color"], "markersize": _DOT * mark_scale()}
     axes.plot(1.0, y, linestyle="none", clip_on=False, transform=edge, **arrow)
-    place = {"xytext": (-1.5 * _DOT * mark_scale(), 0), "textcoords": "offset points", "ha": "right", "va": "center"}
+    gap = (-1.5 * _DOT * mark_scale(), 0)
+    place: Mapping[str, Any] = {"xytext": gap, "textcoords": "offset points", "ha": "right", "va": "center"}
     size = axes.xaxis.label.get_fontsize()
     axes.annotate(text, (1.0, y), xycoords=edge, color=style["color"], fontsize=size, **place)
 
