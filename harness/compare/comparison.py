@@ -1,6 +1,6 @@
 """Comparison of two results on the cells that they share. A is the reference; differences are B - A."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
@@ -28,6 +28,7 @@ from harness.compare.matching import (
 from harness.compare.significance import Verdict
 from harness.compare.units import Performers
 from harness.core.files import to_json_types
+from harness.core.training_data import training_note
 from harness.errors import Outcome
 from harness.results.manifest import Manifest, flatten
 from harness.results.reader import ResultSet, load_results
@@ -64,6 +65,8 @@ class Comparison:
     """Groups in which the sides cover different shares of the frames, or less than 95 %."""
     failed: tuple[str, ...] = ()
     """Planned cells that failed on either side, such as "A: ik on walking_p1_01"."""
+    training_notes: tuple[str, ...] = ()
+    """Compared methods whose training data is unknown or from outside, such as "B: mine:Mine: trained on AMASS"."""
 
 
 def compare_results(
@@ -123,6 +126,10 @@ def compare_results(
         why=why,
         coverage=tuple(faults["coverage"]),
         failed=missing,
+        training_notes=(
+            *_training_notes("A", a.manifest, [one.method for one, _ in matched.pairs]),
+            *_training_notes("B", b.manifest, [other.method for _, other in matched.pairs]),
+        ),
     )
 
 
@@ -187,9 +194,16 @@ def _outcome(
     )
 
 
+def _training_notes(side: str, manifest: Manifest, methods: Iterable[str]) -> list[str]:
+    notes = {name: training_note(manifest.training_data.get(name)) for name in methods}
+    return [f"{side}: {name}: {note}" for name, note in notes.items() if note]
+
+
 def _circumstances(a: Manifest, b: Manifest) -> tuple[tuple[str, str, str], ...]:
     mine, theirs = (flatten(to_json_types(side.circumstances)) for side in (a, b))
     names = {**mine, **theirs}
+    if not (a.training_data and b.training_data):  # a version that did not store it
+        names = {name: None for name in names if not name.startswith("training_data")}
     return tuple(
         (n, format_value(mine.get(n)), format_value(theirs.get(n))) for n in names if mine.get(n) != theirs.get(n)
     )

@@ -20,6 +20,7 @@ from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
+from harness.core.training_data import declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cell_watcher import CellCount
 from harness.experiment.cells import (
@@ -187,6 +188,7 @@ def _run_folder(
                 name=name,
                 command=command,
                 performers=manifest.performers,
+                training_data=manifest.training_data,
                 scenarios=[scenario_label(scenario) for scenario in scenarios],
                 vary=dict(pair for scenario in scenarios for pair in dotted_keys(scenario.vary)),
                 orders=scenarios[0].expected_order if kind == "run" else None,
@@ -213,12 +215,19 @@ def _describe(
     sources = list(dict.fromkeys(source.title for source, _ in opened))
     clips = {name: source for source, test in opened for name in (ClipPart.parse(text).clip for text in test)}
     performers = {name: known for name, source in clips.items() if (known := source.performer(name))}
-    constants = {}
+    constants, training_data = dict[str, str](), dict[str, str]()
     for name in content["methods"]:
         with suppress(MethodFailure):  # its cells fail and say why
-            constants[name] = describe_options(resolve_method(name, isolation))
-    source = sources if "sweep" in content else sources[0]
-    return describe_run(content, motion_source=source, command=command, constants=constants, performers=performers)
+            method = resolve_method(name, isolation)
+            constants[name], training_data[name] = describe_options(method), declared_training_data(method)
+    return describe_run(
+        content,
+        motion_source=sources if "sweep" in content else sources[0],
+        command=command,
+        constants=constants,
+        training_data=training_data,
+        performers=performers,
+    )
 
 
 def _run_tasks(

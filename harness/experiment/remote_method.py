@@ -50,6 +50,7 @@ _MAX_REPLY_BYTES = 100 * MAX_TEXT
 class _Description:
     summary: str
     needs_examples: bool
+    training_data: str
     options: str
     source_hash: str
 
@@ -113,6 +114,10 @@ class RemoteMethod:
     @property
     def needs_examples(self) -> bool:
         return self.describe().needs_examples
+
+    @property
+    def training_data(self) -> str:
+        return self.describe().training_data
 
     @property
     def source_hash(self) -> str:

@@ -39,6 +39,11 @@ class Manifest:
     performers: Mapping[str, str] | None = None
     """Performer of each test clip whose performer is known; None in manifests of versions that did not store them."""
 
+    @property
+    def training_data(self) -> Mapping[str, str]:
+        """Method -> its declared training data (`core.training_data`); empty in manifests that did not store it."""
+        return dict(self.circumstances.get("training_data", {}))
+
     def as_dict(self) -> dict[str, Any]:
         out: dict[str, Any] = to_json_types(asdict(self))
         return out
@@ -71,11 +76,13 @@ def describe_run(
     motion_source: str | Sequence[str],
     command: str,
     constants: Mapping[str, str] | None = None,
+    training_data: Mapping[str, str] | None = None,
     performers: Mapping[str, str] | None = None,
 ) -> Manifest:
     """Manifest of running a scenario, or a sweep's scenarios, with this code on this machine.
 
-    Methods, their `constants`, expected orders and omissions (`left_out`) are circumstances, all else is input.
+    Methods, their `constants` and `training_data`, expected orders and omissions (`left_out`) are circumstances, all
+    else is input.
     """
     inputs = {name: value for name, value in scenario.items() if name not in ("methods", "expected_order", "left_out")}
     return Manifest(
@@ -84,6 +91,7 @@ def describe_run(
         circumstances={
             "methods": scenario.get("methods", ()),
             "constants": constants or {},
+            "training_data": training_data or {},
             "left_out": scenario.get("left_out", {}),
             "command": command,
             **current_circumstances(),

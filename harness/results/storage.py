@@ -138,7 +138,12 @@ def _indexed_cells(out: Path, keys: Collection[str] | None) -> Iterator[Cell]:
 
 
 def write_summary(
-    index: CellIndex, out: Path, *, orders: Sequence[ExpectedOrder] | None = None, **facts: Any
+    index: CellIndex,
+    out: Path,
+    *,
+    orders: Sequence[ExpectedOrder] | None = None,
+    training_data: Mapping[str, str] | None = None,
+    **facts: Any,
 ) -> dict[str, Any]:
     """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
@@ -146,7 +151,8 @@ def write_summary(
     (see `core.line_loss`; absent where every line let its cell be measured) and groups (see
     `table.compute_group_statistics`). The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell
     was measured. With `orders`, as a run has them, it also has statistics over frames, for
-    which every cell is read: methods and behaviours (see `SummaryStatistics.rows`), recovery (see
+    which every cell is read: methods (with their declared `training_data`) and behaviours (see
+    `SummaryStatistics.rows`), recovery (see
     `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
     and cells (the rows). The index then gets the digests of the files and its own.
     """
@@ -166,6 +172,8 @@ def write_summary(
     }
     if orders is not None:
         content |= _frame_statistics(index, out, orders)
+        for row in content["methods"]:
+            row["training_data"] = (training_data or {}).get(row["method"])
     write_table(index, out / "summary.csv")
     write_result_json(out / SUMMARY, content)
     index.write_digest(compute_digests(out))

@@ -23,7 +23,8 @@ from harness.core.motion import BodyMotion
 from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 from harness.testing import method_checks
-from harness.testing.method_checks import MethodContractError, check_method, check_rules
+from harness.testing.contract_case import make_case
+from harness.testing.method_checks import MethodContractError, RuleResult, check_method, check_rules
 from harness.testing.rules import RULES
 
 
@@ -397,6 +398,9 @@ FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
 )
 
 
+TRAINING_RULE = "the declared training data is consistent"
+
+
 def violations(method: Standing) -> dict[str, str]:
     return {result.rule: result.seen for result in check_rules(method) if not result.ok}
 
@@ -458,7 +462,28 @@ def test_modified_examples_violate_one_rule() -> None:
 
 
 def test_every_rule_has_a_faulty_method() -> None:
-    assert {rule for _, rule in FAULTY} | {"examples are not modified"} == set(RULES)
+    assert {rule for _, rule in FAULTY} | {"examples are not modified", TRAINING_RULE} == set(RULES)
+
+
+@pytest.mark.parametrize(
+    ("declared", "ok", "seen"),
+    [
+        ("none", True, "training data: none"),
+        (" AMASS ", True, "trained on AMASS"),
+        ("examples", False, "training_data is 'examples', but needs_examples is False"),
+        (7, False, "training_data is 7. It must be a text such as 'examples', 'none' or 'AMASS'."),
+    ],
+)
+def test_declared_training_data_agrees_with_the_method(declared: object, ok: bool, seen: str) -> None:
+    method = Standing(StandingSession)
+    object.__setattr__(method, "training_data", declared)
+    assert method_checks.check_rule(make_case(method), TRAINING_RULE) == RuleResult(TRAINING_RULE, ok, seen)
+
+
+def test_a_method_without_a_declaration_is_told_and_passes() -> None:
+    found = method_checks.check_rule(make_case(Standing(StandingSession)), TRAINING_RULE)
+    assert found.ok
+    assert found.seen.startswith("training data unknown, ")
 
 
 def test_the_first_violation_is_raised_with_its_rule() -> None:

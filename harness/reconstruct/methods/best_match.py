@@ -47,6 +47,7 @@ class BestMatch:
     name: str = "best_match"
     summary: str = "the nearest example frame, placed at the trackers: a baseline"
     needs_examples: bool = True
+    training_data = "examples"
     position_weight: Annotated[float, Range(0.0, 1e6)] = 0.6
     """Weight of positions in eq. 2 [1/m^2]."""
     velocity_weight: Annotated[float, Range(0.0, 1e6)] = 0.2

@@ -28,6 +28,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
+from harness.core.training_data import declared_training_data
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -71,6 +72,10 @@ class CleanUp:
     @property
     def needs_examples(self) -> bool:
         return self.method.needs_examples
+
+    @property
+    def training_data(self) -> str:
+        return declared_training_data(self.method)
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedCleanUp":
         inner = self.method.fit(body, examples, rng)

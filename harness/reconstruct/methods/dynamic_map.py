@@ -85,6 +85,7 @@ class DynamicMap:
     name: str = "dynamic_map"
     summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
     needs_examples: bool = True
+    training_data = "examples"
     search: Literal["features", "history"] = "features"
     """Search of the neighbours: by the last estimates and the readings, or by the last estimates alone (the paper)."""
     regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)

@@ -83,6 +83,7 @@ class ExpertMap:
     name: str = "expert_map"
     summary: str = "maximum a posteriori pose under tabulated local experts, with self-calibrated noise"
     needs_examples: bool = True
+    training_data = "examples"
     neighbours: Annotated[int, Range(2, 1_000_000)] = 1800
     """K: number of examples in the local model of readings and history."""
     history_neighbours: Annotated[int, Range(2, 1_000_000)] = 400

@@ -28,6 +28,7 @@ from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
+from harness.core.training_data import EXAMPLES, NONE
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
@@ -68,6 +69,10 @@ class Ik:
     @property
     def needs_examples(self) -> bool:
         return self.towards_mean > 0.0 or self.spread
+
+    @property
+    def training_data(self) -> str:
+        return EXAMPLES if self.needs_examples else NONE
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedIk":
         """Learn the prior from examples; BadInput when it needs some and there are none."""

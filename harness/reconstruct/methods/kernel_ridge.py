@@ -51,6 +51,7 @@ class KernelRidge:
     name: str = "kernel_ridge"
     summary: str = "one smooth map from readings to posture, learnt from all examples at once"
     needs_examples: bool = True
+    training_data = "examples"
     most_frames: Annotated[int, Range(2, 1_000_000)] = 2000
     """Largest number of example frames; more are thinned at random."""
     ridge: Annotated[float, Range(1e-12, 1e6)] = 0.01

@@ -64,6 +64,7 @@ class LocalPca:
     name: str = "local_pca"
     summary: str = "best fit to the readings within the principal directions of similar examples"
     needs_examples: bool = True
+    training_data = "examples"
     neighbours: Annotated[int, Range(2, 1_000_000)] = 300
     """K, examples of the local model."""
     components: Annotated[int, Range(1, 55)] = 40

@@ -64,6 +64,7 @@ class LocalRegression(ABC):
     name: str
     summary: str
     needs_examples: bool = True
+    training_data = "examples"
     neighbours: Annotated[int, Range(1, 1_000_000)] = 8
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     weights: FeatureWeights = field(default_factory=FeatureWeights)

@@ -30,6 +30,7 @@ class MeanPose:
     name: str = "mean_pose"
     summary: str = "the examples' mean posture, placed at the trackers: a baseline"
     needs_examples: bool = True
+    training_data = "examples"
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedMeanPose":
         """BadInput without examples."""

@@ -73,6 +73,7 @@ def _facts(comparison: Comparison) -> Mapping[str, str]:
         "B": comparison.b,
         "Clips": f"{len(clips)}: {list_first(clips, _MOST_NAMED)}" if clips else "none",
         "Units": count_units(unit for line in comparison.differences for unit in line.units),
+        "Training data": list_first(comparison.training_notes, _MOST_NAMED),
         "Cells matched": f"{comparison.matched:,}",
         **{
             title: f"{len(texts):,}: {list_first(texts, _MOST_NAMED)}"

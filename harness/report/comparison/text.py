@@ -29,6 +29,7 @@ def text(comparison: Comparison) -> str:
     gated = [line for line in comparison.differences if line.gated]
     rest = [line for line in comparison.differences if not (line.gated or line.part)]
     lines = [sentence(comparison), *_deciding_parts(comparison, gated), f"A: {comparison.a}", f"B: {comparison.b}"]
+    lines += [f"note: {note}" for note in comparison.training_notes]
     for title, group in (("", gated), ("not gated", rest)):
         if group:
             lines += ["", *([title] if title else []), *_table(comparison, group)]

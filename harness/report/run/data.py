@@ -11,6 +11,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
+from harness.core.training_data import training_note
 from harness.report.kit.style import STYLES
 from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, varied_text
 from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row
@@ -168,9 +169,10 @@ def lag_of(row: Row) -> int:
 def series_name(row: Row, rows: Sequence[Row]) -> str:
     """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary.
 
-    It states the lag of the method if the method's own name does not.
+    It states the lag of the method if the method's own name does not, and training data other than the examples.
     """
-    parts = []
+    note = note_of(row, rows)
+    parts = [note] if note else []
     if len({r["inputs"] for r in rows}) > 1:
         parts.append(str(row["inputs"]))
     if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
@@ -178,6 +180,11 @@ def series_name(row: Row, rows: Sequence[Row]) -> str:
     if len({r["performer"] for r in rows}) > 1:
         parts.append(f"{row['performer'] or 'no'} performer")
     return name_with_lag(str(row["method"]), lag_of(row)) + (f" ({', '.join(parts)})" if parts else "")
+
+
+def note_of(row: Row, rows: Sequence[Row]) -> str:
+    """The note on the training data of the method of a row, as `rows`, the methods of the summary, have it."""
+    return next((training_note(r.get("training_data")) for r in rows if r["method"] == row["method"]), "")
 
 
 def last_varied(summary: Row) -> Row:

@@ -10,7 +10,7 @@ from harness.core.number_format import count_noun, format_fixed, format_mean_sd,
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
-from harness.report.run.data import lag_of
+from harness.report.run.data import lag_of, note_of
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, TABLE_COLUMNS
@@ -59,7 +59,7 @@ def _behaviour_rows(summary: Mapping[str, Any]) -> list[str]:
     """The table of every method, behaviour and condition, and that of the standard deviations."""
     rows = sorted(summary["behaviours"], key=lambda row: str(row["behaviour"]))
     varying = _varying_columns(summary["cells"])
-    firsts = [[row["behaviour"], *_first_cells(row, varying)] for row in rows]
+    firsts = [[row["behaviour"], *_first_cells(row, varying, summary["methods"])] for row in rows]
     head = ["behaviour", "method", *varying]
     scores = [(first, row.get("sigma_scores", {})) for first, row in zip(firsts, rows, strict=True)]
     return [*_table_lines(head, firsts, rows), *sigma_lines(head, scores)]
@@ -74,14 +74,16 @@ def _pooled_rows(summary: Mapping[str, Any]) -> list[str]:
     varying = [
         name for name in _varying_columns(summary["cells"]) if len({_format_cell(row[name]) for row in shown}) > 1
     ]
-    firsts = [_first_cells(row, varying) for row in shown]
+    firsts = [_first_cells(row, varying, rows) for row in shown]
     lines = _table_lines(["method", *varying], firsts, shown, short=True)
     more = f"{count_noun(len(rows) - len(shown), 'more row')}, and the" if len(rows) > len(shown) else "The"
     return [*lines, f"{more} rows of single behaviours: --all, or the report."]
 
 
-def _first_cells(row: Mapping[str, Any], varying: Sequence[str]) -> list[str]:
-    return [name_with_lag(row["method"], lag_of(row)), *(_format_cell(row[name]) for name in varying)]
+def _first_cells(row: Mapping[str, Any], varying: Sequence[str], methods: Sequence[Mapping[str, Any]]) -> list[str]:
+    note = note_of(row, methods)
+    name = name_with_lag(row["method"], lag_of(row)) + (f" ({note})" if note else "")
+    return [name, *(_format_cell(row[name]) for name in varying)]
 
 
 def _table_lines(

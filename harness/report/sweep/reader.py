@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.core.arrays import Ints
 from harness.core.estimate import name_with_lag
+from harness.core.training_data import training_note
 from harness.report.sweep.data import READ_METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
@@ -27,7 +28,7 @@ def read_sweep(out: Path) -> SweepData:
     BadFile if `out` holds no sweep, or a damaged or edited one.
     """
     check_folder(out)
-    clip_performers = Manifest.read(out / "manifest.json").performers
+    manifest = Manifest.read(out / "manifest.json")
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
@@ -37,7 +38,8 @@ def read_sweep(out: Path) -> SweepData:
             planned=counts.planned,
             failures=failures,
             command=str(facts.get("command", "")),
-            clip_performers=clip_performers,
+            clip_performers=manifest.performers,
+            training_data=manifest.training_data,
         )
 
 
@@ -50,10 +52,12 @@ def collect_cells(
     command: str = "",
     lags: Iterable[int] | None = None,
     clip_performers: Mapping[str, str] | None = None,
+    training_data: Mapping[str, str] | None = None,
 ) -> SweepData:
     """The data of a sweep from its cells, each a row of the index's columns.
 
-    `lags` has the lag of the method of each cell [frames], by default 0. `clip_performers` are those of the manifest.
+    `lags` has the lag of the method of each cell [frames], by default 0. `clip_performers` and `training_data`
+    are those of the manifest.
     """
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
@@ -75,7 +79,7 @@ def collect_cells(
         failures=dict(failures),
         command=command,
         scenarios=tuple(scenarios.names),
-        series=_series_names(groups.names),
+        series=_series_names(groups.names, training_data or {}),
         performers=tuple(group[-1] for group in groups.names),
         lags=tuple(lag_of_group[code] for code in range(len(groups.names))),
         clips=tuple(clips.names),
@@ -103,12 +107,13 @@ class _LabelEncoder:
         return self._codes[name]
 
 
-def _series_names(groups: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """Names of the methods, qualified by what distinguishes series of one method."""
+def _series_names(groups: Sequence[tuple[str, ...]], training_data: Mapping[str, str]) -> tuple[str, ...]:
+    """Names of the methods, qualified by what distinguishes series of one method, and by notes on training data."""
     names = []
     for method, *group in groups:
         same = [other for other in groups if other[0] == method]
         words = [text or "–" for n, text in enumerate(group, start=1) if len({other[n] for other in same}) > 1]
+        words += filter(None, [training_note(training_data.get(method))])
         names.append(f"{method} ({', '.join(words)})" if words else method)
     return tuple(names)
 

@@ -31,5 +31,6 @@ RULES: dict[str, Rule] = {
     "the method's own model answers undisturbed frames": semantics.answers_by_its_model,
     "the error recovers after a disturbance": semantics.recovers_from_disturbances,
     "the posture does not depend on position and heading": semantics.is_invariant_to_placement,
+    "the declared training data is consistent": semantics.declares_training_data,
 }
 """Name -> rule, in the order in which they are checked."""

@@ -5,6 +5,8 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Origin, Status, session_lag
+from harness.core.training_data import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
+from harness.errors import BadInput
 from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
@@ -126,6 +128,18 @@ def keeps_lag_and_uncertainty(case: ContractCase) -> str:
             raise RuleViolation(f"{found} {when}; {text} without losses")
         text = found
     return text
+
+
+def declares_training_data(case: ContractCase) -> str:
+    """The declared training data is a text that agrees with `needs_examples`; a method without one passes."""
+    try:
+        declared = declared_training_data(case.method)
+    except BadInput as error:
+        raise RuleViolation(str(error)) from error
+    if declared == (NONE if case.method.needs_examples else EXAMPLES):
+        raise RuleViolation(f"training_data is {declared!r}, but needs_examples is {case.method.needs_examples}")
+    missing = ", as its rank will say; declare it by the attribute training_data" if declared == UNKNOWN else ""
+    return training_note(declared) + missing or f"training data: {declared}"
 
 
 def _station_error_mm(case: ContractCase, frames: Frames) -> Floats:

@@ -8,11 +8,12 @@ import pytest
 from matplotlib.colors import to_hex
 
 from harness.compare.paired_statistics import mean_interval
+from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput
 from harness.report.figures.conditions import read_conditions
 from harness.report.figures.ranking import ranking_figure
 from harness.report.figures.selection import FigureSelection
-from harness.report.kit.ranking_chart import wrap_name
+from harness.report.kit.ranking_chart import RankingPanel, explain_marks, wrap_name
 from harness.report.kit.style import COLOURS, FAINT
 from tests.compare.sides import cell, side, write_run
 from tests.report.drawing import texts_apart
@@ -27,22 +28,48 @@ def test_rows_have_the_means_intervals_and_differences_of_the_ranking(ranked: Pa
     with drawn(ranking_figure(run, FigureSelection()), width_mm) as figure:
         means, differences = figure.axes
         assert [text.get_text() for text in means.get_yticklabels()] == list(ranking.values)
-        dots = [float(np.ravel(line.get_xdata())[0]) for line in means.lines]
-        np.testing.assert_allclose(dots, list(ranking.means.values()))
+        *inside, control = ranking.values  # the control errs four times as much, so its values stand at the edge
+        *dots, edge = [float(np.ravel(line.get_xdata())[0]) for line in means.lines]
+        np.testing.assert_allclose(dots, [ranking.means[name] for name in inside])
         np.testing.assert_allclose(
-            spans(means.collections, 0), [mean_interval(values) for values in ranking.values.values()]
+            spans(means.collections, 0), [mean_interval(ranking.values[name]) for name in inside]
         )
-        shown = [float(np.ravel(line.get_xdata())[0]) for line in differences.lines[1:]]
-        np.testing.assert_allclose(shown, [0.0, *ranking.differences.values()])
-        expected = [(-r.high, -r.low) for r in ranking.results.values() if r.low is not None and r.high is not None]
+        *shown, other_edge = [float(np.ravel(line.get_xdata())[0]) for line in differences.lines[1:]]
+        np.testing.assert_allclose(shown, [0.0, *(ranking.differences[name] for name in inside[1:])])
+        results = [ranking.results[name] for name in inside[1:]]
+        expected = [(-r.high, -r.low) for r in results if r.low is not None and r.high is not None]
         np.testing.assert_allclose(spans(differences.collections, 0), expected)
+        assert edge == other_edge == 1.0  # of the width of the axis
+        written = [[text.get_text() for text in axes.texts if text.get_text()[-1:].isdigit()] for axes in figure.axes]
+        assert written == [[f"{ranking.means[control]:.2f}"], [f"+{ranking.differences[control]:.2f}"]]
+        assert means.get_xlim()[1] < 0.5 * ranking.means[control]
         texts_apart(figure)
+
+
+@pytest.mark.parametrize(
+    ("means", "inside"),
+    [
+        ([1.0, 1.1, 1.2, 7.9], 3),
+        ([1.0, 1.1, 1.2, 2.1], 4),
+        ([1.0, 1.1, 8.0, 9.0], 2),
+        ([1.0, 8.0], 2),
+        ([1.0, 8.0, 9.0], 3),
+        ([1.0, 1.1, 2.9, 3.5, 100.0, 200.0], 4),
+        ([2.0], 1),
+        ([0.0, 0.0, 1.0], 2),
+    ],
+)
+def test_a_method_that_errs_several_times_as_much_does_not_squeeze_the_others(means: list[float], inside: int) -> None:
+    values = {f"m{n}": np.full(8, mean) for n, mean in enumerate(means)}
+    panel = RankingPanel("", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), values, {}, {}))
+    assert panel.largest_drawn == means[inside - 1]
+    assert ("beyond the axis" in explain_marks([panel])) == (inside < len(means))
 
 
 def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None:
     with drawn(ranking_figure(read_conditions(ranked), FigureSelection())) as figure:
         marks = [(line.get_marker(), to_hex(line.get_color())) for line in figure.axes[0].lines]
-        assert marks == [("D", COLOURS[1]), ("o", COLOURS[1]), ("s", FAINT), ("s", FAINT)]
+        assert marks == [("D", COLOURS[1]), ("o", COLOURS[1]), ("s", FAINT), (">", FAINT)]
         assert figure.axes[0].get_yticklabels()[0].get_fontweight() == "bold"
         (legend,) = figure.legends
         assert [text.get_text() for text in legend.get_texts()] == ["lowest mean", "tied with it", "worse"]
@@ -53,9 +80,9 @@ def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
     figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
     assert "Fewer than 6 clips cannot show a difference." in figure.caption
     with drawn(figure) as shown:
-        (heading,) = shown.axes[0].texts
+        *_, heading = shown.axes[0].texts  # after the values at the edge
         assert heading.get_text() == "4 clips: differences cannot be shown"
-        assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o"}
+        assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o", ">"}
 
 
 def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
