@@ -1,7 +1,7 @@
 """Replaces the part of a Markdown page that stands between two markers, which name what wrote it."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -37,7 +37,7 @@ def replace_block(page: Path, label: str, lines: Iterable[str]) -> None:
         write_text(page, updated)
 
 
-def describe_code(circumstances: dict[str, object]) -> str:
+def describe_code(circumstances: Mapping[str, object]) -> str:
     """The version of the harness that made something, such as "harness 0.1.0, commit 0fb4ebc7c52a"."""
     commit = f"commit {str(circumstances['commit'])[:12]}" if circumstances.get("commit") else "no commit"
     changes = " with uncommitted changes" if circumstances.get("dirty") else ""
