@@ -21,6 +21,7 @@ from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
 from harness.results.storage import read_summary
+from harness.testing.contract_case import make_case
 from tests.short_demo import short_demo
 
 ROOT = Path(harness.__file__).parent.parent
@@ -29,6 +30,18 @@ OWN_METHOD = (ROOT / "docs" / "own_method.md").read_text(encoding="utf-8")
 RESULTS = (ROOT / "results" / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DEMO = load_scenario("demo")
+EIGHT_WALKS = """schema = 1
+methods = ["ridge"]
+stations = "liu2011"
+[motion]
+source = "builtin"
+body = "common"
+database = "behaviour"
+longest_s = 1.5
+behaviours = ["walking"]
+test = ["walking_p[1-8]_01"]
+examples = ["walking_p1_02", "walking_p2_02"]
+"""
 
 
 def test_the_documented_method_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,6 +77,46 @@ def test_the_first_screen_of_the_readme_gives_a_verdict_on_an_own_method(
     assert main([*shlex.split(run), "--no-report"]) == 0
     assert main(shlex.split(compare)) == Outcome.NOT_COMPARABLE.exit_code
     assert "too few clips: 5" in capsys.readouterr().out
+
+
+def test_every_block_of_the_page_on_own_methods_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One after another in one namespace. The module that wraps `ridge` is tried as a method."""
+    namespace: dict[str, object] = {"__name__": "page"}
+    blocks = re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)
+    for block in blocks:
+        exec(compile(block, "docs/own_method.md", "exec"), namespace)  # noqa: S102  # a reader does this
+    (wrapper,) = (block for block in blocks if block.startswith("# steady.py\n"))
+    (tmp_path / "steady.py").write_text(wrapper)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    hinges = [
+        np.array([estimate.qpos[7:] for estimate in case.run(case.frames)])
+        for case in (make_case(registry.resolve(name)) for name in ("ridge", "steady:Steady"))
+    ]
+    np.testing.assert_array_equal(hinges[1][0], hinges[0][0])
+    np.testing.assert_allclose(hinges[1][1], 0.5 * (hinges[0][0] + hinges[0][1]), atol=1e-12)
+
+
+@pytest.mark.long
+def test_the_copied_method_beats_a_control_and_the_named_change_breaks_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the very commands; `gate` is eight short walks here, and the joint angle alone decides."""
+    section = OWN_METHOD.split("## A whole method")[0]
+    ((source, copy),) = re.findall(r"^    cp (\S+) (\S+)", section, re.MULTILINE)
+    ((option, bad, good),) = re.findall(r"`(\w+)` the default ([\d.]+) in place of\s([\d.]+)\.\s", section)
+    code = (ROOT / source).read_text(encoding="utf-8")
+    (line,) = re.findall(rf"^    {option}: .* = {good}$", code, re.MULTILINE)
+    (tmp_path / "gate").write_text(EIGHT_WALKS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    run, compare, run_again, compare_again = (c for c in commands(section) if c.startswith(("run ", "compare ")))
+    decides = ["--metrics", "joint_angle_mean_deg"]
+    (tmp_path / copy).write_text(code)
+    assert main([*shlex.split(run), "--no-report"]) == 0
+    assert main([*shlex.split(compare), *decides]) == Outcome.PASS.exit_code
+    (tmp_path / copy).write_text(code.replace(line, line.replace(good, bad)))
+    assert main([*shlex.split(run_again), "--no-report"]) == 0
+    assert main([*shlex.split(compare_again), *decides]) == Outcome.REGRESSED.exit_code
 
 
 def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

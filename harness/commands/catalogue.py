@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
+
+from harness.body.humanoid import build_body
 from harness.body.places import NAMED_PLACES
+from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
@@ -34,6 +38,7 @@ def build_catalogue() -> dict[str, dict[str, str]]:
         },
         "figures": {name: kind.text for name, kind in KINDS.items()},
         "places": {place.name: f"{place.text}; bone {place.bone}" for place in NAMED_PLACES.values()},
+        "hinges in the order of qpos": _describe_hinges(),
         "metrics": {name: f"[{d.unit}] {d.text}" for name, d in {**DEFINITIONS, **SIGMA_DEFINITIONS}.items()},
     }
 
@@ -44,6 +49,16 @@ def _describe_method(name: str) -> str:
     examples = "examples" if method.needs_examples else "no examples"
     said = [method.summary, f"needs {examples}, takes any inputs", registry.origin(name)]
     return "; ".join(part for part in said if part)
+
+
+def _describe_hinges() -> dict[str, str]:
+    """The 48 hinges by name, in the order of `qpos[7:]`, which reverses the skeleton's order within each bone."""
+    body, found = build_body(), dict[str, str]()
+    for place, dof in enumerate(QPOS_OF_DOF, start=7):  # the order is its own inverse
+        axis, (low, high) = body.skeleton.axes[dof], np.rad2deg(body.limits_rad[dof])
+        about = f"axis ({axis[0]:.2f}, {axis[1]:.2f}, {axis[2]:.2f}) of its bone"
+        found[body.skeleton.dof_names[dof]] = f"qpos[{place}]; {about}; {low:.0f} to {high:.0f} deg"
+    return found
 
 
 def _describe_scenario(name: str) -> str:

@@ -8,10 +8,11 @@ from harness.errors import Outcome, UnknownName
 
 def add_list(verbs: Verbs) -> None:
     text = (
-        "list the methods, scenarios, studies, places on the body, synthetic takes, noise presets, figures and metrics"
+        "list the methods, scenarios, studies, places on the body, synthetic takes, noise presets, figures, hinges "
+        "and metrics"
     )
     verb = add_verb(verbs, "list", text, run_list)
-    verb.add_argument("kind", nargs="?", help="list one kind alone, such as methods, scenarios, places or metrics")
+    verb.add_argument("kind", nargs="?", help="list one kind alone, such as methods, places, hinges or metrics")
 
 
 def run_list(args: argparse.Namespace) -> Outcome:

@@ -23,6 +23,7 @@ from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
 from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.reconstruct.methods.ridge import Ridge
 
 GROUP = "harness.methods"
 """Entry-point group of installed packages."""
@@ -38,6 +39,7 @@ _BUILT_IN: dict[str, Callable[[], Method]] = {
     "ik:mean": lambda: ik.MEAN,
     "ik:gaussian": lambda: ik.GAUSSIAN,
     "mean_pose": MeanPose,
+    "ridge": Ridge,
     "kernel_ridge": KernelRidge,
     "best_match": BestMatch,
     "local_pca": local_pca.LocalPca,
@@ -74,6 +76,7 @@ def defining_module(name: str) -> str:
 _ORIGINS = {
     "ik": "docs/papers.md C1",
     "best_match": "Slyper & Hodgins 2008, who play the nearest example",
+    "ridge": "ridge regression, Hoerl & Kennard 1970",
     "kernel_ridge": "kernel ridge regression, Saunders et al. 1998",
     "local_pca": "Chai & Hodgins 2005, as Liu et al. 2011 compare with it",
     "dynamic_map": "Liu et al. 2011, eq. 2 to 14",

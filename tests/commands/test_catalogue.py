@@ -3,8 +3,10 @@
 import json
 from importlib.metadata import EntryPoint
 
+import numpy as np
 import pytest
 
+from harness.body.humanoid import build_body
 from harness.body.places import NAMED_PLACES
 from harness.cli import main
 from harness.commands.catalogue import build_catalogue
@@ -30,6 +32,18 @@ def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest
     entry = EntryPoint("theirs", "tests.commands.test_catalogue:Theirs", registry.GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
     assert build_catalogue()["methods"]["theirs"].endswith("; Somebody 2031")
+
+
+def test_hinges_are_listed_in_the_order_of_the_model() -> None:
+    listed, body = build_catalogue()["hinges in the order of qpos"], build_body()
+    addresses = {body.model.joint(name).qposadr[0]: name for name in listed}
+    assert [addresses[place] for place in range(7, 55)] == list(listed)
+    assert list(listed) != list(body.skeleton.dof_names)
+    assert [text.partition(";")[0] for text in listed.values()] == [f"qpos[{place}]" for place in range(7, 55)]
+    for name, text in listed.items():
+        low, high = np.rad2deg(body.model.joint(name).range)
+        axis = ", ".join(f"{x:.2f}" for x in body.model.joint(name).axis)
+        assert text.endswith(f"; axis ({axis}) of its bone; {low:.0f} to {high:.0f} deg")
 
 
 def test_a_scenario_says_what_it_varies() -> None:

@@ -84,7 +84,7 @@ def test_the_tables_are_read() -> None:
     assert len(documented()) > 90
     assert {method for method, _ in documented()} == {
         *("ik", "local_pca", "dynamic_map", "dynamic_map:window", "dynamic_map:literal"),
-        *("kernel_cca", "weighted_blend", "kernel_ridge"),
+        *("kernel_cca", "weighted_blend", "kernel_ridge", "ridge"),
     }
     assert values("0.1 mm, 0.3 m") == [pytest.approx(1e-4), 0.3]
     assert values("0.3, 3 m") == [0.3, 3.0]

@@ -50,6 +50,7 @@ SEEN_IT = Bound(1.0, 10.0)
 """Bound of methods that learn from examples, unless `BOUNDS` has another."""
 BOUNDS = {
     "mean_pose": Bound(9.0, 150.0),  # one posture for all
+    "ridge": Bound(4.0, 60.0),  # linear maps
     "ik": Bound(4.0, 8.0),  # what no station shows is only held to a prior
     "ik:mean": Bound(4.0, 8.0),
     "ik:previous": Bound(4.0, 8.0),

@@ -44,6 +44,7 @@ def test_inverse_kinematics_answers_until_there_is_a_history(name: str) -> None:
         "mean_pose",
         "best_match",
         "kernel_ridge",
+        "ridge",
         "kernel_cca",
         "weighted_blend",
         "weighted_blend+ik",
