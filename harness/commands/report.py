@@ -6,7 +6,7 @@ from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.core.progress import ProgressBar, show_steps
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 
 
 def add_report(verbs: Verbs) -> None:
@@ -19,6 +19,7 @@ def add_report(verbs: Verbs) -> None:
     )
     text = "also replace the table of this run, or the tables of this paper, in a page such as README.md"
     verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--methods", metavar="A,B", help="methods in the table of a run that --readme writes")
 
 
 def run_report(args: argparse.Namespace) -> Outcome:
@@ -27,7 +28,9 @@ def run_report(args: argparse.Namespace) -> Outcome:
     kind = require_kind(args.run, "run", "sweep", "placement", "paper")
     if args.readme:
         require_kind(args.run, "run", "paper")
-    if args.movie:
+    if args.methods and not args.readme:
+        raise BadInput("--methods without --readme.", "The page has all methods; name the file of the table.")
+    if args.movie or args.methods:
         require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
@@ -36,9 +39,10 @@ def run_report(args: argparse.Namespace) -> Outcome:
     with show_steps("parts of the report"), ProgressBar("movies") as bar:
         page = write_run_page(args.run, movie=args.movie, progress=bar)
     if args.readme:
+        from harness.core.options import split_outside_brackets
         from harness.report.figures.performer_table import update_readme
 
-        update_readme(args.readme, args.run)
+        update_readme(args.readme, args.run, split_outside_brackets(args.methods, ",") if args.methods else ())
     return _print_page(args, page, following=["plot", args.run, "--kind", "ranking"])
 
 

@@ -4,6 +4,7 @@ Clips of one performer are not independent. Each performer therefore counts once
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from harness.core.split import performer_of
 from harness.report.figures.conditions import RunCondition, read_conditions
 from harness.report.figures.table_formats import markdown_code
 from harness.report.kit.marked_block import describe_code, replace_block
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_label
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -50,6 +51,12 @@ class PerformerColumn:
         interval = f" ({' to '.join(format_number(end, _UNIT) for end in ends)})" if ends else ""
         return f"**{mean}**{interval}" if bold else f"{mean}{interval}"
 
+    def lowest_on(self) -> str:
+        """On how many performers each method has the lowest error, such as "`ik` 4, `ridge` 1"."""
+        units = next(iter(self.errors.values()), {})
+        lowest = Counter(min(self.errors, key=lambda name, unit=unit: self.errors[name][unit]) for unit in units)
+        return ", ".join(f"{markdown_code(name)} {count}" for name, count in lowest.most_common())
+
     @property
     def _worse(self) -> list[str]:
         """Methods whose paired difference from the lowest mean is shown to be positive; none with few performers."""
@@ -58,9 +65,12 @@ class PerformerColumn:
         return [name for name, difference in differences.items() if difference.verdict == "reproduced"]
 
 
-def performer_columns(folder: Path) -> list[PerformerColumn]:
-    """The conditions of the run in `folder`, known performers first; raises what `read_conditions` raises."""
-    run = read_conditions(folder)
+def performer_columns(folder: Path, methods: Sequence[str] = ()) -> list[PerformerColumn]:
+    """The conditions of the run in `folder`, known performers first, with all methods or these.
+
+    Raises what `read_conditions` raises, and UnknownName for a method that the run lacks.
+    """
+    run = read_conditions(folder).select(methods=methods)
     ordered = sorted(run.conditions, key=lambda each: each.group.performer)
     titles = _titles(ordered)
     return [
@@ -95,14 +105,14 @@ def _titles(conditions: Sequence[RunCondition]) -> list[str]:
     return [", ".join(filter(None, part.values())) or "error" for part in parts]
 
 
-def update_readme(readme: Path, folder: Path) -> None:
+def update_readme(readme: Path, folder: Path, methods: Sequence[str] = ()) -> None:
     """Replace the table of the run in `folder`, by the name of its scenario, or append it.
 
-    Raises what `read_conditions` and `replace_block` raise.
+    Raises what `performer_columns` and `replace_block` raise.
     """
     manifest = Manifest.read(folder / "manifest.json")
     label = f"run {manifest.inputs.get('name', folder.name)}"
-    replace_block(readme, label, table_lines(performer_columns(folder), manifest.circumstances))
+    replace_block(readme, label, table_lines(performer_columns(folder, methods), manifest.circumstances))
 
 
 def table_lines(columns: Sequence[PerformerColumn], circumstances: Mapping[str, object]) -> list[str]:
@@ -112,13 +122,14 @@ def table_lines(columns: Sequence[PerformerColumn], circumstances: Mapping[str, 
         ["method", *(column.title for column in columns)],
         ["---", *["--:"] * len(columns)],
         *([markdown_code(name), *(column.text(name) for column in columns)] for name in methods),
-        ["performers", *(str(column.performers) for column in columns)],
+        ["lowest on", *(column.lowest_on() for column in columns)],
+        ["units (performers)", *(str(column.performers) for column in columns)],
     ]
-    tied = "Bold: the lowest mean, and means that paired differences do not show to be higher."
-    few = f"Fewer than {MIN_CLIPS} performers cannot show a difference, so nothing is bold there."
+    tied = "Bold: the lowest mean, and means not shown to be higher."
+    few = f"Fewer than {MIN_CLIPS} performers cannot show a difference."
     counts = [column.performers for column in columns]
     note = [
-        f"Mean {quantity(PRIMARY_METRIC)} in {_UNIT} over performers, and its 95 % interval.",
+        f"Mean {metric_label(PRIMARY_METRIC)} over performers and its 95 % interval.",
         *([tied] if any("**" in text for row in rows for text in row) else []),
         *([few] if min(counts) < MIN_CLIPS else []),
         f"Made by {_command(circumstances)} ({describe_code(circumstances)}).",

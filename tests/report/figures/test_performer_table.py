@@ -39,7 +39,8 @@ def test_bold_are_the_lowest_and_what_is_tied_with_it() -> None:
     few = PerformerColumn("known", {name: dict(list(found.items())[:5]) for name, found in errors.items()})
     assert not any(few.text(name).startswith("**") for name in errors)
     assert few.text("absent") == "–"
-    (note,) = (" ".join(table_lines(columns, {})[6:]) for columns in [[column, few]])
+    assert few.lowest_on() == "`tied` 3, `low` 2"
+    (note,) = (" ".join(table_lines(columns, {})[7:]) for columns in [[column, few]])
     assert "Bold: the lowest mean" in note
     assert "Fewer than 6 performers cannot show a difference" in note
 
@@ -59,7 +60,7 @@ def test_a_column_is_named_by_what_tells_it_apart(tmp_path: Path) -> None:
     lines = page.read_text().splitlines()
     assert lines[2] == "<!-- run made_up -->"
     assert lines[3] == "| method | known, clean | known, default | new, clean | new, default |"
-    assert "| performers | 7 | 7 | 3 | 3 |" in lines
+    assert "| units (performers) | 7 | 7 | 3 | 3 |" in lines
     assert "`harness run made_up --methods ik,expert_map`" in " ".join(lines)
     assert max(map(len, lines)) <= 120
 
@@ -76,9 +77,13 @@ def test_a_second_update_replaces_the_first(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_verb_puts_the_table_of_a_run_into_a_page(tmp_path: Path) -> None:
-    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0}))
+    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0, "mean_pose": 8.0}))
     page = tmp_path / "README.md"
     page.write_text("# Page\n")
-    assert main(["report", str(out), "--readme", str(page)]) == 0
-    assert re.search(r"^\| `ik` \| \d", page.read_text(), re.MULTILINE)
+    assert main(["report", str(out), "--readme", str(page), "--methods", "ik"]) == 0
+    assert re.findall(r"^\| `(\w+)` \| \d", page.read_text(), re.MULTILINE) == ["ik"]
     assert (out / "report.html").is_file()
+    before = page.read_bytes()
+    assert main(["report", str(out), "--readme", str(page), "--methods", "other"]) == 2
+    assert main(["report", str(out), "--methods", "ik"]) == 2
+    assert page.read_bytes() == before
