@@ -49,7 +49,8 @@ def stack(parts: list[Image.Image]) -> Image.Image:
     for part in parts:
         picture.paste(part.convert("RGB"), (MARGIN_PX, top))
         top += part.height
-    return picture.resize((WIDTH_PX, round(WIDTH_PX * picture.height / picture.width))).quantize(256, dither=Image.Dither.NONE)
+    small = picture.resize((WIDTH_PX, round(WIDTH_PX * picture.height / picture.width)))
+    return small.quantize(256, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":
