@@ -38,7 +38,11 @@ class PerformerColumn:
 
     @property
     def performers(self) -> int:
-        return len(next(iter(self.errors.values()), {}))
+        return len(self._units)
+
+    @property
+    def _units(self) -> list[str]:
+        return list(next(iter(self.errors.values()), {}))
 
     def text(self, method: str) -> str:
         """Mean and 95 % interval; bold if it is lowest or tied and another method is worse. A dash if not measured."""
@@ -53,8 +57,8 @@ class PerformerColumn:
 
     def lowest_on(self) -> str:
         """On how many performers each method has the lowest error, such as "`ik` 4, `ridge` 1"."""
-        units = next(iter(self.errors.values()), {})
-        lowest = Counter(min(self.errors, key=lambda name, unit=unit: self.errors[name][unit]) for unit in units)
+        errors = [[(error[unit], name) for name, error in self.errors.items()] for unit in self._units]
+        lowest = Counter(min(of_unit)[1] for of_unit in errors)
         return ", ".join(f"{markdown_code(name)} {count}" for name, count in lowest.most_common())
 
     @property

@@ -22,8 +22,8 @@ def test_three_clips_of_a_performer_are_one_unit(tmp_path: Path) -> None:
     clips = [f"walking_p{n}_01" for n in range(1, 8)] + ["walking_p1_02", "walking_p1_03@0.00-0.50"]
     cells = tuple(cell(clip, method) for clip in clips for method in ("ik", "mean_pose"))
     (column,) = performer_columns(write_run(tmp_path / "run", ResultSet("A", manifest(), cells, len(cells))))
-    errors = {c.clip: c.metrics["joint_angle_mean_deg"] for c in cells if c.method == "ik"}
-    first = np.mean([error for clip, error in errors.items() if "_p1_" in clip])
+    errors = {c.clip: float(c.metrics["joint_angle_mean_deg"] or 0.0) for c in cells if c.method == "ik"}
+    first = float(np.mean([error for clip, error in errors.items() if "_p1_" in clip]))
     by_performer = [first, *(errors[f"walking_p{n}_01"] for n in range(2, 8))]
     low, high = mean_interval(np.array(by_performer))
     assert column.performers == 7
