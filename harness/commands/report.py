@@ -1,11 +1,12 @@
 """The verb `report`: write the page and plots of finished work again."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.core.progress import ProgressBar, show_steps
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 
 
 def add_report(verbs: Verbs) -> None:
@@ -16,26 +17,33 @@ def add_report(verbs: Verbs) -> None:
     verb.add_argument(
         "--movie", action="store_true", help="also write an mp4 of the worst cell of each method of a run"
     )
-    text = "also replace the tables of a paper that this page shows, such as results/README.md"
+    text = "also replace the table of this run, or the tables of this paper, in a page such as README.md"
     verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--methods", metavar="A,B", help="methods in the table of a run that --readme writes")
 
 
 def run_report(args: argparse.Namespace) -> Outcome:
     from harness.results.folder_kind import require_kind
 
     kind = require_kind(args.run, "run", "sweep", "placement", "paper")
-    for option, needed in ((args.readme, "paper"), (args.movie, "run")):
-        if option:
-            require_kind(args.run, needed)
+    if args.readme:
+        require_kind(args.run, "run", "paper")
+    if args.methods and not args.readme:
+        raise BadInput("--methods without --readme.", "The page has all methods; name the file of the table.")
+    if args.movie or args.methods:
+        require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
     from harness.report.run.writer import write_run_page
 
     with show_steps("parts of the report"), ProgressBar("movies") as bar:
         page = write_run_page(args.run, movie=args.movie, progress=bar)
-    return print_result(
-        args, {"report": str(page)}, f"report: {page}", following=["plot", args.run, "--kind", "ranking"]
-    )
+    if args.readme:
+        from harness.core.options import split_outside_brackets
+        from harness.report.figures.performer_table import update_readme
+
+        update_readme(args.readme, args.run, split_outside_brackets(args.methods, ",") if args.methods else ())
+    return _print_page(args, page, following=["plot", args.run, "--kind", "ranking"])
 
 
 def _report_sweep(args: argparse.Namespace) -> Outcome:
@@ -66,5 +74,11 @@ def _report_paper(args: argparse.Namespace) -> Outcome:
         page = write_paper_page(args.run)
     if args.readme:
         update_readme(args.readme, read_findings(args.run / FINDINGS))
+    return _print_page(args, page)
+
+
+def _print_page(args: argparse.Namespace, page: Path, following: Sequence[object] = ()) -> Outcome:
+    """Print the page that was written, and the page with tables that was updated."""
     lines = [f"report: {page}", *([f"tables: {args.readme}"] if args.readme else [])]
-    return print_result(args, {"report": str(page), "readme": args.readme and str(args.readme)}, *lines)
+    content = {"report": str(page), "readme": args.readme and str(args.readme)}
+    return print_result(args, content, *lines, following=following)

@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.body.rendering import RenderScene
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.files import atomic_path
 from harness.core.plain_import import plain_import
 from harness.view.movie import DRAWN_SUFFIX
@@ -20,7 +20,7 @@ from harness.view.movie import DRAWN_SUFFIX
 with plain_import():
     import pyvista as pv
 
-_TRUTH, _METHODS, _LOST = "#5b87ad", ("#e8850c", "#0f9d76", "#c05f9c"), "#8d98a5"
+TRUTH, _METHODS, _LOST = "#5b87ad", ("#e8850c", "#0f9d76", "#c05f9c"), "#8d98a5"
 _STATIONS = ("#20a4a8", "#e0b000", "#d43c3c")
 """Colours of a station that is valid, partly missing, or lost."""
 _AXES = ("#d84a3a", "#3f9b45", "#3b6fd4")
@@ -103,18 +103,19 @@ class MoviePane:
         known = truth_m is not None and job["truth_states"][frame] != _NO_ESTIMATE
         if self._method is not None and self._estimate is not None:
             joints_m, state = job[f"joints_m_{self._method}"][frame], job[f"states_{self._method}"][frame]
-            paint = np.tile(_rgb(_LOST if state == _LOST_STATE else _METHODS[self._method]), (len(joints_m), 1))
+            paint = np.tile(rgb(_LOST if state == _LOST_STATE else _METHODS[self._method]), (len(joints_m), 1))
             if known and job["colour_by_error"]:
-                paint = _error_colours(np.linalg.norm(joints_m - truth_m, axis=1))
+                paint = error_colours(np.linalg.norm(joints_m - truth_m, axis=1))
             self._estimate.move(joints_m[bones], (0.6 if known else 1.0) * radii_m, paint[bones])
             self._estimate.show(state != _NO_ESTIMATE)
             root_m = joints_m[0]
         if truth_m is not None and self._truth is not None:
-            self._truth.move(truth_m[bones], radii_m, np.broadcast_to(_rgb(_TRUTH), (len(bones), 2, 3)))
+            self._truth.move(truth_m[bones], radii_m, np.broadcast_to(rgb(TRUTH), (len(bones), 2, 3)))
             self._truth.show(known)
             root_m = truth_m[0] if known or root_m is None else root_m
         if self._stations is not None:
-            self._stations.move(*_station_capsules(job, frame))
+            parts = (job[name][frame] for name in ("station_m", "world_from_station", "station_states"))
+            self._stations.move(*station_capsules(*parts))
             root_m = np.mean(job["station_m"][frame], axis=0) if root_m is None else root_m
         if root_m is not None:
             self._scene.follow(root_m)
@@ -124,25 +125,30 @@ class MoviePane:
         self._scene.close()
 
 
-def _station_capsules(job: dict[str, Any], frame: int) -> tuple[Floats, Floats, Floats]:
-    """Ends, radii and colours of a disc and three axes for each station."""
-    at_m, states = job["station_m"][frame], job["station_states"][frame]
-    axes = np.swapaxes(rotations.to_matrix(job["world_from_station"][frame]), 1, 2)
-    disc = at_m[:, None] + _DISC_M * np.stack([-axes[:, 0], axes[:, 0]], axis=1)
-    arms = np.stack([np.broadcast_to(at_m[:, None], axes.shape), at_m[:, None] + _AXIS_M * axes], axis=2)
+def station_capsules(
+    at_m: Floats, world_from_station: Floats, states: Ints, size: float = 1.0
+) -> tuple[Floats, Floats, Floats]:
+    """Ends, radii and colours of a disc and three axes for each of S stations, `size` times as large as usual.
+
+    `at_m` (S, 3) are positions, `world_from_station` (S, 4) orientations, and `states` (S,) index the discs' colours.
+    """
+    axes = np.swapaxes(rotations.to_matrix(world_from_station), 1, 2)
+    disc = at_m[:, None] + size * _DISC_M * np.stack([-axes[:, 0], axes[:, 0]], axis=1)
+    arms = np.stack([np.broadcast_to(at_m[:, None], axes.shape), at_m[:, None] + size * _AXIS_M * axes], axis=2)
     ends_m = np.concatenate([disc[:, None], arms], axis=1).reshape(-1, 2, 3)
-    radii_m = np.tile([_DISC_RADIUS_M, *[_AXIS_RADIUS_M] * 3], len(at_m))
-    colours = np.array([[_rgb(_STATIONS[state]), *map(_rgb, _AXES)] for state in states.tolist()]).reshape(-1, 3)
+    radii_m = size * np.tile([_DISC_RADIUS_M, *[_AXIS_RADIUS_M] * 3], len(at_m))
+    colours = np.array([[rgb(_STATIONS[state]), *map(rgb, _AXES)] for state in states.tolist()]).reshape(-1, 3)
     return ends_m, np.stack([radii_m, radii_m], axis=1), np.stack([colours, colours], axis=1)
 
 
-def _rgb(colour: str) -> Floats:
+def rgb(colour: str) -> Floats:
+    """(3,) parts of a colour "#rrggbb", 0 to 1."""
     return np.array([int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
 
 
-def _error_colours(error_m: Floats) -> Floats:
-    """(J, 3) colours of errors (J,) [m]."""
-    ramp, place = np.array([_rgb(c) for c in _RAMP]), np.linspace(0.0, _WORST_M, len(_RAMP))
+def error_colours(error_m: Floats, worst_m: float = _WORST_M) -> Floats:
+    """(J, 3) colours of errors (J,) [m]: the last colour of the ramp from `worst_m` on."""
+    ramp, place = np.array([rgb(c) for c in _RAMP]), np.linspace(0.0, worst_m, len(_RAMP))
     return np.stack([np.interp(error_m, place, ramp[:, c]) for c in range(3)], axis=1)
 
 

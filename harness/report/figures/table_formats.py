@@ -65,7 +65,7 @@ def to_markdown(table: ResultsTable) -> str:
     titles = _titles(table)
     texts = len(table.condition_names) + 1
     rules = ["---" if n < texts else "--:" for n in range(len(titles))]
-    names = [_markdown_code(row.method) for row in table.rows]
+    names = [markdown_code(row.method) for row in table.rows]
     rows = [
         [*map(_escape_markdown, row.condition), name, str(row.clips), *map(_markdown_value, row.values)]
         for name, row in zip(names, table.rows, strict=True)
@@ -79,7 +79,7 @@ def _markdown_value(value: MetricValue) -> str:
     return f"{f'**{mean}**' if value.bold else mean} {interval}".strip()
 
 
-def _markdown_code(text: str) -> str:
+def markdown_code(text: str) -> str:
     """A name as code: the fence is longer than any of its own backticks, and a bar would end the cell even here."""
     fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
     pad = " " if text.startswith("`") or text.endswith("`") else ""
