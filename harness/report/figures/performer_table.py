@@ -12,9 +12,10 @@ from textwrap import wrap
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, compare_paired, mean_interval
+from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
+from harness.compare.ranking import shared_clips
+from harness.compare.units import average_units
 from harness.core.number_format import format_number
-from harness.core.split import performer_of
 from harness.report.figures.conditions import RunCondition, read_conditions
 from harness.report.figures.table_formats import markdown_code
 from harness.report.kit.marked_block import describe_code, replace_block
@@ -77,22 +78,16 @@ def performer_columns(folder: Path, methods: Sequence[str] = ()) -> list[Perform
     run = read_conditions(folder).select(methods=methods)
     ordered = sorted(run.conditions, key=lambda each: each.group.performer)
     titles = _titles(ordered)
-    return [
-        PerformerColumn(title, _errors(each, run.performers or {})) for title, each in zip(titles, ordered, strict=True)
-    ]
+    return [PerformerColumn(title, _errors(each)) for title, each in zip(titles, ordered, strict=True)]
 
 
-def _errors(condition: RunCondition, performers: Mapping[str, str]) -> dict[str, dict[str, float]]:
-    """Errors by method and performer, of the clips that every method has; a clip of no known performer is a unit."""
+def _errors(condition: RunCondition) -> dict[str, dict[str, float]]:
+    """Errors by method and unit, of the clips that every method has."""
     by_clip = {name: values.get(PRIMARY_METRIC, {}) for name, values in condition.values().items()}
     by_clip = {name: errors for name, errors in by_clip.items() if errors}
-    shared = set.intersection(*map(set, by_clip.values())) if by_clip else set()
-    units: dict[str, list[str]] = {}
-    for clip in sorted(shared):
-        take = clip.partition("@")[0]
-        units.setdefault(performers.get(take) or performer_of(take) or clip, []).append(clip)
+    shared = shared_clips(by_clip.values())
     return {
-        name: {unit: float(np.mean([errors[clip] for clip in clips])) for unit, clips in units.items()}
+        name: average_units({clip: errors[clip] for clip in shared}, condition.performers)
         for name, errors in by_clip.items()
     }
 
@@ -130,12 +125,12 @@ def table_lines(columns: Sequence[PerformerColumn], circumstances: Mapping[str, 
         ["units (performers)", *(str(column.performers) for column in columns)],
     ]
     tied = "Bold: the lowest mean, and means not shown to be higher."
-    few = f"Fewer than {MIN_CLIPS} performers cannot show a difference."
+    few = f"Fewer than {MIN_UNITS} performers cannot show a difference."
     counts = [column.performers for column in columns]
     note = [
         f"Mean {metric_label(PRIMARY_METRIC)} over performers and its 95 % interval.",
         *([tied] if any("**" in text for row in rows for text in row) else []),
-        *([few] if min(counts) < MIN_CLIPS else []),
+        *([few] if min(counts) < MIN_UNITS else []),
         f"Made by {_command(circumstances)} ({describe_code(circumstances)}).",
     ]
     return [*(f"| {' | '.join(row)} |" for row in rows), "", *wrap(" ".join(note), _WIDTH, break_on_hyphens=False)]
