@@ -40,10 +40,8 @@ def add_all_flag(verb: argparse.ArgumentParser) -> None:
 def run_scenario(args: argparse.Namespace) -> Outcome:
     from dataclasses import replace
 
-    from harness.core.options import expand_alternatives, split_outside_brackets
     from harness.experiment import engine
     from harness.experiment.scenario import check_scenario, load_scenario
-    from harness.reconstruct import registry
     from harness.report.run.text import run_table
     from harness.results.storage import read_summary
 
@@ -51,11 +49,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     if args.seed is not None:
         scenario = replace(scenario, seed=args.seed)
     if args.methods is not None:
-        named = [name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)]
-        if EVERY_METHOD in named:
-            rest = (*scenario.methods, *registry.methods())
-            named = list(dict.fromkeys(each for name in named for each in (rest if name == EVERY_METHOD else [name])))
-        scenario = replace(scenario, methods=tuple(named))
+        scenario = replace(scenario, methods=_named_methods(args.methods, scenario.methods))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with (
@@ -89,3 +83,15 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         outcome=outcome,
         following=["view", out] if outcome is Outcome.PASS else ["status", out],
     )
+
+
+def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
+    """The methods that `--methods` names; `all` stands for the scenario's `own` and the others that are installed."""
+    from harness.core.options import expand_alternatives, split_outside_brackets
+    from harness.reconstruct import registry
+
+    named = [name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part)]
+    if EVERY_METHOD not in named:
+        return tuple(named)
+    every = (*own, *registry.methods())
+    return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))
