@@ -26,15 +26,15 @@ class WalkingPath:
 
 
 def sample_walking_path(
-    rng: np.random.Generator, t: Floats, take: int, speed: float = 1.0, variety: float = 1.0
+    rng: np.random.Generator, t: Floats, take: int, speed_factor: float = 1.0, variety: float = 1.0
 ) -> WalkingPath:
     """A random path at times `t` (T,) [s], centred on the origin; the take's number and chance decide its kind.
 
-    `speed` is a factor, `variety` one of the take's deviation from a usual speed.
+    `speed_factor` scales the speed, and `variety` the take's deviation from a usual speed.
     """
     kind = PATH_KINDS[(take - 1 + int(rng.integers(2))) % len(PATH_KINDS)]
     speed_m_s = rng.uniform(0.95, 1.6)
-    speed_m_s = speed * (speed_m_s + (variety - 1.0) * (speed_m_s - _USUAL_SPEED_M_S))
+    speed_m_s = speed_factor * (speed_m_s + (variety - 1.0) * (speed_m_s - _USUAL_SPEED_M_S))
     yaw = rng.uniform(-np.pi, np.pi) + smooth_noise(rng, t, 4.0, 0.05)
     slow = np.zeros(len(t))
     start_s = float(t[0])
