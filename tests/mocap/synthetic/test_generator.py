@@ -190,11 +190,11 @@ def test_every_style_moves_within_the_limits_of_joints(behaviour: str) -> None:
 @pytest.mark.long
 def test_walkers_differ_in_their_gait() -> None:
     """Standard deviation over performers of the mean of each hinge; that of CMU's walkers is 6 to 8.5 deg."""
-    spread_deg = {}
+    spread_deg = []
     for group in (synthetic.REFERENCE_PERFORMERS, STYLED[::7]):
         clips = [synthetic.generate("walking", who, 1, seed=7, duration_s=3.0, rate_hz=30.0) for who in group]
         means = np.rad2deg([clip.angles_rad.mean(axis=0) for clip in clips])
-        spread_deg[len(spread_deg)] = float(np.sqrt(means.var(axis=0, ddof=1).mean()))
+        spread_deg.append(float(np.sqrt(means.var(axis=0, ddof=1).mean())))
     assert spread_deg[0] < 4.0 < 4.8 < spread_deg[1] < 9.0
 
 
