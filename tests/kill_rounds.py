@@ -45,7 +45,7 @@ class Outside(MeanPose):
 SWEEP = """
 schema = 1
 scenarios = ["demo"]
-clips = ["walking_p1_01", "boxing_p1_01"]
+clips = ["walking_p1_01", "boxing_p11_01"]
 methods = ["mean_pose", "ik:previous"]
 
 [vary]

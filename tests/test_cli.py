@@ -11,6 +11,8 @@ import pytest
 
 from harness.cli import build_parser, main
 from harness.commands.common import repeat_flags
+from harness.commands.run import _named_methods
+from harness.reconstruct import registry
 from tests.short_demo import short_demo
 
 
@@ -65,6 +67,18 @@ def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_all_methods_are_the_scenario_s_and_every_other_one() -> None:
+    own = ("ik", "local_pca+ik")
+    assert _named_methods("mean_pose,ik[prior_sigma_rad=0.5|0.6]", own) == (
+        *("mean_pose", "ik[prior_sigma_rad=0.5]", "ik[prior_sigma_rad=0.6]"),
+    )
+    named = _named_methods("all,mine:Mine,ik", own)
+    assert named[:2] == own
+    assert named[-1] == "mine:Mine"
+    assert set(named) == {*own, *registry.methods(), "mine:Mine"}
+    assert len(set(named)) == len(named)
+
+
 def test_what_a_method_prints_is_talk_and_its_interrupt_a_failed_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -155,25 +155,27 @@ def test_documented_options_are_those_of_the_method() -> None:
 
 
 @pytest.mark.parametrize(
-    ("clip", "behaviour"),
+    "behaviour",
     [
-        pytest.param(clip, behaviour, marks=[] if behaviour == "boxing" else [pytest.mark.slow])
-        for clip, behaviour in zip(DEMO.motion.test, DEMO.motion.behaviours, strict=True)
+        pytest.param(behaviour, marks=[] if behaviour == "jumping" else [pytest.mark.slow])
+        for behaviour in dict.fromkeys(DEMO.motion.behaviours)
     ],
 )
-def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, clip: str, behaviour: str) -> None:
+def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, behaviour: str) -> None:
     """Every figure but times, to 5 %: another machine's arithmetic may differ in the last bits."""
     shown = RESULTS.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
-    alone = replace(DEMO, motion=replace(DEMO.motion, test=(clip,), behaviours=(behaviour,)))
+    clips = tuple(clip for clip in DEMO.motion.test if clip.startswith(behaviour))
+    alone = replace(DEMO, motion=replace(DEMO.motion, test=clips, behaviours=(behaviour,)))
     assert engine.run(alone, tmp_path / "demo") is Outcome.PASS
     made = run_table(read_summary(tmp_path / "demo"))
     rows, again = ([line.split() for line in text.splitlines() if "/" in line] for text in (shown, made))
-    assert len(rows) == 1 + len(DEMO.methods) * len(DEMO.motion.test)  # the title first
+    assert len(rows) == 1 + len(DEMO.methods) * len(set(DEMO.motion.behaviours))  # the title first
     of_it = [row for row in rows[1:] if row[0] == behaviour]
     assert len(of_it) == len(DEMO.methods)
     for row, other in zip(of_it, again[1:], strict=True):
         assert row[:5] == other[:5]
-        np.testing.assert_allclose([float(x) for x in row[5:-1]], [float(x) for x in other[5:-1]], rtol=0.05)
+        figures = [[float(x) for x in each[5:] if x != "±"][:-2] for each in (row, other)]  # the last ones are times
+        np.testing.assert_allclose(*figures, rtol=0.05, atol=0.02)
 
 
 def commands(text: str) -> list[str]:

@@ -8,6 +8,7 @@ from harness.bench.leak_check import bench_leak_check
 from harness.bench.live_viewer import bench_live_viewer
 from harness.bench.load import bench_load
 from harness.bench.neighbour_search import bench_index
+from harness.bench.performers import NoLibrary, bench_performers
 from harness.bench.physics.speed import bench_physics
 from harness.bench.regression_gate import bench_regression_gate
 from harness.bench.rejected_readings import bench_rejected_readings
@@ -61,6 +62,7 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkRow]]] = {
     "leak": lambda seed, large, runs: bench_leak_check(seed),
     "gate": lambda seed, large, runs: bench_regression_gate(seed),
     "sweep": lambda seed, large, runs: bench_sweep(seed),
+    "performers": lambda seed, large, runs: bench_performers(seed),
 }
 
 
@@ -76,7 +78,8 @@ def run_benchmarks(
 
     With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
     `wire` runs each line `runs` times, and so do `serve` and `view` their sessions.
-    UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed.
+    UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed, and NoLibrary
+    for a named one that needs real motion.
     """
     for name in names:
         if name not in BENCHMARKS:
@@ -88,7 +91,7 @@ def run_benchmarks(
         progress(name, done, len(chosen))
         try:
             rows += BENCHMARKS[name](seed, large, runs)
-        except MissingExtra as missing:
+        except (MissingExtra, NoLibrary) as missing:
             if names:
                 raise
             skipped.append(f"{name} was not run. {missing}")

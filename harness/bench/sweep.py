@@ -35,7 +35,7 @@ SMALL_SWEEP, TINY_SWEEP = 200, 20
 """Cells of the two sweeps whose difference gives the overhead; both write a report page."""
 REPEATS = 3
 """Number of repeats; the shortest time counts, since other load only adds to it."""
-CLIPS = ("walking_p1_01", "boxing_p1_01", "jumping_p1_01", "golf_p1_01")
+CLIPS = ("walking_p1_01", "boxing_p11_01", "jumping_p14_01", "golf_p16_01")
 PARALLEL_SWEEP = f"""
 schema = 1
 scenarios = ["demo"]

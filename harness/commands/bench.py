@@ -29,8 +29,8 @@ def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
     text = (
-        "methods, ik, index, wire, serve, view, stream, physics, lab, load, gate, sweep, startup (default: all), or "
-        "accuracy"
+        "methods, ik, index, wire, serve, view, stream, physics, lab, load, gate, sweep, startup, performers "
+        "(default: all), or accuracy"
     )
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"

@@ -10,17 +10,25 @@ from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
+EVERY_METHOD = "all"
+"""In `--methods`: the scenario's methods, and all others that are installed."""
+
 
 def add_run(verbs: Verbs) -> None:
     text = "run a scenario: every test clip with every method; the same command resumes an interrupted run"
     verb = add_verb(verbs, "run", text, run_scenario, "seed", "out", "jobs", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
-    text = "methods instead of the scenario's, such as ik,best_match+ik,my_module:MyMethod[option=3]"
-    verb.add_argument("--methods", metavar="A,B", help=text)
+    add_methods_flag(verb)
     add_isolation_flags(verb)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     add_all_flag(verb)
     verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
+
+
+def add_methods_flag(verb: argparse.ArgumentParser) -> None:
+    """Add `--methods`, for other methods than the scenario's."""
+    text = "methods instead of the scenario's, such as ik,best_match+ik,my_module:MyMethod[option=3]; all adds the rest"
+    verb.add_argument("--methods", metavar="A,B", help=text)
 
 
 def add_all_flag(verb: argparse.ArgumentParser) -> None:
@@ -32,7 +40,6 @@ def add_all_flag(verb: argparse.ArgumentParser) -> None:
 def run_scenario(args: argparse.Namespace) -> Outcome:
     from dataclasses import replace
 
-    from harness.core.options import expand_alternatives, split_outside_brackets
     from harness.experiment import engine
     from harness.experiment.scenario import check_scenario, load_scenario
     from harness.report.run.text import run_table
@@ -42,8 +49,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     if args.seed is not None:
         scenario = replace(scenario, seed=args.seed)
     if args.methods is not None:
-        named = (name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text))
-        scenario = replace(scenario, methods=tuple(named))
+        scenario = replace(scenario, methods=_named_methods(args.methods, scenario.methods))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with (
@@ -77,3 +83,15 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         outcome=outcome,
         following=["view", out] if outcome is Outcome.PASS else ["status", out],
     )
+
+
+def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
+    """The methods that `--methods` names; `all` stands for the scenario's `own` and the others that are installed."""
+    from harness.core.options import expand_alternatives, split_outside_brackets
+    from harness.reconstruct import registry
+
+    named = [name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part)]
+    if EVERY_METHOD not in named:
+        return tuple(named)
+    every = (*own, *registry.methods())
+    return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))

@@ -68,7 +68,7 @@ def generate_take(
 
     Behaviours and performers alternate; after all combinations the seed is increased. Angles are not clipped.
     """
-    performers = synthetic.performer_names()
+    performers = synthetic.REFERENCE_PERFORMERS
     round_index, index = divmod(index, len(behaviours) * len(performers))
     behaviour, performer = behaviours[index % len(behaviours)], performers[index // len(behaviours)]
     clip = synthetic.generate(behaviour, performer, 1, seed=seed + round_index, duration_s=TAKE_S, rate_hz=RATE_HZ)

@@ -2,6 +2,7 @@
 
 import os
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Protocol
 
@@ -68,8 +69,9 @@ def _synthetic_names() -> frozenset[str]:
 
 
 def _list_synthetic_names() -> tuple[str, ...]:
-    takes = (name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
-    return (*takes, *RIG_TAKES)
+    """All takes; the behaviours alternate, so that the first names, which a message suggests, are of each."""
+    takes = zip(*map(synthetic.take_names, synthetic.BEHAVIOURS), strict=True)
+    return (*chain.from_iterable(takes), *RIG_TAKES)
 
 
 class SyntheticSource:

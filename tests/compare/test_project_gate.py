@@ -7,9 +7,12 @@ import pytest
 
 from harness.compare.margins import GATED_METRICS
 from harness.compare.significance import SIGNIFICANCE
+from harness.core.split import ClipPart
 from harness.errors import RenamedKey
-from harness.experiment.clip_evaluation import noise_of
+from harness.experiment.clip_evaluation import ClipEvaluation, noise_of
 from harness.experiment.scenario import Scenario, load_scenario
+from harness.mocap.sources import open_motion_source
+from harness.mocap.synthetic import BEHAVIOURS
 from harness.reconstruct import registry
 from harness.results.reader import load_results
 from harness.testing.regression_gate import scenario_from_manifest
@@ -35,6 +38,22 @@ def test_the_clips_are_enough_to_show_a_change_among_all_lines(scenario: Scenari
     """All clips on one side are the least p that sign flips can give, and Holm multiplies it by the lines."""
     lines = len(scenario.methods) * len(GATED_METRICS)
     assert lines * 2.0 ** (1 - len(scenario.motion.test)) <= SIGNIFICANCE
+
+
+def test_each_clip_is_of_another_performer_and_half_of_them_are_known(scenario: Scenario) -> None:
+    """Counted as a run counts them: `known` if the examples of the clip's behaviour hold another of his takes."""
+    source = open_motion_source("builtin", None, seed=scenario.seed, rate_hz=None)
+    pairs = zip(scenario.motion.test, scenario.motion.behaviours, strict=True)
+    groups = [
+        ClipEvaluation(scenario, source, ClipPart(clip), behaviour).subject.performer for clip, behaviour in pairs
+    ]
+    performers = {source.performer(clip) for clip in scenario.motion.test}
+    assert len(performers) == len(groups) >= 24
+    assert groups.count("known") == groups.count("new") == len(groups) / 2
+    for behaviour in BEHAVIOURS:
+        of_it = [group for group, each in zip(groups, scenario.motion.behaviours, strict=True) if each == behaviour]
+        assert of_it.count("known") == of_it.count("new") >= 2
+    assert scenario.motion.longest_s == 4.0
 
 
 def test_the_baseline_is_small_and_of_this_scenario(scenario: Scenario) -> None:

@@ -59,7 +59,7 @@ SWEEP = """
 schema = 1
 name = "tiny"
 scenarios = ["demo"]
-clips = ["walking_p1_01", "boxing_p1_01"]
+clips = ["walking_p1_01", "boxing_p11_01"]
 methods = ["ik:previous", "ik:previous+ik"]
 
 [vary]

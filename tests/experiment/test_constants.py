@@ -66,6 +66,13 @@ def test_the_record_names_every_clip_of_a_search(name: str) -> None:
     assert set(SEARCHES[name]) <= {clip for clip, _ in CHOSEN}
 
 
+@pytest.mark.parametrize("name", ["walking", "new_performers", "jumping", "boxing"])
+def test_built_in_motion_was_not_made_like_the_clips_of_the_tables(name: str) -> None:
+    looked_at = [clip for entry in CONTENT["motion"] for clip in entry["clips"]]
+    assert looked_at
+    assert not [(test, clip) for test in JUDGING[name] for clip in looked_at if overlap(test, clip)]
+
+
 def test_the_seeds_of_the_truth_table_chose_no_default_of_the_physics() -> None:
     (entry,) = (entry for entry in CONTENT["constant"] if entry["method"] == "physics of the simulated tracker")
     assert max(SEEDS) < entry["seeds_from"]

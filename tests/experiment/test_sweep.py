@@ -67,7 +67,7 @@ def test_every_cell_is_in_the_table_in_planned_order(made_up: Path) -> None:
         (noise, rate, clip, method)
         for noise in ("clean", "default")
         for rate in ("20.0", "40.0")
-        for clip in ("walking_p1_01", "boxing_p1_01")
+        for clip in ("walking_p1_01", "boxing_p11_01")
         for method in ("ik:previous", "ik:previous+ik")
     ]
     assert {row["scenario"] for row in found} == {"demo"}
@@ -91,7 +91,7 @@ def test_any_number_of_workers_in_any_order_gives_the_same_bytes(made_up: Path) 
 @pytest.mark.parametrize("workers", [1, 2, 5, 16, 1000])
 def test_tasks_are_all_cells_once_and_enough_for_all_workers(workers: int) -> None:
     scenario = replace(load_scenario("demo"), vary={"noise": ["clean", "noise", "default"], "seed": [1, 2]})
-    one = replace(scenario, motion=replace(scenario.motion, test=("golf_p1_01",), behaviours=("golf",)))
+    one = replace(scenario, motion=replace(scenario.motion, test=("golf_p16_01",), behaviours=("golf",)))
     for asked in (scenario, one, replace(one, vary={})):
         names = cell_names(asked)
         tasks = plan_tasks([asked], None, "", workers)
@@ -180,7 +180,7 @@ def test_a_cell_of_another_name_is_refused_with_the_nearest(made_up: Path, capsy
 
 def test_a_worker_that_dies_takes_one_cell_with_it(made_up: Path) -> None:
     """Its task is made again cell by cell; the one that kills once more has failed."""
-    name = "demo seed 1: ik:previous+ik on boxing_p1_01 (noise=clean tracker.rate_hz=40)"
+    name = "demo seed 1: ik:previous+ik on boxing_p11_01 (noise=clean tracker.rate_hz=40)"
 
     def deadly(
         function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /

@@ -165,7 +165,7 @@ def test_two_thousand_cells_of_a_cluster_that_loses_one_of_two_workers_are_those
 STUDY = """
 schema = 1
 scenarios = ["demo"]
-clips = ["walking_p1_01", "boxing_p1_01", "golf_p1_01"]
+clips = ["walking_p1_01", "boxing_p11_01", "golf_p16_01"]
 methods = ["mean_pose", "ik:previous"]
 
 [vary]

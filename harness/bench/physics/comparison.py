@@ -35,7 +35,7 @@ def compare_error_models(
 
 
 def _recordings(seeds: Sequence[int], noise: Noise) -> Iterator[RecordedErrors]:
-    performers = synthetic.performer_names()
+    performers = synthetic.REFERENCE_PERFORMERS
     for seed in seeds:
         performer = performers[seed % len(performers)]
         clip = synthetic.generate("boxing", performer, 1, seed=seed, duration_s=_SECONDS)

@@ -124,16 +124,16 @@ _GUARD_DOWN: Mapping[str, Keyframes] = {
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """Generate one take at times `t` (T,) [s]; its random frequencies of combinations depend on the take."""
-    rear = habits.hand
+    rear, style = habits.hand, habits.style
     lead = "l" if rear == "r" else "r"
     s = SIDE_SIGN[lead]
     size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.80, 1.0)) / habits.pace
     leg = leg_length_m(skeleton)
-    bladed, crouch = float(rng.uniform(0.45, 0.80)), float(rng.uniform(0.04, 0.09))
+    bladed, crouch = float(rng.uniform(0.45, 0.80)), style.crouch + float(rng.uniform(0.04, 0.09))
 
     stance = {
-        lead: FootPlacement(0.27 * leg, s * 0.15 * leg, -s * 0.30),
-        rear: FootPlacement(-0.24 * leg, -s * 0.16 * leg, -s * 0.95),
+        lead: FootPlacement(0.27 * leg * style.width, s * 0.15 * leg * style.width, -s * 0.30),
+        rear: FootPlacement(-0.24 * leg * style.width, -s * 0.16 * leg * style.width, -s * 0.95),
     }
     start, shifts = _plan_footwork(rng, t, slow)
     place, facing = plan_body_path(t, start, shifts)
@@ -145,8 +145,8 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     place = place + horizontal_vector(facing, ahead, s * (act["side"] + smooth_noise(rng, t, 1.6, 0.015)))
     heel = 0.32 + 0.04 * np.sin(bounce) + act["heel"]
     feet = {
-        lead: plan_foot(t, skeleton, lead, plants[lead], 0.05, 0.03 + 0.03 * np.sin(bounce)),
-        rear: plan_foot(t, skeleton, rear, plants[rear], 0.05, heel, s * act["pivot"]),
+        lead: plan_foot(t, skeleton, lead, plants[lead], 0.05 + style.knees_out_rad, 0.03 + 0.03 * np.sin(bounce)),
+        rear: plan_foot(t, skeleton, rear, plants[rear], 0.05 + style.knees_out_rad, heel, s * act["pivot"]),
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.4, 0.55) + rng.uniform(0.0, 6.0))
     pelvis = stack_columns(
@@ -161,20 +161,30 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     )
     gaze = stack_columns(
         facing - s * (0.06 - 0.15 * act["twist"]) + smooth_noise(rng, t, 2.0, 0.05),
-        0.18 + smooth_noise(rng, t, 2.0, 0.03),
+        0.18 + style.nod_rad + smooth_noise(rng, t, 2.0, 0.03),
         s * 0.4 * act["lean"] + smooth_noise(rng, t, 2.0, 0.03),
     )
     top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
     height = np.median(top) - crouch * leg + 0.010 * np.sin(bounce) - act["dip"] + smooth_noise(rng, t, 2.0, 0.008)
     root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
+    lift, reach = style.shoulder_rad
     shoulders = {
-        side: (0.06 + 0.02 * breath, act[f"{who}.reach"] + smooth_noise(rng, t, 1.5, 0.015))
+        side: (lift + 0.06 + 0.02 * breath, reach + act[f"{who}.reach"] + smooth_noise(rng, t, 1.5, 0.015))
         for who, side in (("lead", lead), ("rear", rear))
     }
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for who, side, guard in (("lead", lead, (0.36, 0.16, 0.04)), ("rear", rear, (0.20, 0.14, 0.06))):
         figure.pose_leg(side, feet[side])
-        _pose_arm(figure, side, rng, t, facing, np.array(guard), {k: act[f"{who}.{k}"] for k in _CHANNELS}, act["drop"])
+        _pose_arm(
+            figure,
+            side,
+            rng,
+            t,
+            facing,
+            np.add(guard, style.guard_m),
+            {k: act[f"{who}.{k}"] for k in _CHANNELS},
+            act["drop"],
+        )
     return figure
 
 

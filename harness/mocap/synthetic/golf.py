@@ -34,7 +34,7 @@ _WRIST_SEPARATION_M = 0.075
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """Generate one take at times `t` (T,) [s]: a swing about every eight seconds, full or three-quarter."""
-    trail = habits.hand
+    trail, style = habits.hand, habits.style
     lead = "l" if trail == "r" else "r"
     s = SIDE_SIGN[lead]
     leg = leg_length_m(skeleton)
@@ -42,7 +42,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     swings, begins = _plan_swings(rng, t, habits, full)
     act = sum_gestures(t, swings)
 
-    half = leg * float(rng.uniform(0.22, 0.30))
+    half = leg * style.width * float(rng.uniform(0.22, 0.30))
     stance = {
         lead: FootPlacement(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
         trail: FootPlacement(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
@@ -52,8 +52,10 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     place, facing = plan_body_path(t, start, shifts)
     plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
     feet = {
-        lead: plan_foot(t, skeleton, lead, plants[lead], 0.02, act["lead heel"]),
-        trail: plan_foot(t, skeleton, trail, plants[trail], 0.02, act["trail heel"], s * act["pivot"]),
+        lead: plan_foot(t, skeleton, lead, plants[lead], 0.02 + style.knees_out_rad, act["lead heel"]),
+        trail: plan_foot(
+            t, skeleton, trail, plants[trail], 0.02 + style.knees_out_rad, act["trail heel"], s * act["pivot"]
+        ),
     }
     tilt = float(rng.uniform(0.26, 0.40)) + act["tilt"] + smooth_noise(rng, t, 2.5, 0.01)
     bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + smooth_noise(rng, t, 2.5, 0.015)
@@ -66,17 +68,23 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     spine = stack_columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) + s * (0.10 - act["side bend"]))
     gaze = stack_columns(
         facing + s * (act["look"] + 0.03) + smooth_noise(rng, t, 2.5, 0.03),
-        0.80 + act["nod"] + smooth_noise(rng, t, 2.5, 0.02),
+        0.80 + style.nod_rad + act["nod"] + smooth_noise(rng, t, 2.5, 0.02),
         s * act["cant"] + smooth_noise(rng, t, 3.0, 0.015),
     )
     ahead = -0.13 * leg - 0.03 + act["ahead"] + smooth_noise(rng, t, 2.5, 0.006)
     place = place + horizontal_vector(facing, ahead, s * act["side"] + smooth_noise(rng, t, 2.5, 0.006))
     top = highest_root_m(skeleton, place, pelvis, feet, 0.985)
-    height = np.median(top) - float(rng.uniform(0.025, 0.05)) * leg + act["up"] + smooth_noise(rng, t, 2.5, 0.004)
+    height = (
+        np.median(top)
+        - (style.crouch + float(rng.uniform(0.025, 0.05))) * leg
+        + act["up"]
+        + smooth_noise(rng, t, 2.5, 0.004)
+    )
     root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
+    lift, reach = style.shoulder_rad
     shoulders = {
-        lead: (act["lead lift"] + breath, 0.05 + act["lead reach"]),
-        trail: (-0.05 + act["trail lift"] + breath, 0.13 + act["trail reach"]),
+        lead: (lift + act["lead lift"] + breath, reach + 0.05 + act["lead reach"]),
+        trail: (lift - 0.05 + act["trail lift"] + breath, reach + 0.13 + act["trail reach"]),
     }
     figure = ArticulatedFigure(
         skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits, 1.4)

@@ -31,7 +31,7 @@ from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """Generate one take at times `t` (T,) [s]; the take's number decides its most frequent kind of jump."""
     jumps, yaw0 = plan_jumps(rng, t, habits, JUMP_KINDS[take % len(JUMP_KINDS)])
-    leg = leg_length_m(skeleton)
+    leg, style = leg_length_m(skeleton), habits.style
     act = sum_gestures(t, [_jump_gesture(rng, jump, habits) for jump in jumps])
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.35, 0.5) + rng.uniform(0.0, 6.0))
 
@@ -59,7 +59,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     place += horizontal_vector(yaw, back, smooth_noise(rng, t, 2.0, 0.008)) - middle
     foot_place += horizontal_vector(foot_yaw, 0.06, 0.0) - middle
 
-    half, out = leg * float(rng.uniform(0.12, 0.20)), habits.toes_out_rad + 0.03
+    half, out = leg * style.width * float(rng.uniform(0.12, 0.20)), habits.toes_out_rad + 0.03
 
     def feet_at(lift: float | Floats) -> dict[str, FootTarget]:
         feet: dict[str, FootTarget] = {}
@@ -67,11 +67,17 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
             ball = stack_columns(
                 *(foot_place + horizontal_vector(foot_yaw, 0.0, SIDE_SIGN[side] * half)).T, BALL_M + lift
             )
-            feet[side] = pose_foot(skeleton, side, ball, foot_yaw + SIDE_SIGN[side] * out, pitch, 0.0, 0.06)
+            feet[side] = pose_foot(
+                skeleton, side, ball, foot_yaw + SIDE_SIGN[side] * out, pitch, 0.0, 0.06 + style.knees_out_rad
+            )
         return feet
 
     top = highest_root_m(skeleton, place, pelvis, feet_at(0.0), 0.99)
-    stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012 if np.any(pitch < 0.01) else float(np.min(top))
+    stand = (
+        float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012 - style.crouch * leg
+        if np.any(pitch < 0.01)
+        else float(np.min(top))
+    )
     air = _flight_weight(t, jumps)
     root = stack_columns(*place.T, smooth_minimum(_root_height(t, jumps, stand, leg), top + 0.5 * air, 0.02))
     # in flight the feet rise with the body, and a little more: a tuck
@@ -83,22 +89,25 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     )
     gaze = stack_columns(
         yaw + act["look"] + smooth_noise(rng, t, 2.0, 0.05),
-        0.12 + act["nod"] + smooth_noise(rng, t, 2.0, 0.03),
+        0.12 + style.nod_rad + act["nod"] + smooth_noise(rng, t, 2.0, 0.03),
         smooth_noise(rng, t, 2.0, 0.02),
     )
     up = np.tanh(act["swing"])
-    shoulders = {side: (0.02 * breath + 0.06 * up, 0.05 * up + smooth_noise(rng, t, 2.0, 0.01)) for side in SIDES}
+    lift, reach = style.shoulder_rad
+    shoulders = {
+        side: (lift + 0.02 * breath + 0.06 * up, reach + 0.05 * up + smooth_noise(rng, t, 2.0, 0.01)) for side in SIDES
+    }
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
         figure.pose_leg(side, feet[side])
         amplitude = float(rng.uniform(0.95, 1.05))
         figure.pose_hanging_arm(
             side,
-            0.06 + amplitude * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
+            0.06 + style.arm_forward_rad + amplitude * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
             habits.spread_rad + 0.05 + act["spread"] + smooth_noise(rng, t, 1.8, 0.03),
-            0.20 + smooth_noise(rng, t, 1.8, 0.04),
-            habits.elbow_rad + amplitude * act["elbow"] + smooth_noise(rng, t, 1.8, 0.04),
-            0.08 + 0.15 * act["swing"] + smooth_noise(rng, t, 1.6, 0.04),
+            0.20 + style.arm_twist_rad + smooth_noise(rng, t, 1.8, 0.04),
+            habits.elbow_rad + amplitude * style.elbow_swing * act["elbow"] + smooth_noise(rng, t, 1.8, 0.04),
+            0.08 + style.pronation_rad + 0.15 * act["swing"] + smooth_noise(rng, t, 1.6, 0.04),
             (-0.20 + 0.06 * act["swing"], np.zeros(len(t))),
         )
     return figure
@@ -164,7 +173,9 @@ def _jump_gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gestu
         "deep": jump.landing_bottom_s - start_s,
         "end": max(jump.up_s, jump.landing_bottom_s + 0.45) - start_s,
     }
-    high = min(float(rng.uniform(1.2, 1.9)) * habits.size, 2.0) * (0.55 if jump.rebound else 1.0)
+    high = min(float(rng.uniform(1.2, 1.9)) * habits.size * habits.style.swing**0.5, 2.0) * (
+        0.55 if jump.rebound else 1.0
+    )
     dip, give, far = jump.dip, jump.landing_depth, float(np.hypot(*jump.displacement_m))
     parts = {
         "pelvis": keyframes_at(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),

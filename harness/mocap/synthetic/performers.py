@@ -14,8 +14,11 @@ from harness.core import humanoid24
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import UnknownName
+from harness.mocap.synthetic.style import Style, sample_style
 
-_NAMES = ("p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8")
+_NAMES = tuple(f"p{number}" for number in range(1, 65))
+REFERENCE_PERFORMERS = _NAMES[:8]
+"""The performers of tables, placement studies and databases of benchmarks. Their style is neutral."""
 _STATURE_STD = 0.035
 """Relative standard deviation of the stature, which scales all bones."""
 _BONE_LENGTH_STD_M = {
@@ -61,6 +64,8 @@ class Habits:
     """Flexion of the elbow of a hanging arm."""
     posture_rad: Mapping[str, tuple[float, ...]]
     """Constant offsets of the hinges of back, neck and hands, by bone."""
+    style: Style
+    """In what performers differ beyond these; neutral for `REFERENCE_PERFORMERS`."""
 
 
 def performer_names() -> tuple[str, ...]:
@@ -107,21 +112,28 @@ def _sample_skeleton(rng: np.random.Generator) -> Skeleton:
 
 def performer_habits(performer: str) -> Habits:
     """The performer's habits; raises UnknownName."""
-    rng = _performer_rng(performer, "habits")
+    rng, style = _performer_rng(performer, "habits"), _performer_style(performer)
     return Habits(
-        hand="l" if performer in ("p3", "p6") else "r",
-        pace=1.0 + 0.06 * float(np.clip(rng.normal(), -1.5, 1.5)),
-        size=1.0 + 0.08 * float(np.clip(rng.normal(), -1.5, 1.5)),
-        bend_rad=float(rng.uniform(0.02, 0.10)),
-        spread_rad=float(rng.uniform(0.10, 0.20)),
-        toes_out_rad=float(rng.uniform(0.05, 0.17)),
-        pelvis_rad=float(rng.uniform(-0.03, 0.08)),
-        elbow_rad=float(rng.uniform(0.28, 0.60)),
-        posture_rad=_sample_posture(rng),
+        hand="l" if style.left_handed else "r",
+        pace=1.0 + 0.06 * float(np.clip(rng.normal(), -1.5, 1.5)) + style.pace,
+        size=1.0 + 0.08 * float(np.clip(rng.normal(), -1.5, 1.5)) + style.size,
+        bend_rad=float(rng.uniform(0.02, 0.10)) + style.bend_rad,
+        spread_rad=float(rng.uniform(0.10, 0.20)) + style.spread_rad,
+        toes_out_rad=float(rng.uniform(0.05, 0.17)) + style.toes_out_rad,
+        pelvis_rad=float(rng.uniform(-0.03, 0.08)) + style.pelvis_rad,
+        elbow_rad=float(rng.uniform(0.28, 0.60)) + style.elbow_rad,
+        posture_rad=_sample_posture(rng, style.posture),
+        style=style,
     )
 
 
-def _sample_posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
+def _performer_style(performer: str) -> Style:
+    if performer in REFERENCE_PERFORMERS:
+        return Style(left_handed=performer in ("p3", "p6"))
+    return sample_style(_performer_rng(performer, "style"))
+
+
+def _sample_posture(rng: np.random.Generator, size: float) -> dict[str, tuple[float, ...]]:
     """Hinge offsets of neighbouring bones that cancel, so that chest and head keep their orientation approximately."""
     back, neck = np.deg2rad(rng.normal(0.0, (2.5, 0.5, 0.8))), np.deg2rad(rng.normal(0.0, (4.0, 1.0, 1.5)))
     share = float(rng.uniform(0.3, 0.7))
@@ -136,7 +148,7 @@ def _sample_posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
     for side in ("l", "r"):
         out[f"{side}wrist"] = np.deg2rad(rng.normal(0.0, 5.0, 1))
         out[f"{side}hand"] = np.deg2rad(rng.normal(0.0, (4.0, 5.0)))
-    return {bone: tuple(float(x) for x in angles) for bone, angles in out.items()}
+    return {bone: tuple(size * float(x) for x in angles) for bone, angles in out.items()}
 
 
 def _performer_rng(performer: str, what: str) -> np.random.Generator:

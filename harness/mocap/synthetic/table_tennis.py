@@ -4,7 +4,7 @@ Distances are relative to the top of the chest, facing the table; `bat` is the a
 direction towards the other arm. In a rally a ball is played every 1.1 to 1.6 s.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -108,24 +108,26 @@ _SERVE: Mapping[str, Keyframes] = {
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """Generate one take at times `t` (T,) [s]: rallies of several strokes, each started with a serve."""
-    bat = habits.hand
+    bat, style = habits.hand, habits.style
     free = "l" if bat == "r" else "r"
     s = SIDE_SIGN[free]  # the side of the bat has the sign -s
     leg = leg_length_m(skeleton)
     size, slow = habits.size * float(rng.uniform(0.95, 1.15)), float(rng.uniform(0.92, 1.12)) / habits.pace
-    crouch = float(rng.uniform(0.06, 0.13))
+    crouch = style.crouch + float(rng.uniform(0.06, 0.13))
 
     start, shifts, strokes = _plan_rallies(rng, t, size, slow, _STROKE_FREQUENCIES[take % len(_STROKE_FREQUENCIES)], -s)
     stance = {
-        bat: FootPlacement(-0.06 * leg, -s * 0.34 * leg, -s * 0.30),
-        free: FootPlacement(0.12 * leg, s * 0.34 * leg, s * 0.18),
+        bat: FootPlacement(-0.06 * leg, -s * 0.34 * leg * style.width, -s * 0.30),
+        free: FootPlacement(0.12 * leg, s * 0.34 * leg * style.width, s * 0.18),
     }
     place, facing = plan_body_path(t, start, shifts)
     plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
     act = sum_gestures(t, strokes)
     bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.5 + smooth_noise(rng, t, 3.0, 0.12)))
+    knees_out = 0.10 + style.knees_out_rad
     feet = {
-        side: plan_foot(t, skeleton, side, plants[side], 0.10, 0.10 + 0.03 * np.sin(bounce)) for side in (bat, free)
+        side: plan_foot(t, skeleton, side, plants[side], knees_out, 0.10 + 0.03 * np.sin(bounce))
+        for side in (bat, free)
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.35, 0.5) + rng.uniform(0.0, 6.0))
     pelvis = stack_columns(
@@ -140,7 +142,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     )
     gaze = stack_columns(
         facing + s * 0.25 * act["twist"] + smooth_noise(rng, t, 1.2, 0.09),
-        0.24 + 0.2 * act["bend"] + act["look"] + smooth_noise(rng, t, 1.2, 0.04),
+        0.24 + style.nod_rad + 0.2 * act["bend"] + act["look"] + smooth_noise(rng, t, 1.2, 0.04),
         smooth_noise(rng, t, 2.0, 0.03),
     )
     ahead = -0.06 * leg - 0.05 + act["forward"] + 0.012 * np.sin(bounce) + smooth_noise(rng, t, 1.8, 0.01)
@@ -148,9 +150,10 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
     height = np.median(top) - crouch * leg - act["dip"] + 0.010 * np.sin(bounce) + smooth_noise(rng, t, 2.0, 0.006)
     root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
+    lift, reach = style.shoulder_rad
     shoulders = {
-        bat: (0.02 + 0.01 * breath, 0.06 + act["reach"] + smooth_noise(rng, t, 1.5, 0.012)),
-        free: (0.02 + 0.01 * breath, 0.05 + 0.3 * act["free ahead"] + smooth_noise(rng, t, 1.5, 0.012)),
+        bat: (lift + 0.02 + 0.01 * breath, reach + 0.06 + act["reach"] + smooth_noise(rng, t, 1.5, 0.012)),
+        free: (lift + 0.02 + 0.01 * breath, reach + 0.05 + 0.3 * act["free ahead"] + smooth_noise(rng, t, 1.5, 0.012)),
     }
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     low = act["rest"]
@@ -169,7 +172,8 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     heading = {bat: facing, free: facing + 0.75 * s * (act["pelvis"] + act["twist"])}
     for side in (bat, free):
         figure.pose_leg(side, feet[side])
-        _pose_arm(figure, side, rng, t, heading[side], wrists[side], forearm[side])
+        held = [x + more for x, more in zip(wrists[side], style.guard_m, strict=True)]
+        _pose_arm(figure, side, rng, t, heading[side], held, forearm[side])
     return figure
 
 
@@ -179,7 +183,7 @@ def _pose_arm(
     rng: np.random.Generator,
     t: Floats,
     facing: Floats,
-    wrist_m: tuple[Floats, Floats, Floats],
+    wrist_m: Sequence[Floats],
     forearm: tuple[Floats, Floats, Floats],
 ) -> None:
     """Pose one arm: `wrist_m` is ahead, out and up of the chest for an arm of 0.58 m [m].

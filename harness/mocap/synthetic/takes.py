@@ -1,6 +1,6 @@
 """Takes of the motion generator, by behaviour, performer and number; they are generated on demand."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -28,11 +28,11 @@ _SYNTHESIZERS: dict[str, Callable[[Skeleton, Habits, np.random.Generator, Floats
 BEHAVIOURS = tuple(_SYNTHESIZERS)
 
 
-def take_names(behaviour: str) -> tuple[str, ...]:
-    """Names of a behaviour's takes, such as "walking_p1_03"; raises UnknownName."""
+def take_names(behaviour: str, performers: Sequence[str] = performer_names()) -> tuple[str, ...]:
+    """Names of a behaviour's takes by these performers, such as "walking_p1_03"; raises UnknownName."""
     _check_behaviour(behaviour)
     numbers = range(1, TAKES_PER_PERFORMER + 1)
-    return tuple(f"{behaviour}_{performer}_{n:02d}" for performer in performer_names() for n in numbers)
+    return tuple(f"{behaviour}_{performer}_{n:02d}" for performer in performers for n in numbers)
 
 
 def generate(

@@ -52,14 +52,15 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     step_s = float(t[1] - t[0])
     pad = int(_PAD_S / step_s)
     padded_t = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
-    path = sample_walking_path(rng, padded_t, take)
+    style = habits.style
+    path = sample_walking_path(rng, padded_t, take, style.speed, style.variety)
     gait = _sample_gait(rng, habits, float(path.speed_m_s.mean()), take)
     # cadence: step length grows as speed to the power 0.55
     rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (path.speed_m_s / 1.3) ** 0.45
     rhythm *= 1.0 + smooth_noise(rng, padded_t, 1.5, 0.012)
     steps = np.concatenate([[0.0], np.cumsum(0.5 * (rhythm[1:] + rhythm[:-1]) * step_s)]) + rng.uniform(0.0, 2.0)
     plants = _plan_footsteps(rng, skeleton, habits, gait, padded_t, path, steps)
-    feet = {side: plan_foot(t, skeleton, side, plants[side], 0.03) for side in SIDES}
+    feet = {side: plan_foot(t, skeleton, side, plants[side], 0.03 + style.knees_out_rad) for side in SIDES}
 
     inside = slice(pad, pad + len(t))
     stride = np.pi * steps[inside]
@@ -67,15 +68,17 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     yaw = path.yaw_rad[inside]
     lean = np.clip(np.gradient(yaw, step_s) * path.speed_m_s[inside] / GRAVITY_M_S2, -0.3, 0.3)
     pelvis = stack_columns(
-        yaw - 0.085 * gait.effort * np.cos(stride + 0.15) + smooth_noise(rng, t, 2.5, 0.012),
+        yaw - 0.085 * style.pelvis_turn * gait.effort * np.cos(stride + 0.15) + smooth_noise(rng, t, 2.5, 0.012),
         habits.pelvis_rad
         + 0.05
         + 0.3 * gait.stoop_rad
         + 0.012 * np.cos(2.0 * stride - 0.8)
         + smooth_noise(rng, t, 3.0, 0.008),
-        0.055 * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + smooth_noise(rng, t, 3.0, 0.008),
+        0.055 * style.pelvis_list * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + smooth_noise(rng, t, 3.0, 0.008),
     )
-    sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + smooth_noise(rng, t, 2.0, 0.004)
+    sway = style.pelvis_list * rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + smooth_noise(
+        rng, t, 2.0, 0.004
+    )
     place = path.place_m[inside] + horizontal_vector(yaw, -0.03, sway)
     top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
     root = stack_columns(
@@ -87,18 +90,23 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     bob = 0.02 * np.cos(2.0 * stride + 0.6) + 0.008 * breath
     spine = stack_columns(
         habits.bend_rad + 0.7 * gait.stoop_rad + 0.02 * gait.effort + bob + smooth_noise(rng, t, 4.0, 0.012),
-        0.15 * gait.swing * gait.effort * np.cos(stride) + smooth_noise(rng, t, 3.0, 0.015),
-        -0.065 * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + smooth_noise(rng, t, 3.0, 0.012),
+        0.15 * style.trunk_turn * gait.swing * gait.effort * np.cos(stride) + smooth_noise(rng, t, 3.0, 0.015),
+        -0.065 * style.pelvis_list * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + smooth_noise(rng, t, 3.0, 0.012),
     )
     look = sum_gestures(t, _sample_glances(rng, t))
     bearing = np.clip(1.1 * (np.interp(t + 0.35, padded_t, path.yaw_rad) - yaw), -0.7, 0.7)
     gaze = stack_columns(
         yaw + np.tanh(bearing + look["yaw"]) + smooth_noise(rng, t, 2.5, 0.05),
-        0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + smooth_noise(rng, t, 2.5, 0.03),
+        0.06 + style.nod_rad + rng.uniform(-0.04, 0.12) + look["pitch"] + smooth_noise(rng, t, 2.5, 0.03),
         -0.15 * lean + smooth_noise(rng, t, 3.0, 0.012),
     )
-    forward = {"l": -np.cos(stride - 0.1), "r": np.cos(stride - 0.1)}
-    shoulders = {s: (0.02 * breath + smooth_noise(rng, t, 3.0, 0.01), 0.04 * gait.swing * forward[s]) for s in SIDES}
+    arms = stride - 0.1 - style.swing_lag_rad
+    forward = {"l": -np.cos(arms), "r": np.cos(arms)}
+    lift, reach = style.shoulder_rad
+    shoulders = {
+        s: (lift + 0.02 * breath + smooth_noise(rng, t, 3.0, 0.01), reach + 0.04 * gait.swing * forward[s])
+        for s in SIDES
+    }
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
         figure.pose_leg(side, feet[side])
@@ -116,16 +124,23 @@ def _sample_gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, tak
         "tired": ((0.4, 0.8), (-0.15, 0.2), (0.12, 0.28), (0.01, 0.035), (0.035, 0.06)),
         "marching": ((1.5, 1.9), (-0.1, 0.3), (-0.05, 0.03), (0.0, 0.01), (0.10, 0.15)),
     }[style]
+    own = habits.style
+
+    def sample(limits: tuple[float, float], easy: float) -> float:
+        """A draw, and nearer to `easy` the less the performer's takes vary."""
+        drawn = float(rng.uniform(*limits))
+        return drawn + (own.variety - 1.0) * (drawn - easy)
+
     return Gait(
         effort=effort,
-        swing=habits.size * float(rng.uniform(*swing)),
-        elbow_rad=habits.elbow_rad + float(rng.uniform(*elbow)),
-        stoop_rad=float(rng.uniform(*stoop)),
-        crouch=float(rng.uniform(*crouch)),
-        land_rad=float(rng.uniform(0.28, 0.40)) * effort**0.5,
-        push_rad=float(rng.uniform(0.90, 1.05)),
-        lift_m=float(rng.uniform(*lift)),
-        half_width_m=float(rng.uniform(0.045, 0.075)),
+        swing=habits.size * own.swing * sample(swing, 1.05),
+        elbow_rad=habits.elbow_rad + sample(elbow, 0.03),
+        stoop_rad=sample(stoop, 0.05),
+        crouch=own.crouch + sample(crouch, 0.005),
+        land_rad=own.push * float(rng.uniform(0.28, 0.40)) * effort**0.5,
+        push_rad=own.push * float(rng.uniform(0.90, 1.05)),
+        lift_m=sample(lift, 0.055),
+        half_width_m=own.width * float(rng.uniform(0.045, 0.075)),
     )
 
 
@@ -145,9 +160,10 @@ def _plan_footsteps(
 
     plants: dict[str, list[FootContact]] = {side: [] for side in SIDES}
     ahead_m = 0.92 * float(skeleton.length_m[skeleton.index("lfoot")])
-    for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * STANCE_SHARE)):
+    stance_share = STANCE_SHARE + habits.style.stance_share
+    for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * stance_share)):
         side = SIDES[k % 2]
-        yaw = at(k + STANCE_SHARE, path.yaw_rad)
+        yaw = at(k + stance_share, path.yaw_rad)
         toes = yaw + SIDE_SIGN[side] * habits.toes_out_rad + float(rng.normal(0.0, 0.02))
         ankle = np.array([at(k + _PASSING_SHARE, path.place_m[:, 0]), at(k + _PASSING_SHARE, path.place_m[:, 1])])
         ankle += horizontal_vector(
@@ -157,7 +173,7 @@ def _plan_footsteps(
         plants[side].append(
             FootContact(
                 on_s=at(k, t),
-                off_s=at(k + 2.0 * STANCE_SHARE, t),
+                off_s=at(k + 2.0 * stance_share, t),
                 ball_m=(float(ball[0]), float(ball[1])),
                 yaw_rad=toes,
                 land_rad=gait.land_rad * float(rng.uniform(0.92, 1.08)),
@@ -192,14 +208,15 @@ def _swing_arm(
     forward: Floats,
 ) -> None:
     """Pose a swinging arm; `forward` (T,) is 1 where it is farthest forward, -1 where it is farthest back."""
+    style, flexion = habits.style, gait.elbow_rad
     size = gait.swing * gait.effort * float(rng.uniform(0.9, 1.1))
-    flexion = gait.elbow_rad
+    size *= 1.0 + (style.uneven if side == habits.hand else -style.uneven)
     figure.pose_hanging_arm(
         side,
-        0.26 * size * forward - 0.08 + 0.10 * flexion + smooth_noise(rng, t, 2.5, 0.03),
+        0.26 * size * forward - 0.08 + style.arm_forward_rad + 0.10 * flexion + smooth_noise(rng, t, 2.5, 0.03),
         habits.spread_rad + 0.02 * forward + smooth_noise(rng, t, 2.5, 0.02),
-        0.20 + 0.15 * flexion + 0.08 * forward + smooth_noise(rng, t, 2.5, 0.03),
-        flexion + 0.20 * size * forward + 0.05 * forward**2 + smooth_noise(rng, t, 2.0, 0.03),
-        0.05 + 0.08 * forward + smooth_noise(rng, t, 2.0, 0.04),
+        0.20 + style.arm_twist_rad + 0.15 * flexion + 0.08 * forward + smooth_noise(rng, t, 2.5, 0.03),
+        flexion + 0.20 * style.elbow_swing * size * forward + 0.05 * forward**2 + smooth_noise(rng, t, 2.0, 0.03),
+        0.05 + style.pronation_rad + 0.08 * forward + smooth_noise(rng, t, 2.0, 0.04),
         (-0.22 + 0.08 * forward + smooth_noise(rng, t, 1.5, 0.02), smooth_noise(rng, t, 1.5, 0.02)),
     )

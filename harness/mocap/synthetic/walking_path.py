@@ -8,6 +8,7 @@ from harness.core.arrays import Floats
 from harness.mocap.synthetic.curves import minimum_jerk, smooth_noise
 
 PATH_KINDS = ("round the room", "to and fro", "square left", "square right", "figure of eight", "wandering")
+_USUAL_SPEED_M_S = 1.25
 _TURNING_SPEED_M_S = 0.92
 """Speed in a sharp turn."""
 
@@ -24,10 +25,16 @@ class WalkingPath:
     """(T,) [m/s]."""
 
 
-def sample_walking_path(rng: np.random.Generator, t: Floats, take: int) -> WalkingPath:
-    """A random path at times `t` (T,) [s], centred on the origin; the take's number and chance decide its kind."""
+def sample_walking_path(
+    rng: np.random.Generator, t: Floats, take: int, speed_factor: float = 1.0, variety: float = 1.0
+) -> WalkingPath:
+    """A random path at times `t` (T,) [s], centred on the origin; the take's number and chance decide its kind.
+
+    `speed_factor` scales the speed, and `variety` the take's deviation from a usual speed.
+    """
     kind = PATH_KINDS[(take - 1 + int(rng.integers(2))) % len(PATH_KINDS)]
     speed_m_s = rng.uniform(0.95, 1.6)
+    speed_m_s = speed_factor * (speed_m_s + (variety - 1.0) * (speed_m_s - _USUAL_SPEED_M_S))
     yaw = rng.uniform(-np.pi, np.pi) + smooth_noise(rng, t, 4.0, 0.05)
     slow = np.zeros(len(t))
     start_s = float(t[0])

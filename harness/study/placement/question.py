@@ -18,6 +18,7 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
+from harness.mocap.synthetic import REFERENCE_PERFORMERS, SOURCE
 from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig
@@ -148,10 +149,14 @@ def _thinned_frames(examples: Sequence[str], source: MotionSource) -> int:
 
 
 def _deal_clips(behaviour: str, source: MotionSource) -> tuple[list[str], list[str], list[str]]:
-    """Clips of a behaviour to choose on, to hold out and to learn from; each performer's takes are dealt in turn."""
+    """Clips of a behaviour to choose on, to hold out and to learn from; each performer's takes are dealt in turn.
+
+    Built-in takes are those of the reference performers.
+    """
+    is_library = source.title != SOURCE
     by_subject: dict[str, list[str]] = {}
     for name in source.names():
-        if source.behaviour(name) == behaviour:
+        if source.behaviour(name) == behaviour and (is_library or source.subject(name) in REFERENCE_PERFORMERS):
             by_subject.setdefault(source.subject(name), []).append(name)
     if not by_subject:
         raise UnknownName("behaviour", behaviour, dict.fromkeys(filter(None, map(source.behaviour, source.names()))))

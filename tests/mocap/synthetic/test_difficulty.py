@@ -46,7 +46,7 @@ def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str)
     """Kernel ridge regression from tracker readings to angles, trained on all takes but the test take."""
     takes = {
         (who, take): features(synthetic.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
-        for who in synthetic.performer_names()
+        for who in synthetic.REFERENCE_PERFORMERS
         for take in range(1, 5)
     }
     for judged in JUDGED:

@@ -16,9 +16,12 @@ from harness.mocap import synthetic
 from harness.mocap.file_inspection import inspect_clip
 from harness.mocap.synthetic.curves import GRAVITY_M_S2
 from harness.mocap.synthetic.foot_trajectory import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
+from harness.mocap.synthetic.performers import performer_habits
+from harness.mocap.synthetic.style import Style
 
-TAKES = [("p1", 1), ("p2", 2), ("p3", 3), ("p4", 4), ("p5", 5), ("p6", 6), ("p7", 3), ("p8", 2)]
-"""Every performer, every take number."""
+TAKES = [("p1", 1), ("p2", 2), ("p3", 3), ("p4", 4), ("p5", 5), ("p6", 6), ("p21", 3), ("p57", 2)]
+"""Six of the performers with a neutral style, two with their own; every take number."""
+STYLED = [who for who in synthetic.performer_names() if who not in synthetic.REFERENCE_PERFORMERS]
 EVERY = [(behaviour, who, take) for behaviour in synthetic.BEHAVIOURS for who, take in TAKES]
 on_every_take = pytest.mark.parametrize(("behaviour", "who", "take"), EVERY)
 on_every_behaviour = pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
@@ -134,8 +137,65 @@ def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
 
 def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
     """Rounded, since the last bit of a sine depends on the computer."""
-    bones_m = np.round([synthetic.performer_skeleton(who).bone_m for who in synthetic.performer_names()], 9) + 0.0
+    assert synthetic.REFERENCE_PERFORMERS == ("p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8")
+    bones_m = np.round([synthetic.performer_skeleton(who).bone_m for who in synthetic.REFERENCE_PERFORMERS], 9) + 0.0
     assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("behaviour", "digest"),
+    [
+        ("walking", "13fce5ce3bfc2846"),
+        ("boxing", "391508eb34398014"),
+        ("jumping", "e42501416a1702df"),
+        ("golf", "01f3975dfdf6f3df"),
+        ("table_tennis", "0d839e045ea8a91b"),
+    ],
+)
+def test_motion_of_the_reference_performers_is_what_results_were_measured_on(behaviour: str, digest: str) -> None:
+    """Rounded to 1e-6 rad and m; the digests are those of the commit before there were others."""
+    said = blake2b(digest_size=8)
+    for number, who in enumerate(synthetic.REFERENCE_PERFORMERS):
+        clip = synthetic.generate(behaviour, who, 1 + number % 6, seed=7, duration_s=1.0, rate_hz=30.0)
+        for array in (clip.root_m, clip.world_from_root, clip.angles_rad):
+            said.update((np.round(array, 6) + 0.0).tobytes())
+    assert said.hexdigest() == digest
+
+
+def test_there_are_64_people() -> None:
+    names = synthetic.performer_names()
+    assert names == tuple(f"p{number}" for number in range(1, 65))
+    lengths = np.array([synthetic.performer_skeleton(who).length_m for who in names])
+    apart_m = np.abs(lengths[:, None] - lengths).max(axis=-1) + np.eye(len(names))
+    assert apart_m.min() > 1e-3
+    left = [who for who in STYLED if performer_habits(who).hand == "l"]
+    assert 0.02 < len(left) / len(STYLED) < 0.25  # a tenth of people
+    style = [performer_habits(who).style for who in STYLED]
+    assert len({(s.swing, s.pace, s.speed) for s in style}) == len(STYLED)
+    assert all(performer_habits(who).style == Style(left_handed=who in ("p3", "p6")) for who in names[:8])
+
+
+@pytest.mark.long
+@on_every_behaviour
+def test_every_style_moves_within_the_limits_of_joints(behaviour: str) -> None:
+    low, high = humanoid24.limits_rad().T
+    for number, who in enumerate(STYLED):
+        if number % len(synthetic.BEHAVIOURS) == synthetic.BEHAVIOURS.index(behaviour):
+            clip = synthetic.generate(behaviour, who, 1 + number % 6, seed=7, duration_s=4.0, rate_hz=60.0)
+            assert np.all((clip.angles_rad >= low) & (clip.angles_rad <= high)), clip.name
+            assert inspect_clip(clip).doubts == (), clip.name
+
+
+@pytest.mark.long
+def test_walkers_differ_in_their_gait() -> None:
+    """Standard deviation over performers of the mean of each hinge; that of CMU's walkers is 6 to 8.5 deg."""
+    spread_deg = []
+    for group in (synthetic.REFERENCE_PERFORMERS, STYLED[::7]):
+        clips = [synthetic.generate("walking", who, 1, seed=7, duration_s=3.0, rate_hz=30.0) for who in group]
+        means = np.rad2deg([clip.angles_rad.mean(axis=0) for clip in clips])
+        spread_deg.append(float(np.sqrt(means.var(axis=0, ddof=1).mean())))
+    assert spread_deg[0] < 4.0 < 4.8 < spread_deg[1] < 9.0
 
 
 @pytest.mark.long

@@ -86,7 +86,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
     stations = {**sets["liu2011"], "pelvis": sets["kim2012"]["pelvis"]}
     mounts = [mount_of(name, Station(**station)) for name, station in stations.items()]
     hall, out = load_constellation(ConstellationSettings(name="hall")), {}
-    for performer in synthetic.performer_names():
+    for performer in synthetic.REFERENCE_PERFORMERS:
         parts = []
         for take in range(1, 7):
             body, motion = retarget_to_own_body(synthetic.generate("walking", performer, take, seed=seed))
@@ -101,7 +101,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_stations_of_walkers_hear_three_emitters_of_hall(seed: int) -> None:
     coverage = walker_coverage(seed)
-    assert set(coverage) == set(synthetic.performer_names())
+    assert set(coverage) == set(synthetic.REFERENCE_PERFORMERS)
     for performer, found in coverage.items():
         for row, station in enumerate(found.stations):
             assert found.shares(row)[3] >= 0.9, (performer, station)

@@ -9,6 +9,7 @@ import pytest
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.scenario import load_scenario
+from harness.mocap.synthetic import BEHAVIOURS
 from harness.results.reader import load_results
 
 ORDERS = [
@@ -24,11 +25,13 @@ ORDERS = [
 def test_the_order_of_both_papers_holds_on_unseen_motion(tmp_path: Path, inputs: str) -> None:
     """Fifteen takes of five behaviours by performers 4 to 6, seed 23; examples are one other take of each performer."""
     gate = load_scenario("gate")
-
-    def others(clips: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(f"{clip[:-4]}{int(clip[-4]) + 3}{clip[-3:]}" for clip in clips)
-
-    motion = replace(gate.motion, test=others(gate.motion.test), examples=others(gate.motion.examples))
+    shown = [(behaviour, f"{behaviour}_{who}") for behaviour in BEHAVIOURS for who in ("p4", "p5", "p6")]
+    motion = replace(
+        gate.motion,
+        test=tuple(f"{take}_01" for _, take in shown),
+        examples=tuple(f"{take}_02" for _, take in shown),
+        behaviours=tuple(behaviour for behaviour, _ in shown),
+    )
     methods = tuple(dict.fromkeys(method for order in ORDERS for method in order))
     scenario = replace(gate, seed=23, motion=motion, methods=methods, inputs=(inputs,))
     assert engine.run(scenario, tmp_path / "run", jobs=2) is Outcome.PASS
