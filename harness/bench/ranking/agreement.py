@@ -75,31 +75,32 @@ class RankingAgreement:
 def compare_rankings(builtin: ErrorsByUnit, real: ErrorsByUnit) -> RankingAgreement:
     """Compare the order of the items on both sides. An item that misses a performer of a side is left out."""
     sides = {"built-in": builtin, "real": real}
-    units = {
-        name: tuple(dict.fromkeys(u for by_unit in side.values() for u in by_unit)) for name, side in sides.items()
+    units = {name: tuple(dict.fromkeys(unit for of in side.values() for unit in of)) for name, side in sides.items()}
+    left_out = {
+        item: f"not measured on {name} motion of {', '.join(missing)}"
+        for name, side in sides.items()
+        for item in dict.fromkeys((*builtin, *real))
+        if (missing := [unit for unit in units[name] if side.get(item, {}).get(unit) is None])
     }
-    left_out = {}
-    for item in dict.fromkeys((*builtin, *real)):
-        for name, side in sides.items():
-            missing = [unit for unit in units[name] if side.get(item, {}).get(unit) is None]
-            if missing:
-                left_out[item] = f"not measured on {name} motion of {', '.join(missing)}"
     items = [item for item in builtin if item not in left_out]
-    tables = [np.array([[side[item][u] for u in units[name]] for item in items], float) for name, side in sides.items()]
-    means = {item: (float(a.mean()), float(b.mean())) for item, a, b in zip(items, *tables, strict=True)}
-    order = sorted(range(len(items)), key=lambda at: means[items[at]])
-    ranked, tables = [items[at] for at in order], [table[order] for table in tables]
-    pairs = _decide(ranked, tables)
-    tau = float(tau_b(*(table.mean(axis=1) for table in tables))) if len(items) >= MIN_ITEMS else float("nan")
+    tables = [
+        np.array([[side[item][u] for u in units[name]] for item in items], float).reshape(len(items), len(units[name]))
+        for name, side in sides.items()
+    ]
+    order = sorted(range(len(items)), key=lambda at: tables[0][at].mean())
+    items, tables = [items[at] for at in order], [table[order] for table in tables]
+    means = [table.mean(axis=1) for table in tables]
+    tau = float(tau_b(*means)) if len(items) >= MIN_ITEMS else float("nan")
+    pairs = _decide(items, tables)
     low, high = _interval(pairs) if np.isfinite(tau) and min(map(len, units.values())) >= MIN_UNITS else (None, None)
     return RankingAgreement(
         *units.values(),
-        {item: means[item] for item in ranked},
+        dict(zip(items, zip(*(each.tolist() for each in means), strict=True), strict=True)),
         tau if np.isfinite(tau) else None,
         low,
         high,
         pairs,
-        tuple(_enough_units(a, tables, len(pairs)) for a in combinations(range(len(items)), 2)),
+        _enough_units(tables),
         left_out,
     )
 
@@ -128,12 +129,16 @@ def _interval(pairs: Sequence[PairAgreement]) -> tuple[float, float]:
     return (decided - undecided) / len(pairs), (decided + undecided) / len(pairs)
 
 
-def _enough_units(pair: tuple[int, int], tables: Sequence[Floats], pairs: int) -> int | None:
-    """The number of performers on each side with which both differences would be significant among all pairs."""
+def _enough_units(tables: Sequence[Floats]) -> tuple[int | None, ...]:
+    """For each pair the number of performers on each side with which both differences would be significant."""
+    indices = list(combinations(range(len(tables[0])), 2))
     if min(table.shape[1] for table in tables) < MIN_UNITS:
-        return None
-    differences = [table[pair[0]] - table[pair[1]] for table in tables]
+        return (None,) * len(indices)
     counts = np.arange(MIN_UNITS, MOST_UNITS + 1)
-    least_t = special.stdtrit(counts - 1, 1.0 - SIGNIFICANCE / pairs)
-    shown = np.all([np.sqrt(counts) * abs(d.mean()) >= least_t * d.std(ddof=1) for d in differences], axis=0)
-    return int(counts[shown][0]) if shown.any() and all(d.any() for d in differences) else None
+    least = special.stdtrit(counts - 1, 1.0 - SIGNIFICANCE / max(len(indices), 1)) / np.sqrt(counts)
+    found = []
+    for a, b in indices:
+        differences = [table[a] - table[b] for table in tables]
+        shown = np.all([abs(d.mean()) >= least * d.std(ddof=1) for d in differences], axis=0)
+        found.append(int(counts[shown][0]) if shown.any() and all(d.any() for d in differences) else None)
+    return tuple(found)

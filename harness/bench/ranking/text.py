@@ -42,7 +42,17 @@ def _means_table(ranking: RankingAgreement) -> Table:
 
 def _pairs_table(ranking: RankingAgreement) -> Table:
     """Every pair with its differences, the reversed ones first."""
-    head = ["pair", "verdict", "built-in, a - b [deg]", "95 % interval", "real", "95 % interval", "p", "enough", "why"]
+    head = [
+        "pair",
+        "verdict",
+        "built-in, a - b [deg]",
+        "95 % interval",
+        "real",
+        "95 % interval",
+        "p",
+        "performers needed",
+        "why",
+    ]
     order = list(VERDICTS)
     pairs = sorted(zip(ranking.pairs, ranking.enough, strict=True), key=lambda each: order.index(each[0].verdict))
     rows = [
@@ -72,11 +82,11 @@ def statement(ranking: RankingAgreement) -> str:
     if ranking.reason:
         return f"{tau}, without an interval ({ranking.reason}). No pair can be told."
     counts = {verdict: len(ranking.with_verdict(verdict)) for verdict in VERDICTS}
-    total = count_noun(len(ranking.pairs), "pair")
     reversed_pairs = "; ".join(map(_order, ranking.with_verdict("contradict")))
     return (
-        f"{tau} ({format_interval(ranking.low, ranking.high, 2)}), {_performers(ranking)}. Of {total} "
-        f"{counts['agree']} agree, {counts['contradict']} are reversed, {counts['cannot tell']} cannot be told."
+        f"{tau} ({format_interval(ranking.low, ranking.high, 2)}), {_performers(ranking)}. Of "
+        f"{count_noun(len(ranking.pairs), 'pair')}: {counts['agree']} agree, {counts['contradict']} reversed, "
+        f"{counts['cannot tell']} cannot be told."
         + (f" Better on built-in motion and worse on real motion: {reversed_pairs}." if reversed_pairs else "")
     )
 
