@@ -94,8 +94,9 @@ def compare_rankings(builtin: ErrorsByUnit, real: ErrorsByUnit) -> RankingAgreem
     pairs = _decide(items, tables)
     low, high = _interval(pairs) if np.isfinite(tau) and min(map(len, units.values())) >= MIN_UNITS else (None, None)
     return RankingAgreement(
-        *units.values(),
-        dict(zip(items, zip(*(each.tolist() for each in means), strict=True), strict=True)),
+        units["built-in"],
+        units["real"],
+        {item: (float(a), float(b)) for item, a, b in zip(items, *means, strict=True)},
         tau if np.isfinite(tau) else None,
         low,
         high,

@@ -109,8 +109,15 @@ def measure_rankings(
         check_names(scenarios, folder)
         with open_study(out, {"benchmark": "ranking"}):
             (out / "cells").mkdir(exist_ok=True)
-            options = {"folder": folder, "executor": executor, "command": command, "workers": workers}
-            results = run_cells(scenarios, out, progress=progress, **options)
+            results = run_cells(
+                scenarios,
+                out,
+                folder=folder,
+                executor=executor,
+                command=command,
+                progress=progress,
+                workers=workers,
+            )
     finally:
         close_methods()
     return RankingReport(rank_rows(results.rows, scenarios), results.failures)

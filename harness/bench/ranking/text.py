@@ -1,6 +1,6 @@
 """Text and JSON of a report on rankings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -8,9 +8,9 @@ from harness.bench.ranking.agreement import RankingAgreement
 from harness.bench.ranking.measurement import PLACES, PLACES_METHOD, RankingReport
 from harness.core.number_format import count_noun, format_fixed, format_interval, format_p_value
 from harness.core.text_table import Table
-from harness.results.trust_findings import PairAgreement, SideDifference
+from harness.results.trust_findings import PairAgreement, PairVerdict, SideDifference
 
-VERDICTS = {"contradict": "reversed", "agree": "agree", "cannot tell": "cannot tell"}
+VERDICTS: Mapping[PairVerdict, str] = {"contradict": "reversed", "agree": "agree", "cannot tell": "cannot tell"}
 
 
 def format_rankings(report: RankingReport) -> str:

@@ -10,7 +10,7 @@ the larger of two one-sided p values, and Holm's method corrects it for the numb
 false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -139,8 +139,9 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
         return first, second
     sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]
     drawn = generator(0, "rank correlation").integers(0, len(clips), (RESAMPLES, len(clips)))
+    measures: tuple[Callable[[Floats, Floats], Floats | float], ...] = (tau_b, _pearson)
     found = []
-    for name, measure in zip(names, (tau_b, _pearson), strict=True):
+    for name, measure in zip(names, measures, strict=True):
         value = float(measure(sides[0].mean(axis=1), sides[1].mean(axis=1)))
         resampled = np.array([measure(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
         finite = resampled[np.isfinite(resampled)]
