@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from harness.experiment.cells import check_names, clear_caches
 from harness.experiment.engine import run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.remote_method import close_methods
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario, load_scenario, variants
 from harness.mocap import synthetic
 from harness.mocap.library import LibraryFolders
 from harness.results.expected_orders import METRIC
@@ -32,7 +33,8 @@ TRUNK = ("pelvis", "torso", "head")
 """Places of the third station of a set, beside a pair on limbs."""
 QUICK_BEHAVIOURS, QUICK_METHODS = BEHAVIOURS[:1], ("ik", "kernel_cca", "mean_pose")
 QUICK_SETS, QUICK_CLIPS, QUICK_S = 3, 2, 2.0
-METHODS, PLACES = "methods", "places"
+METHODS, SETS, LIMB_PAIRS, THIRD_STATIONS = "methods", "sets of three", "limb pairs", "third stations"
+"""What is ranked; a pair on limbs is averaged over the third stations, and a third station over the pairs."""
 _BUILTIN, _REAL = "builtin", "cmu"
 
 
@@ -41,7 +43,7 @@ class RankingReport:
     """Agreement by behaviour, and what failed."""
 
     rankings: Mapping[tuple[str, str], RankingAgreement] = field(default_factory=dict)
-    """(behaviour, "methods" or "places") -> agreement."""
+    """(behaviour, what is ranked) -> agreement."""
     failures: Mapping[str, str] = field(default_factory=dict)
     """Cell -> why it has no result."""
 
@@ -66,10 +68,10 @@ def plan_rankings(*, quick: bool = False) -> list[Scenario]:
     for behaviour in QUICK_BEHAVIOURS if quick else BEHAVIOURS:
         real = load_scenario(data_folder("scenarios") / "ranking" / f"cmu_{behaviour}.toml")
         for scenario in (_builtin_side(real, behaviour), real):
-            name = f"{behaviour}_{METHODS}_{scenario.motion.source}"
+            name = f"{behaviour}_methods_{scenario.motion.source}"
             planned.append(replace(scenario, name=name))
             places = {"worn": [list(stations) for stations in station_sets().values()]}
-            name = f"{behaviour}_{PLACES}_{scenario.motion.source}"
+            name = f"{behaviour}_places_{scenario.motion.source}"
             planned.append(replace(scenario, name=name, methods=(PLACES_METHOD,), worn=(), vary=places))
     return [_shorten(scenario) for scenario in planned] if quick else planned
 
@@ -126,35 +128,43 @@ def measure_rankings(
 def rank_rows(
     rows: Iterable[Mapping[str, Any]], scenarios: Sequence[Scenario]
 ) -> dict[tuple[str, str], RankingAgreement]:
-    """(behaviour, kind) -> agreement, from the rows of finished cells. A cell without a row counts as not measured."""
-    found: dict[str, dict[tuple[str, str], list[float]]] = {}
-    names = {frozenset(stations): name for name, stations in station_sets().items()}
-    for row in rows:
-        kind = row["scenario"].split("_")[-2]
-        item = row["method"] if kind == METHODS else names[frozenset(row["stations"])]
-        if row[METRIC] is not None:
-            found.setdefault(row["scenario"], {}).setdefault((item, _performer(row["clip"])), []).append(row[METRIC])
-    agreements = {}
+    """(behaviour, kind) -> agreement, from the rows of finished cells.
+
+    An item is the mean over its cells of a performer, and is not measured where one of them has no result.
+    """
+    measured = {(row["scenario"], row["method"], frozenset(row["stations"]), row["clip"]): row[METRIC] for row in rows}
+    values: dict[tuple[str, str], dict[str, dict[str, dict[str, list[float | None]]]]] = {}
     for scenario in scenarios:
-        behaviour, kind, source = scenario.name.rsplit("_", 2)
-        if source == _REAL:
-            sides = [
-                _errors(side, kind, found.get(side.name, {}))
-                for side in scenarios
-                if side.name in (f"{behaviour}_{kind}_{_BUILTIN}", scenario.name)
-            ]
-            agreements[behaviour, kind] = compare_rankings(sides[0], sides[1])
-    return agreements
-
-
-def _errors(scenario: Scenario, kind: str, values: Mapping[tuple[str, str], Sequence[float]]) -> ErrorsByUnit:
-    """Item -> performer -> mean over the performer's clips, of every item and performer that was planned."""
-    worn = {frozenset(stations): name for name, stations in station_sets().items()}
-    items = scenario.methods if kind == METHODS else [worn[frozenset(names)] for names in scenario.vary["worn"]]
-    performers = list(dict.fromkeys(_performer(clip) for clip in scenario.motion.test))
+        behaviour, _, source = scenario.name.rsplit("_", 2)
+        for _, variant in variants(scenario):
+            worn = frozenset(variant.worn_stations)
+            for method, clip in product(variant.methods, variant.motion.test):
+                for kind, item in _ranked_items(scenario, method, worn).items():
+                    by_item = values.setdefault((behaviour, kind), {}).setdefault(source, {})
+                    cell = measured.get((scenario.name, method, worn, clip))
+                    by_item.setdefault(item, {}).setdefault(_performer(clip), []).append(cell)
     return {
-        item: {p: float(np.mean(values[item, p])) if (item, p) in values else None for p in performers}
-        for item in items
+        key: compare_rankings(*(_mean_errors(sides[s]) for s in (_BUILTIN, _REAL))) for key, sides in values.items()
+    }
+
+
+def _ranked_items(scenario: Scenario, method: str, worn: frozenset[str]) -> dict[str, str]:
+    """Kind of ranking -> the item that a cell belongs to."""
+    if "worn" not in scenario.vary:
+        return {METHODS: method}
+    name = next(name for name, stations in station_sets().items() if set(stations) == worn)
+    limbs, third = name.split(" + ")
+    return {SETS: name, LIMB_PAIRS: limbs, THIRD_STATIONS: third}
+
+
+def _mean_errors(side: Mapping[str, Mapping[str, Sequence[float | None]]]) -> ErrorsByUnit:
+    """Item -> performer -> mean; None where a value is missing."""
+    return {
+        item: {
+            performer: None if None in values else float(np.mean([v for v in values if v is not None]))
+            for performer, values in by_performer.items()
+        }
+        for item, by_performer in side.items()
     }
 
 

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.bench.ranking.agreement import RankingAgreement
-from harness.bench.ranking.measurement import PLACES, PLACES_METHOD, RankingReport
+from harness.bench.ranking.measurement import METHODS, PLACES_METHOD, RankingReport
 from harness.core.number_format import count_noun, format_fixed, format_interval, format_p_value
 from harness.core.text_table import Table
 from harness.results.trust_findings import PairAgreement, PairVerdict, SideDifference
@@ -17,7 +17,7 @@ def format_rankings(report: RankingReport) -> str:
     """All rankings with their pairs, then one line for each ranking."""
     blocks = []
     for (behaviour, kind), ranking in report.rankings.items():
-        by = f", by {PLACES_METHOD}" if kind == PLACES else ""
+        by = "" if kind == METHODS else f", by {PLACES_METHOD}"
         head = f"{behaviour}, {kind}{by}: {_performers(ranking)}"
         lines = [head, "", *_means_table(ranking).lines(), "", *_pairs_table(ranking).lines()]
         lines += [f"left out: {item}, {why}" for item, why in ranking.left_out.items()]
@@ -77,18 +77,31 @@ def _statements(report: RankingReport) -> Iterator[str]:
 
 
 def statement(ranking: RankingAgreement) -> str:
-    """Kendall's tau with its interval and its units, and how many pairs agree, are reversed, or cannot be told."""
+    """Kendall's tau with its interval and its units, how many pairs agree, and what a choice on built-in motion costs."""
     tau = f"Kendall's tau {format_fixed(ranking.tau, 2)}"
     if ranking.reason:
-        return f"{tau}, without an interval ({ranking.reason}). No pair can be told."
+        return f"{tau}, without an interval ({ranking.reason}). No pair can be told. {_cost_of_choice(ranking)}".strip()
     counts = {verdict: len(ranking.with_verdict(verdict)) for verdict in VERDICTS}
     reversed_pairs = "; ".join(map(_order, ranking.with_verdict("contradict")))
-    return (
-        f"{tau} ({format_interval(ranking.low, ranking.high, 2)}), {_performers(ranking)}. Of "
-        f"{count_noun(len(ranking.pairs), 'pair')}: {counts['agree']} agree, {counts['contradict']} reversed, "
-        f"{counts['cannot tell']} cannot be told."
-        + (f" Better on built-in motion and worse on real motion: {reversed_pairs}." if reversed_pairs else "")
-    )
+    sentences = [
+        f"{tau} ({format_interval(ranking.low, ranking.high, 2)}), {_performers(ranking)}.",
+        f"Of {count_noun(len(ranking.pairs), 'pair')}: {counts['agree']} agree, {counts['contradict']} reversed, "
+        f"{counts['cannot tell']} cannot be told.",
+        f"Better on built-in motion and worse on real motion: {reversed_pairs}." if reversed_pairs else "",
+        _cost_of_choice(ranking),
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def _cost_of_choice(ranking: RankingAgreement) -> str:
+    """What the best item on built-in motion loses on real motion; "" without items."""
+    if not ranking.means:
+        return ""
+    chosen, best = (min(ranking.means, key=lambda item: ranking.means[item][side]) for side in (0, 1))
+    if chosen == best:
+        return f"{best} has the lowest error on both."
+    loss = ranking.means[chosen][1] - ranking.means[best][1]
+    return f"On real motion {chosen}, best on built-in motion, errs {loss:.2f} deg more than {best}, best there."
 
 
 def _order(pair: PairAgreement) -> str:

@@ -57,7 +57,7 @@ def test_a_set_has_a_pair_on_limbs_and_one_more_station() -> None:
 
 
 def planted_rows(scenarios: list[Scenario], missing: tuple[str, str] = ("", "")) -> Iterator[dict[str, Any]]:
-    """Rows of every planned cell but one (method, clip): each item errs by its place in the list."""
+    """Rows of every planned cell but those of a (method, clip): each item errs by its place in the list."""
     for scenario in scenarios:
         for n, stations in enumerate(scenario.vary.get("worn", [list(scenario.worn)])):
             for m, method in enumerate(scenario.methods):
@@ -71,9 +71,15 @@ def planted_rows(scenarios: list[Scenario], missing: tuple[str, str] = ("", ""))
 def test_rows_become_rankings_by_behaviour() -> None:
     planned = plan_rankings()
     found = rank_rows(planted_rows(planned), planned)
-    assert set(found) == {(behaviour, kind) for behaviour in BEHAVIOURS for kind in ("methods", "places")}
-    assert found["walking", "methods"].tau == found["boxing", "places"].tau == 1.0
-    assert list(found["walking", "places"].means) == list(station_sets())
+    kinds = ("methods", "sets of three", "limb pairs", "third stations")
+    assert set(found) == {(behaviour, kind) for behaviour in BEHAVIOURS for kind in kinds}
+    assert found["walking", "methods"].tau == found["boxing", "sets of three"].tau == 1.0
+    assert list(found["walking", "sets of three"].means) == list(station_sets())
+    assert list(found["walking", "limb pairs"].means) == ["hands", "ankles", "upper arms", "thighs"]
+    assert list(found["walking", "third stations"].means) == ["pelvis", "torso", "head"]
+    sets = found["jumping", "sets of three"].means
+    hands = [sets[f"hands + {place}"][1] for place in ("pelvis", "torso", "head")]
+    assert found["jumping", "limb pairs"].means["hands"][1] == pytest.approx(sum(hands) / 3)
     assert (found["walking", "methods"].low, found["boxing", "methods"].low) == (1.0, None)
 
 
@@ -81,7 +87,7 @@ def test_the_statement_on_boxing_says_that_five_performers_are_too_few() -> None
     planned = plan_rankings()
     text = format_rankings(RankingReport(rank_rows(planted_rows(planned), planned)))
     why = "too few units: 5 real performers, of at least 6"
-    assert f"boxing, methods: Kendall's tau 1.00, without an interval ({why}). No pair can be told." in text
+    assert f"boxing, methods: Kendall's tau 1.00, without an interval ({why}). No pair can be told. ik has" in text
 
 
 def test_a_failed_cell_leaves_its_method_out_and_makes_the_outcome_incomplete() -> None:
@@ -93,6 +99,17 @@ def test_a_failed_cell_leaves_its_method_out_and_makes_the_outcome_incomplete() 
     assert "left out: local_pca, not measured on real motion of 16" in text
     assert "FAILED walking_methods_cmu: 16_16 local_pca: ValueError: singular" in text
     assert "local_pca" in found["jumping", "methods"].means
+
+
+def test_a_set_that_failed_leaves_out_its_places() -> None:
+    planned = plan_rankings()
+    failed = ("right_ankle", "left_ankle", "torso")
+    rows = [row for row in planted_rows(planned) if set(row["stations"]) != set(failed) or row["clip"] != "02_04"]
+    found = rank_rows(rows, planned)
+    assert set(found["jumping", "sets of three"].left_out) == {"ankles + torso"}
+    assert set(found["jumping", "limb pairs"].left_out) == {"ankles"}
+    assert set(found["jumping", "third stations"].left_out) == {"torso"}
+    assert not found["walking", "sets of three"].left_out
 
 
 def test_the_text_names_units_pairs_and_what_would_be_enough() -> None:
@@ -124,7 +141,8 @@ def test_the_text_names_units_pairs_and_what_would_be_enough() -> None:
     assert rows[10] == f"b, c cannot tell {numbers} {why}"
     tau, reversed_pair = "Kendall's tau 0.33 (−0.33 to 0.33), 7 built-in and 7 real performers", "a than b"
     counts = "Of 3 pairs: 1 agree, 1 reversed, 1 cannot be told."
-    better = f"Better on built-in motion and worse on real motion: {reversed_pair}."
+    better = f"Better on built-in motion and worse on real motion: {reversed_pair}. On real motion a, best on built-in motion,"
+    better += " errs 1.00 deg more than b, best there."
     assert rows[-1] == f"walking, methods: {tau}. {counts} {better}"
     (content,) = rankings_content(report)["rankings"]
     assert (content["behaviour"], content["pairs"][0]["verdict"]) == ("walking", "contradict")
