@@ -77,7 +77,7 @@ def _statements(report: RankingReport) -> Iterator[str]:
 
 
 def statement(ranking: RankingAgreement) -> str:
-    """Kendall's tau with its interval and its units, how many pairs agree, and what a choice on built-in motion costs."""
+    """Kendall's tau with its interval and units, the number of pairs that agree, and the cost of a choice."""
     tau = f"Kendall's tau {format_fixed(ranking.tau, 2)}"
     if ranking.reason:
         return f"{tau}, without an interval ({ranking.reason}). No pair can be told. {_cost_of_choice(ranking)}".strip()

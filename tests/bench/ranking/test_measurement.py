@@ -141,9 +141,9 @@ def test_the_text_names_units_pairs_and_what_would_be_enough() -> None:
     assert rows[10] == f"b, c cannot tell {numbers} {why}"
     tau, reversed_pair = "Kendall's tau 0.33 (−0.33 to 0.33), 7 built-in and 7 real performers", "a than b"
     counts = "Of 3 pairs: 1 agree, 1 reversed, 1 cannot be told."
-    better = f"Better on built-in motion and worse on real motion: {reversed_pair}. On real motion a, best on built-in motion,"
-    better += " errs 1.00 deg more than b, best there."
-    assert rows[-1] == f"walking, methods: {tau}. {counts} {better}"
+    better = f"Better on built-in motion and worse on real motion: {reversed_pair}."
+    cost = "On real motion a, best on built-in motion, errs 1.00 deg more than b, best there."
+    assert rows[-1] == f"walking, methods: {tau}. {counts} {better} {cost}"
     (content,) = rankings_content(report)["rankings"]
     assert (content["behaviour"], content["pairs"][0]["verdict"]) == ("walking", "contradict")
 
