@@ -20,6 +20,8 @@ from harness.errors import BadInput, Outcome
 
 ACCURACY = "accuracy"
 """Name of the benchmark of accuracy, which runs alone."""
+RANKING = "ranking"
+"""Name of the comparison of rankings on built-in and on real motion, which runs alone."""
 LAB = "lab"
 """Name of the benchmark of characterize, validate and trust."""
 _ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick")
@@ -30,7 +32,7 @@ def add_bench(verbs: Verbs) -> None:
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
     text = (
         "methods, ik, index, wire, serve, view, stream, physics, lab, load, gate, sweep, startup, performers "
-        "(default: all), or accuracy"
+        "(default: all); accuracy; or ranking: do methods and places rank alike on built-in and real motion?"
     )
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
@@ -48,12 +50,12 @@ def add_bench(verbs: Verbs) -> None:
         metavar="N",
         help="number of seeds: accuracy (default 5), --truth of physics (20) and lab (100)",
     )
-    text = "accuracy, --truth of lab: clips or captures computed at the same time (default 1)"
+    text = "accuracy, ranking, --truth of lab: clips or captures computed at the same time (default 1)"
     verb.add_argument("--jobs", type=process_count, metavar="N", help=text)
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
     verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")
-    text = "accuracy: one seed, three clips, no verdict"
+    text = "accuracy: one seed, three clips, no verdict; ranking: two performers, three methods and sets"
     verb.add_argument("--quick", action="store_true", default=None, help=text)
 
 
@@ -62,6 +64,8 @@ def run_bench(args: argparse.Namespace) -> Outcome:
         return _bench_lab_truth(args) if args.what == [LAB] else _bench_truth(args)
     if ACCURACY in args.what:
         return _bench_accuracy(args)
+    if RANKING in args.what:
+        return _bench_ranking(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
         raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
     if args.runs and args.what and not {"wire", "serve", "view"} & set(args.what):
@@ -170,3 +174,30 @@ def _bench_accuracy(args: argparse.Namespace) -> Outcome:
     if args.save and not report.failures:
         write_errors(args.save, StoredErrors(method, commit, seeds, report.by_method[method]))
     return print_result(args, report_content(report), format_report(report), outcome=report.outcome)
+
+
+def _bench_ranking(args: argparse.Namespace) -> Outcome:
+    from harness.bench.ranking.measurement import measure_rankings, plan_rankings
+    from harness.bench.ranking.text import format_rankings, rankings_content
+    from harness.experiment.executors import process_executor
+
+    others = (args.seed, args.method, args.seeds, args.baseline, args.save, args.runs)
+    if args.what != [RANKING] or args.large or any(value is not None for value in others):
+        raise BadInput("ranking takes --quick, --jobs, --out and --mocap alone.", "Leave the other words out.")
+    jobs, out = args.jobs or 1, args.out or Path("results") / RANKING
+    with (
+        progress_note(out),
+        ProgressBar("cells") as bar,
+        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
+        process_executor(jobs) as executor,
+    ):
+        report = measure_rankings(
+            plan_rankings(quick=bool(args.quick)),
+            out,
+            folder=args.mocap,
+            executor=executor,
+            workers=jobs,
+            command=this_command(),
+            progress=bar,
+        )
+    return print_result(args, rankings_content(report), format_rankings(report), outcome=report.outcome)

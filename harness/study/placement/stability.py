@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.paired_statistics import CONFIDENCE_LEVEL, MIN_UNITS
+from harness.compare.rank_correlation import tau_b
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -98,17 +99,6 @@ def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paire
             significant = None if p is None else p <= SIGNIFICANCE
             changes.append(ChangedOrder(names[first], names[second], (before, after), significant))
     return sorted(changes, key=lambda c: (not c.significant, c.differences[1] - c.differences[0]))
-
-
-def tau_b(a: Floats, b: Floats) -> Floats:
-    """Kendall's tau-b of (..., n) and (..., n) values, over the last axis; NaN where one side has only ties."""
-    first, second = np.triu_indices(a.shape[-1], 1)
-    sign_a, sign_b = (np.sign(side[..., first] - side[..., second]) for side in (a, b))
-    with np.errstate(invalid="ignore"):
-        out: Floats = np.sum(sign_a * sign_b, axis=-1) / np.sqrt(
-            np.sum(sign_a**2, axis=-1) * np.sum(sign_b**2, axis=-1)
-        )
-    return out
 
 
 def _interval(tables: Sequence[Floats], same_clips: bool) -> tuple[float | None, float | None]:

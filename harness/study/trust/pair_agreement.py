@@ -10,13 +10,14 @@ the larger of two one-sided p values, and Holm's method corrects it for the numb
 false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 from scipy import special
 
 from harness.compare.paired_statistics import MIN_UNITS
+from harness.compare.rank_correlation import tau_b
 from harness.compare.ranking import shared_clips
 from harness.compare.significance import holm
 from harness.core.arrays import Floats
@@ -39,30 +40,41 @@ def judge_pairs(
     opposite. Anything else, and fewer than `MIN_UNITS` clips, is undecided.
     """
     chosen = list(combinations(device, 2)) if pairs is None else list(pairs)
-    measured = [_compare_sides(device, simulated, pair, level) for pair in chosen]
-    tested = [at for at, (_, sides) in enumerate(measured) if all(side.p is not None for side in sides)]
-    p = {at: max(side.p or 0.0 for side in measured[at][1]) for at in tested}
+    return decide_pairs(chosen, [_compare_sides(device, simulated, pair, level) for pair in chosen], level)
+
+
+def decide_pairs(
+    pairs: Sequence[tuple[str, str]],
+    compared: Sequence[tuple[int, tuple[SideDifference, SideDifference]]],
+    level: float,
+    *,
+    sides: tuple[str, str] = ("device", "simulation"),
+    unit: str = "clips",
+) -> list[PairAgreement]:
+    """Decide on pairs that are tested together, from their numbers of units and the differences of both sides.
+
+    `sides` and `unit` name the two sides and what was counted in the reasons.
+    """
+    tested = [at for at, (_, found) in enumerate(compared) if all(side.p is not None for side in found)]
+    p = {at: max(side.p or 0.0 for side in compared[at][1]) for at in tested}
     corrected = dict(zip(tested, holm([p[at] for at in tested]), strict=True))
     judged = []
-    for at, ((a, b), (clips, sides)) in enumerate(zip(chosen, measured, strict=True)):
+    for at, ((a, b), (count, found)) in enumerate(zip(pairs, compared, strict=True)):
         if at in corrected:
-            verdict, why = _verdict(sides, corrected[at], level, len(tested))
+            verdict, why = _verdict(dict(zip(sides, found, strict=True)), corrected[at], level, len(tested))
         else:
-            verdict, why = "cannot tell", f"too few clips: {clips}, of at least {MIN_UNITS}"
-        judged.append(PairAgreement(a, b, clips, *sides, p.get(at), corrected.get(at), verdict, why))
+            verdict, why = "cannot tell", f"too few {unit}: {count}, of at least {MIN_UNITS}"
+        judged.append(PairAgreement(a, b, count, *found, p.get(at), corrected.get(at), verdict, why))
     return judged
 
 
-def _verdict(
-    sides: tuple[SideDifference, SideDifference], p_holm: float, level: float, pairs: int
-) -> tuple[PairVerdict, str]:
-    device, simulated = sides
+def _verdict(sides: Mapping[str, SideDifference], p_holm: float, level: float, pairs: int) -> tuple[PairVerdict, str]:
+    first, second = (np.sign(side.mean or 0.0) for side in sides.values())
     if p_holm <= level:
-        if np.sign(device.mean or 0.0) == np.sign(simulated.mean or 0.0):
+        if first == second:
             return "agree", "both sides show the same order"
         return "contradict", "each side shows the other order"
-    names = zip(("device", "simulation"), sides, strict=True)
-    weak = [name for name, side in names if side.p is not None and side.p > level]
+    weak = [name for name, side in sides.items() if side.p is not None and side.p > level]
     if weak:
         return "cannot tell", f"no significant difference on the {' and the '.join(weak)}"
     return "cannot tell", f"not significant among {pairs} pairs"
@@ -84,8 +96,8 @@ def _compare_sides(
     if all(len(row) > 1 for row in rows[1]):
         of_simulation = float(np.mean([row.var(ddof=1) / len(row) for row in rows[1]]))
         free = sum(len(row) - 1 for row in rows[1])
-    first = _side_difference(means[0], of_device, len(clips) - 1, level)
-    return len(clips), (first, _side_difference(means[1], of_simulation, free, level))
+    first = side_difference(means[0], of_device, len(clips) - 1, level)
+    return len(clips), (first, side_difference(means[1], of_simulation, free, level))
 
 
 def _differences(side: ArmErrors, pair: tuple[str, str]) -> dict[str, Floats]:
@@ -101,7 +113,7 @@ def clip_means(errors: Mapping[str, Sequence[float | None]]) -> dict[str, float]
     return {clip: sum(values) / len(values) for clip, values in known.items() if values}
 
 
-def _side_difference(values: Floats, variance: float, free: int, level: float) -> SideDifference:
+def side_difference(values: Floats, variance: float, free: int, level: float) -> SideDifference:
     """The mean of (n,) differences, whose noise has this variance, known with `free` degrees of freedom."""
     mean, deviation = float(values.mean()), float(np.sqrt(variance / len(values)))
     half = float(special.stdtrit(free, 1.0 - level)) * deviation
@@ -127,9 +139,10 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
         return first, second
     sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]
     drawn = generator(0, "rank correlation").integers(0, len(clips), (RESAMPLES, len(clips)))
+    measures: tuple[Callable[[Floats, Floats], Floats | float], ...] = (tau_b, _pearson)
     found = []
-    for name, measure in zip(names, (kendall_tau_b, _pearson), strict=True):
-        value = measure(sides[0].mean(axis=1), sides[1].mean(axis=1))
+    for name, measure in zip(names, measures, strict=True):
+        value = float(measure(sides[0].mean(axis=1), sides[1].mean(axis=1)))
         resampled = np.array([measure(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
         finite = resampled[np.isfinite(resampled)]
         if not np.isfinite(value) or not len(finite):
@@ -138,13 +151,6 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
         low, high = np.quantile(finite, (0.025, 0.975))
         found.append(RankCorrelation(name, value, float(low), float(high)))
     return found[0], found[1]
-
-
-def kendall_tau_b(x: Floats, y: Floats) -> float:
-    """Kendall's rank correlation of (n,) values with a correction of ties (tau-b); NaN if one side is constant."""
-    first, second = (np.sign(values[:, None] - values[None, :]) for values in (x, y))
-    scale = np.sqrt(float((first**2).sum()) * float((second**2).sum()))
-    return float((first * second).sum() / scale) if scale else float("nan")
 
 
 def _pearson(x: Floats, y: Floats) -> float:

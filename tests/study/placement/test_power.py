@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from harness.compare.significance import SIGNIFICANCE, sign_flip_p
+from harness.compare.significance import SIGNIFICANCE, count_needed, sign_flip_p
 from harness.results.placement_findings import StationPlacement
 from harness.study.placement.power import (
     POWER,
@@ -14,14 +14,13 @@ from harness.study.placement.power import (
     estimate_power,
     smallest_effect,
 )
-from harness.study.placement.ranking import min_clips
 
 SETS = [(StationPlacement(f"place_{n}", "head", 0.5, 0.0),) for n in range(10)]
 
 
 @pytest.mark.parametrize(("comparisons", "least"), [(1, 6), (9, 9), (164, 13)])
 def test_too_few_clips_show_nothing_however_large_the_difference(comparisons: int, least: int) -> None:
-    assert min_clips(comparisons) == least
+    assert count_needed(comparisons) == least
     assert smallest_effect(least - 1, comparisons) == math.inf
     assert smallest_effect(least, comparisons) < 3.0
 
@@ -39,7 +38,7 @@ def test_the_sign_flip_test_finds_the_smallest_effect_with_the_stated_power(
 
 @pytest.mark.parametrize("comparisons", [1, 9, 164])
 def test_more_clips_show_smaller_differences(comparisons: int) -> None:
-    least = min_clips(comparisons)
+    least = count_needed(comparisons)
     effects = [smallest_effect(clips, comparisons) for clips in (least, least + 4, least + 20, least + 100)]
     assert effects == sorted(effects, reverse=True)
     assert effects[-1] < 0.55

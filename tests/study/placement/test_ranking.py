@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from harness.compare.significance import count_needed
 from harness.core.seeds import generator
 from harness.results.placement_findings import StationNames
 from harness.study.placement.ranking import (
@@ -12,7 +13,6 @@ from harness.study.placement.ranking import (
     complete_sets,
     cross_validated_cost,
     mean_cost,
-    min_clips,
     rank_sets,
     selection_stability,
     significant_differences,
@@ -103,7 +103,7 @@ def test_a_set_that_misses_a_clip_is_not_ranked_but_named() -> None:
 @pytest.mark.parametrize("comparisons", [1, 2, 9, 30])
 def test_so_many_clips_can_tell_and_one_less_cannot(comparisons: int) -> None:
     sets = {name: 1.0 + at for at, name in enumerate("abcdefghijklmnopqrstuvwxyzABCDE"[: comparisons + 1])}
-    enough = min_clips(comparisons)
+    enough = count_needed(comparisons)
     for clips, told in ((enough, True), (enough - 1, enough == 6)):  # fewer than 6 never have intervals
         whole, _ = complete_sets(study(sets, 0.0, 1, CLIPS[:clips]))
         better, _ = significant_differences(sort_by_cost(whole), whole)
