@@ -175,7 +175,7 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, behaviour: str) -
     for row, other in zip(of_it, again[1:], strict=True):
         assert row[:5] == other[:5]
         figures = [[float(x) for x in each[5:] if x != "±"][:-2] for each in (row, other)]  # the last ones are times
-        np.testing.assert_allclose(*figures, rtol=0.05, atol=0.02)
+        np.testing.assert_allclose(figures[0], figures[1], rtol=0.05, atol=0.02)
 
 
 def commands(text: str) -> list[str]:

@@ -48,13 +48,14 @@ class World:
 def _clusters(size: int) -> Callable[[np.random.Generator, int], Floats]:
     def draw(rng: np.random.Generator, units: int) -> Floats:
         shared, own = rng.normal(size=(units, 1)), rng.normal(size=(units, size))
-        return np.sqrt(_CORRELATION) * shared + np.sqrt(1.0 - _CORRELATION) * own
+        drawn: Floats = np.sqrt(_CORRELATION) * shared + np.sqrt(1.0 - _CORRELATION) * own
+        return drawn
 
     return draw
 
 
 def _few_differ(rng: np.random.Generator, units: int) -> Floats:
-    return (rng.random((units, 1)) < _FEW) * (1.0 + 0.3 * rng.normal(size=(units, 1)))
+    return np.where(rng.random((units, 1)) < _FEW, 1.0 + 0.3 * rng.normal(size=(units, 1)), 0.0)
 
 
 WORLDS = (
@@ -66,11 +67,11 @@ WORLDS = (
     World("clusters of 3", _clusters(3), 0.0),
     World(
         "half are zero",
-        lambda rng, units: (rng.random((units, 1)) < 0.5) * np.exp(0.5 * rng.normal(size=(units, 1))),
+        lambda rng, units: np.where(rng.random((units, 1)) < 0.5, np.exp(0.5 * rng.normal(size=(units, 1))), 0.0),
         0.5 * float(np.exp(0.125)),
         0.5,
     ),
-    World("ties", lambda rng, units: np.round(rng.normal(size=(units, 1))), 0.0, 1.0 - float(special.erf(8.0**-0.5))),
+    World("ties", lambda rng, units: np.rint(rng.normal(size=(units, 1))), 0.0, 1.0 - float(special.erf(8.0**-0.5))),
 )
 """The differences are exponential, Student's t with 3 degrees of freedom, log-normal or zero, and whole numbers."""
 

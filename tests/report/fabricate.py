@@ -78,8 +78,8 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
 def make_cell(
     behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan, varied: Mapping[str, Any]
 ) -> storage.Cell:
-    """The cell of one method on one take."""
-    made = generate(behaviour, "p1", take, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
+    """The cell of one method on the take of one performer."""
+    made = generate(behaviour, f"p{take}", 1, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
     skeleton, dofs = made.skeleton.subset(BONES)
     truth = pack(made.root_m, made.world_from_root, made.angles_rad[:, dofs])
     clip = plan.clip_name or made.name

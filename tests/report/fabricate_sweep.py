@@ -50,7 +50,7 @@ def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
         plan.scenarios, plan.seeds, itertools.product(*values), range(plan.clips), plan.methods
     ):
         varied = {key: value for key, (_, value) in zip(plan.vary, combination, strict=True)}
-        cell = f"{scenario} seed {seed}: {method} on {scenario}_p1_{clip + 1:02} ({varied})"
+        cell = f"{scenario} seed {seed}: {method} on {scenario}_p{clip + 1}_01 ({varied})"
         named.append(cell)
         if method in plan.failing:
             failed.append((cell, "", FAILURE))
@@ -80,7 +80,7 @@ def _row(
     return {
         "key": content_key([scenario, seed, method, clip, varied]),
         "scenario": scenario,
-        "clip": f"{scenario}_p1_{clip + 1:02}",
+        "clip": f"{scenario}_p{clip + 1}_01",
         "behaviour": scenario,
         "method": method,
         "inputs": "pos+ori",

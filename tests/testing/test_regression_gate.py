@@ -88,7 +88,7 @@ def test_a_worse_method_fails_with_the_table(project: pytest.Pytester) -> None:
     CHANGE["now"] = 1.2
     result = gated(project)
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["B is worse than A in 3 of 3 gated lines on 8 clips: *", "A: baseline main"])
+    result.stdout.fnmatch_lines(["B is worse than A in 3 of 3 gated lines on 8 takes: *", "A: baseline main"])
     result.stdout.fnmatch_lines(["*worse*mine:Mine*mpjpe_mm*8*"])
     result.stdout.no_fnmatch_line("*Traceback*")
     result.stdout.no_fnmatch_line("*gate.py*")
@@ -103,7 +103,7 @@ def test_a_better_method_passes_and_one_may_be_held_to_another(project: pytest.P
 def test_other_metrics_may_be_chosen(project: pytest.Pytester) -> None:
     CHANGE["now"] = 1.2
     result = gated(project, ONE.format(", metrics=('mpjpe_mm',)"))
-    result.stdout.fnmatch_lines(["B is worse than A in 1 of 1 gated line on 8 clips: *"])
+    result.stdout.fnmatch_lines(["B is worse than A in 1 of 1 gated line on 8 takes: *"])
 
 
 def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:

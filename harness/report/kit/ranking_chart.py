@@ -147,7 +147,8 @@ def _draw_heading(row: Sequence["Axes"], heading: str) -> None:
 def _limit_axis(axes: "Axes", lowest: float, highest: float) -> None:
     """Keep intervals that are far wider than the means differ from stretching the axis."""
     low, high = axes.get_xlim()
-    axes.set_xlim(max(low, lowest), min(high, highest))
+    if highest > 0.0:  # methods without an error leave the axis as it is
+        axes.set_xlim(max(low, lowest), min(high, highest))
 
 
 def _draw_means(axes: "Axes", ranking: MethodRanking, places: Sequence[float], largest: float, unit: str) -> None:

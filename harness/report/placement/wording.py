@@ -79,7 +79,8 @@ def sentence(findings: PlacementFindings) -> str:
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
     clips = {clip for tried in findings.tried for clip in tried.errors}
-    chosen = [f"Sets were chosen on {count_clips(clips)}."] if clips else []
+    counted = count_clips(clips)
+    chosen = [f"Sets were chosen on {counted}."] if counted != count_noun(len(clips), "clip") else []
     if findings.sizes:
         return " ".join([*(_size_sentence(findings, size) for size in findings.sizes), *chosen])
     best = smallest_sufficient_set(findings)

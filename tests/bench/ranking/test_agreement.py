@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness.bench.ranking.agreement import MIN_UNITS, ErrorsByUnit, RankingAgreement, compare_rankings
+from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, compare_rankings
+from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.rank_correlation import tau_b
 from harness.core.arrays import Floats
 

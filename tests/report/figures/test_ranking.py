@@ -61,7 +61,9 @@ def test_rows_have_the_means_intervals_and_differences_of_the_ranking(ranked: Pa
 )
 def test_a_method_that_errs_several_times_as_much_does_not_squeeze_the_others(means: list[float], inside: int) -> None:
     values = {f"m{n}": np.full(8, mean) for n, mean in enumerate(means)}
-    panel = RankingPanel("", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), values, {}, {}))
+    panel = RankingPanel(
+        "", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), tuple("abcdefgh"), values, {}, {})
+    )
     assert panel.largest_drawn == means[inside - 1]
     assert ("beyond the axis" in explain_marks([panel])) == (inside < len(means))
 
@@ -78,10 +80,10 @@ def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None
 
 def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
     figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
-    assert "Fewer than 6 clips cannot show a difference." in figure.caption
+    assert "Fewer than 6 units cannot show a difference." in figure.caption
     with drawn(figure) as shown:
         *_, heading = shown.axes[0].texts  # after the values at the edge
-        assert heading.get_text() == "4 clips: differences cannot be shown"
+        assert heading.get_text() == "4 takes: differences cannot be shown"
         assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o", ">"}
 
 
@@ -89,10 +91,10 @@ def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
     figure = ranking_figure(read_conditions(conditions), FigureSelection())
     with drawn(figure) as shown:
         assert [" ".join(text.get_text().split()) for axes in shown.axes for text in axes.texts] == [
-            "noise=clean, known performers (8 clips)",
-            "noise=clean, new performers (3 clips): differences cannot be shown",
-            "noise=default, known performers (8 clips)",
-            "noise=default, new performers (3 clips): differences cannot be shown",
+            "noise=clean, known performers (8 takes)",
+            "noise=clean, new performers (3 takes): differences cannot be shown",
+            "noise=default, known performers (8 takes)",
+            "noise=default, new performers (3 takes): differences cannot be shown",
         ]
         assert len({axes.get_xlim() for axes in shown.axes[::2]}) == 1
         texts_apart(shown)

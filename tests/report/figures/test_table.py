@@ -55,7 +55,8 @@ def test_few_clips_make_nothing_bold(tmp_path: Path) -> None:
     assert {value.standing for row in table.rows for value in row.values} == {"lowest", "tied"}
     assert not any(value.bold for row in table.rows for value in row.values)
     assert table.note == (
-        "Mean over clips and its 95 % interval. Fewer than 6 clips cannot show a difference, so nothing is bold there."
+        "Mean over units and its 95 % interval: 4 clips. "
+        "Fewer than 6 units cannot show a difference, so nothing is bold there."
     )
 
 

@@ -147,4 +147,4 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
 def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
     clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
     for sizes in ((), (2,)):
-        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on clips of 3 performers.")
+        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on 6 clips of 3 performers.")

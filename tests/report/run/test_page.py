@@ -53,8 +53,8 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     heading, _ = verdict_of(page)
     assert page.index("<h1>") < page.index("<table")
     assert heading.startswith("best_match+ik has the lowest mean joint-angle error, ")
-    assert "on 2 sequences of built-in motion" in heading
-    assert "cannot be called better than any of the other 3 (too few clips: 2, of at least 6)." in heading
+    assert "on 2 sequences of 1 performer of built-in motion" in heading
+    assert "cannot be called better than any of the other 3 (too few units: 1, of at least 6)." in heading
     assert "<td><strong>" not in page
     assert "Bold: " not in page
 
@@ -81,7 +81,7 @@ def test_headline_bold_cells_terminal_and_comparison_agree(ten_clips: Path) -> N
     heading, rest = verdict_of(page)
     less = f"That is {errors[poor] - errors['good']:.2f}° ({100 * (1 - errors['good'] / errors[poor]):.0f} %) less than"
     assert heading.startswith(f"good is best: {errors['good']:.2f}° mean joint-angle error on 10 sequences of ")
-    assert rest.startswith(f"{less} {poor}, the next, and lower on 10 of 10 sequences.")
+    assert rest.startswith(f"{less} {poor}, the next, and lower on 10 of 10 performers.")
     assert "good is best: " in run_table(read_summary(ten_clips))
     for other in ("poor", "other"):
         line = compare_runs(ten_clips, methods=(other, "good")).differences[0]
@@ -210,7 +210,7 @@ def test_a_run_without_any_finished_cell_has_a_page(tmp_path: Path) -> None:
 def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
     said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
-    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion (1 performer). No other" in said
+    assert "oracle: 0.00° mean joint-angle error on 1 sequence of 1 performer of built-in motion. No other" in said
     assert "Its mean joint position error is 0 mm." in said
 
 
@@ -239,7 +239,7 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
         assert f" {row['metrics']['joint_angle_mean_deg']['mean']:.2f} " in said
     last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
     assert f"ik has the lowest mean joint-angle error, {last:.2f}° on 1 sequence" in said
-    assert "of built-in motion, with components.echo.share=0.1 (1 performer), but cannot be called better than" in said
+    assert "of 1 performer of built-in motion, with components.echo.share=0.1, but cannot be called better than" in said
     assert {trace.key for trace in read_run(out).traces} == {
         row["key"] for row in read_run(out).full_summary["cells"][-2:]
     }
@@ -282,7 +282,7 @@ def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
     )
     for kind in ("known", "new"):
         assert f"ik ({kind} performer) has the lowest mean joint-angle error, " in said
-        assert f"on 1 sequence of built-in motion by {kind} performers" in said
+        assert f"on 1 sequence of 1 performer of built-in motion by {kind} performers" in said
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:

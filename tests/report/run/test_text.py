@@ -46,4 +46,4 @@ def test_few_rows_are_all_shown(summary: Any) -> None:
 def test_the_ranking_is_one_sentence_where_nothing_can_be_told(summary: Any) -> None:
     (line,) = [line for line in run_table(summary, short=True).splitlines() if "lowest mean" in line]
     assert line.startswith("m00 has the lowest mean joint-angle error, ")
-    assert line.endswith(", but cannot be called better than any of the other 13 (too few clips: 2, of at least 6).")
+    assert line.endswith(", but cannot be called better than any of the other 13 (too few units: 1, of at least 6).")

@@ -63,7 +63,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
     assert re.search(
-        r"on 14 clips \(1 performer\)\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 14",
+        r"on 14 clips of 7 performers\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 7",
         said,
     )
     raw = (folder / "report.html").read_text(encoding="utf-8")
@@ -175,7 +175,7 @@ def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
     assert sentence(read_sweep(few)).endswith(
-        "but cannot be called better than any of the other 2 (too few clips: 5, of at least 6)."
+        "but cannot be called better than any of the other 2 (too few units: 5, of at least 6)."
     )
     assert sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
     for out in (few, alike):
@@ -184,13 +184,17 @@ def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Path) -> None:
-    """Six clips of each scenario are too few for 4 lines, as 4 * 2 / 2^6 is above 0.05; the 12 of both are enough."""
-    plan = Plan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=6)
-    page = write_sweep_page(fabricate_sweep(tmp_path, plan)).read_text(encoding="utf-8")
-    sweep = read_sweep(tmp_path)
-    over_all = sweep.statistic(PRIMARY_METRIC, sweep.select(series=sweep.series.index("dynamic_map"))).mean
-    table = page.split(f'aria-label="{PRIMARY_METRIC}"')[-1].split("</table>")[0]
-    assert re.findall(r"<strong>([\d.]+)", table) == [f"{over_all:.2f}"]
+    """Six performers are too few for 4 lines, as 4 * 2 / 2^6 is above 0.05, however many clips they have."""
+    for clips, columns in ((6, 0), (10, 3)):
+        plan = Plan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=clips)
+        out = tmp_path / str(clips)
+        page = write_sweep_page(fabricate_sweep(out, plan)).read_text(encoding="utf-8")
+        sweep = read_sweep(out)
+        over_all = sweep.statistic(PRIMARY_METRIC, sweep.select(series=sweep.series.index("dynamic_map"))).mean
+        table = page.split(f'aria-label="{PRIMARY_METRIC}"')[-1].split("</table>")[0]
+        bold = re.findall(r"<strong>([\d.]+)", table)
+        assert len(bold) == columns
+        assert not columns or f"{over_all:.2f}" in bold
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
@@ -217,7 +221,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
     assert "good is best: " in causal
     assert "late" not in causal
-    assert late.endswith("with a lag of 2 frames (1 performer). No other method was measured.")
+    assert late.endswith("of 10 performers, with a lag of 2 frames. No other method was measured.")
     assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
     table = str(scenario_table(sweep, PRIMARY_METRIC))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]

@@ -36,7 +36,7 @@ def test_every_metric_of_a_capture_has_the_value_of_the_general_scoring(small_st
 @pytest.fixture(scope="module")
 def made() -> tuple[MethodAnswers, Ints]:
     """Answers to 200 frames that are off by random angles, and the true frame of each."""
-    playback = prepare_playback("demo", clip="boxing_p1_01")
+    playback = prepare_playback("builtin_boxing")
     qpos = playback.simulation.truth_qpos[:200].copy()
     qpos[:, 7:] += 0.05 * generator(1, "answers").normal(size=qpos[:, 7:].shape)
     ones, zeros = np.ones(200), np.zeros(200, dtype=np.int64)
@@ -45,7 +45,7 @@ def made() -> tuple[MethodAnswers, Ints]:
 
 def test_loops_count_together_and_only_the_first_warms_up(made: tuple[MethodAnswers, Ints]) -> None:
     answers, index = made
-    playback = prepare_playback("demo", clip="boxing_p1_01")
+    playback = prepare_playback("builtin_boxing")
     truth_qpos, skeleton = playback.simulation.truth_qpos, playback.body.skeleton
     truth = compute_poses(skeleton, truth_qpos)
     loops = [LoopFrames(index[20:120], index[20:120]), LoopFrames(index[120:], index[120:])]
@@ -58,7 +58,7 @@ def test_loops_count_together_and_only_the_first_warms_up(made: tuple[MethodAnsw
 
 def test_half_of_the_frames_are_needed(made: tuple[MethodAnswers, Ints]) -> None:
     answers, index = made
-    playback = prepare_playback("demo", clip="boxing_p1_01")
+    playback = prepare_playback("builtin_boxing")
     truth = compute_poses(playback.body.skeleton, playback.simulation.truth_qpos)
     lost = answers.qpos.copy()
     lost[40:121] = np.nan  # 81 of the 160 frames after the warm-up
@@ -76,7 +76,7 @@ def replace_qpos(answers: MethodAnswers, qpos: np.ndarray) -> MethodAnswers:
 
 def test_a_lag_leaves_the_last_frames_without_an_answer(made: tuple[MethodAnswers, Ints]) -> None:
     answers, index = made
-    playback = prepare_playback("demo", clip="boxing_p1_01")
+    playback = prepare_playback("builtin_boxing")
     truth = compute_poses(playback.body.skeleton, playback.simulation.truth_qpos)
     lag = np.minimum(np.arange(200), 5)
     late = answers._replace(lag=lag, qpos=np.concatenate([answers.qpos[:1].repeat(5, axis=0), answers.qpos[:-5]]))
