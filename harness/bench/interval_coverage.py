@@ -24,7 +24,7 @@ ENOUGH = 12
 """Number of units from which on the targets hold."""
 EQUIVALENCE_LEVEL = 0.05
 _CORRELATION = 0.8
-"""Of the clips of one unit."""
+"""Correlation of the clips of one unit."""
 _FEW = 0.2
 """Share of units that differ where few do."""
 
