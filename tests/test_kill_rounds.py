@@ -35,7 +35,10 @@ def test_a_command_that_is_stopped_ends_tidily(work: Work, kind: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["emulate", "record", "report", "sweep"])
+@pytest.mark.parametrize(
+    "kind",
+    ["emulate", "record", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("report", "sweep"))],
+)
 def test_a_longer_command_that_is_stopped_ends_tidily(work_with_device: Work, kind: str) -> None:
     assert_rounds(work_with_device, kind, 1, seed=1)
 

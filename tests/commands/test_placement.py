@@ -74,7 +74,7 @@ def test_a_question_is_answered_alike_on_the_terminal_the_page_and_in_json(
     assert {folder.name for folder in (out / "cells").iterdir()} == cells
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_without_the_time_for_every_set_stations_are_added_one_after_another(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -186,7 +186,7 @@ def test_takes_of_the_motion_generator_are_apart(behaviour: str) -> None:
     assert 2.0 * copies[0] < SAME_MOTION < 0.5 * min(takes[0], blocks[0])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_takes_of_one_subject_of_the_library_are_apart(mocap: Path) -> None:
     """The performers with the most similar clips; `test_no_two_takes_of_the_library_are_refused` has all of them."""
     library = MotionLibrary(mocap)

@@ -98,7 +98,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_stations_of_walkers_hear_three_emitters_of_hall(seed: int) -> None:
     coverage = walker_coverage(seed)
     assert set(coverage) == set(synthetic.REFERENCE_PERFORMERS)
