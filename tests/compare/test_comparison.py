@@ -141,7 +141,25 @@ def test_a_line_names_the_behaviour_that_decides_it() -> None:
     assert describe_parts(comparison, line) == "better for boxing (8 performers), the same elsewhere"
     assert f"✓ ik {ANGLE}: better for boxing (8 performers), the same elsewhere" in text(comparison)
     again = found(sides[0], sides[0])
-    assert describe_parts(again, again.differences[0]) == "the same in each part"
+    assert describe_parts(again, again.differences[0]) == "the same for walking (8 performers), boxing (8 performers)"
+
+
+def test_parts_by_behaviour_and_by_performer_are_described_one_after_the_other() -> None:
+    """Six known and six new performers are worse alike; each walks and boxes, with too large a scatter in boxing."""
+    sides = []
+    for change in (0.0, 0.3):
+        cells = []
+        for n in range(1, 13):
+            for behaviour in ("walking", "boxing"):
+                times = 1.0 + change + (0.5 * (-1) ** n * change / 0.3 if behaviour == "boxing" else 0.01 * n)
+                known = "known" if n % 2 else "new"
+                of_it = cell(f"{behaviour}_p{n}_01", times=times, performer=known)
+                cells.append(replace(of_it, behaviour=behaviour))
+        sides.append(ResultSet("A", manifest(), tuple(cells), 24))
+    comparison = found(sides[1], sides[0])
+    said = describe_parts(comparison, comparison.differences[0])
+    assert said.startswith("worse for walking (12 performers), no difference shown elsewhere; ")
+    assert said.count("elsewhere") == 1 + said.endswith("elsewhere")
 
 
 def test_clips_of_one_performer_count_once() -> None:

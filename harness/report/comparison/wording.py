@@ -52,22 +52,24 @@ def sentence(comparison: Comparison) -> str:
 
 
 def describe_parts(comparison: Comparison, line: Difference) -> str:
-    """What decides a gated line: the behaviours and the kinds of performers in which the sides differ.
+    """What decides a gated line: the behaviours, and the kinds of performers, in which the sides differ.
 
     "" where the line has no parts.
     """
     parts = parts_of(comparison, line)
+    of_performers = [part for part in parts if part.part.endswith(" performers")]
+    behaviours = [part for part in parts if part not in of_performers]
+    return "; ".join(_describe_kind(kind) for kind in (behaviours, of_performers) if kind)
+
+
+def _describe_kind(parts: Sequence[Difference]) -> str:
     differing = [part for part in parts if part.verdict in ("worse", "better")]
-    if not parts:
-        return ""
     if not differing:
         if all(part.verdict == "same" for part in parts):
-            return "the same in each part"
+            return f"the same for {list_first([_part_name(part) for part in parts])}"
         largest = max(parts, key=lambda part: abs(part.difference))
         change = format_change_percent(percent_of_a(largest, largest.difference))
-        fewest, most = (pick(len(part.units) for part in parts) for pick in (min, max))
-        units = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-        return f"no part of {units} units shows a difference alone; the largest is {_part_name(largest)}, {change}"
+        return f"no difference shown for any part alone, the largest is {change} for {_part_name(largest)}"
     texts = []
     for verdict in ("worse", "better"):
         names = [_part_name(part) for part in differing if part.verdict == verdict]
@@ -79,7 +81,8 @@ def describe_parts(comparison: Comparison, line: Difference) -> str:
 
 
 def _part_name(part: Difference) -> str:
-    return f"{part.part.replace('_', ' ')} ({count_units(part.units)})"
+    name = part.part.removesuffix(" performers").replace("_", " ")
+    return f"{name} ({count_units(part.units)})"
 
 
 def parts_of(comparison: Comparison, line: Difference) -> list[Difference]:
