@@ -49,7 +49,7 @@ def here(runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("worse main", 0, "pass", "better"),
         ("main torn", 3, "not comparable", "the interval contains zero"),
         ("few few", 0, "pass", "no worse"),
-        ("few faster_few", 3, "not comparable", "too few clips: 5, of at least 6"),
+        ("few faster_few", 3, "not comparable", "too few units: 5, of at least 6"),
         ("main other", 3, "not comparable", "scenario: demo against other"),
         ("main empty", 3, "not comparable", "no cell of A has a partner in B"),
         ("main faster", 3, "not comparable", "tracker.rate_hz: 40 against 60"),

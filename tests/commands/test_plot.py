@@ -22,7 +22,7 @@ def test_it_names_the_file_its_size_and_a_caption(
     assert main(["plot", str(run), "--out", "r.svg", "--methods", "ik,expert_map", "--width", "170"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("figure: r.svg (170 x ")
-    assert lines[1].startswith("caption: Mean joint angle error on 15 clips. Lines: 95 % intervals over clips.")
+    assert lines[1].startswith("caption: Mean joint angle error on 15 clips. Lines: 95 % intervals over units.")
     assert lines[-1] == "pass"
     assert Path("r.svg").is_file()
     assert main(["plot", str(run), "--out", "r.svg"]) == 2

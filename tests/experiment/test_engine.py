@@ -70,7 +70,7 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     performers = {"walking_p1_01": "p1", "boxing_p2_01": "p2"}
     assert Manifest.read(out / "manifest.json").performers == performers
     assert read_summary(out)["performers"] == performers
-    assert "2 clips (2 performers)" in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
+    assert "on 2 performers:" in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
 
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
