@@ -21,6 +21,7 @@ class Late:
     name: str = "late"
     summary: str = "inverse kinematics, late"
     needs_examples: bool = False
+    training_data: str = "none"
 
     def fit(self, body: Any, examples: Any, rng: Any) -> "Waiting":
         return Waiting(self, Ik(towards_mean=0.0, spread=False).fit(body, examples, rng))

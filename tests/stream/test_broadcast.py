@@ -27,6 +27,7 @@ from harness.stream.emulator.udp_port import parse_udp_address
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
+from tests.long_demo import write_long_demo
 from tests.stream.emulator.played import NAMES, make_samples
 from tests.stream.wire import frames_equal
 
@@ -55,9 +56,9 @@ def test_the_broadcast_satisfies_the_contract_of_streams() -> None:
     assert len(frames) == 15
 
 
-def test_the_frames_are_those_of_the_simulation() -> None:
+def test_the_frames_are_those_of_the_simulation(tmp_path: Path) -> None:
     """Within single precision of metres, degrees and seconds; validity and suspicion are equal."""
-    playback = prepare_playback("demo", clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
+    playback = prepare_playback(write_long_demo(tmp_path), clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
     simulated = playback.simulation.frames
     for _ in range(ATTEMPTS):  # a frame is closed when its packets are late
         with broadcast(playback.samples) as (_, port), open_tracker(port, DriverConfig(rate_hz=RATE_HZ)) as tracker:

@@ -4,15 +4,17 @@ import pytest
 
 from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
+from tests.long_demo import write_long_demo
 from tests.stream.sources import RATE_HZ, SOURCES, PlayedTake, Sources, differences, overlap, read_sources
 
 ESTIMATED_FRAMES = 60
 
 
 @pytest.fixture(scope="module")
-def playback() -> Playback:
+def playback(tmp_path_factory: pytest.TempPathFactory) -> Playback:
     """Four stations with all errors of the device, at a rate that a busy computer can sustain."""
-    return prepare_playback("demo", clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
+    scenario = write_long_demo(tmp_path_factory.mktemp("scenario"))
+    return prepare_playback(scenario, clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="module")
