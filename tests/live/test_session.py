@@ -250,7 +250,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     run_session(
         Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
         worn.body,
-        worn.clip_evaluation.fit_method(registry.resolve("ik"), "ik"),
+        worn.clip_evaluation.fit_method(registry.resolve("ik:previous"), "ik:previous"),
         TPoseCalibrator(worn.body, mounts_of(worn.scenario)),
         [output],
         LiveOptions(40.0, queue_frames=999, host_timestamps=False),
@@ -259,7 +259,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     assert said[1].startswith("calibration: done")
     assert output.poses
     for pose in output.poses:
-        np.testing.assert_allclose(pose.root_m, upright[:3], atol=0.04)  # the prior of `ik` is that of boxers
+        np.testing.assert_allclose(pose.root_m, upright[:3], atol=0.03)
 
 
 def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
