@@ -55,3 +55,14 @@ def test_each_world_and_number_of_units_has_its_rows(monkeypatch: pytest.MonkeyP
     assert [row.target for row in rows] == ["", "", "", "", ">= 92", "", "<= 5", ""]
     assert all("earlier version" in row.reference for row in rows)
     assert "at most 93.1% of samples differ" in rows[4].reference
+
+
+@pytest.mark.slow
+def test_intervals_hold_in_every_world() -> None:
+    """Every target of the table, as `harness bench gate` prints it."""
+    missed = []
+    for row in coverage_rows(1):
+        relation, _, limit = row.target.partition(" ")
+        if relation and not (row.value >= float(limit) if relation == ">=" else row.value <= float(limit)):
+            missed.append(f"{row.name}: {row.value}, {row.target}")
+    assert missed == []
