@@ -15,6 +15,7 @@ from harness.report.comparison.wording import (
     OUTCOME_TITLES,
     clips_of,
     count_verdicts,
+    deciding_parts,
     listed_issues,
     parts_of,
     sentence,
@@ -73,6 +74,7 @@ def _facts(comparison: Comparison) -> Mapping[str, str]:
         "B": comparison.b,
         "Clips": f"{len(clips)}: {list_first(clips, _MOST_NAMED)}" if clips else "none",
         "Units": count_units(unit for line in comparison.differences for unit in line.units),
+        "Where A and B differ": " ".join(f"{text}." for text in deciding_parts(comparison)[:_MOST_NAMED]),
         "Training data": list_first(comparison.training_notes, _MOST_NAMED),
         "Cells matched": f"{comparison.matched:,}",
         **{

@@ -7,13 +7,12 @@ from harness.core.number_format import format_change_percent, format_p_value
 from harness.core.text_table import Table
 from harness.report.comparison.wording import (
     MARKS,
-    describe_parts,
+    deciding_parts,
     excerpt_pair,
     format_interval,
     format_mean,
     format_signed,
     groups_vary,
-    line_title,
     listed_issues,
     percent_of_a,
     sentence,
@@ -28,7 +27,7 @@ def text(comparison: Comparison) -> str:
     """The text of a comparison; without tables if nothing was compared."""
     gated = [line for line in comparison.differences if line.gated]
     rest = [line for line in comparison.differences if not (line.gated or line.part)]
-    lines = [sentence(comparison), *_deciding_parts(comparison, gated), f"A: {comparison.a}", f"B: {comparison.b}"]
+    lines = [sentence(comparison), *_first(deciding_parts(comparison)), f"A: {comparison.a}", f"B: {comparison.b}"]
     lines += [f"note: {note}" for note in comparison.training_notes]
     for title, group in (("", gated), ("not gated", rest)):
         if group:
@@ -36,14 +35,7 @@ def text(comparison: Comparison) -> str:
     return "\n".join([*lines, *_reasons(gated), *_differences(comparison)])
 
 
-def _deciding_parts(comparison: Comparison, gated: Sequence[Difference]) -> list[str]:
-    """For each gated line that is not the same, in which behaviours and performers its sides differ."""
-    lines = [line for line in sort_by_verdict(gated) if line.verdict != "same"]
-    texts = [
-        f"{MARKS[line.verdict]} {line_title(line)}: {parts}"
-        for line in lines
-        if (parts := describe_parts(comparison, line))
-    ]
+def _first(texts: Sequence[str]) -> list[str]:
     more = len(texts) - _MOST_LISTED
     return [*texts[:_MOST_LISTED], *([f"{more} more lines: --html"] if more > 0 else [])]
 

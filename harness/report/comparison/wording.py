@@ -51,6 +51,16 @@ def sentence(comparison: Comparison) -> str:
             return f"It cannot be decided whether B is worse than A: {comparison.why.rstrip('.')}."
 
 
+def deciding_parts(comparison: Comparison) -> list[str]:
+    """For each gated line that is not the same, in which behaviours and performers its sides differ."""
+    lines = [line for line in comparison.differences if line.gated and line.verdict != "same"]
+    return [
+        f"{MARKS[line.verdict]} {line_title(line)}: {parts}"
+        for line in sort_by_verdict(lines)
+        if (parts := describe_parts(comparison, line))
+    ]
+
+
 def describe_parts(comparison: Comparison, line: Difference) -> str:
     """What decides a gated line: the behaviours, and the kinds of performers, in which the sides differ.
 
