@@ -69,17 +69,18 @@ def describe_parts(comparison: Comparison, line: Difference) -> str:
     parts = parts_of(comparison, line)
     of_performers = [part for part in parts if part.part.endswith(" performers")]
     behaviours = [part for part in parts if part not in of_performers]
-    return "; ".join(_describe_kind(kind) for kind in (behaviours, of_performers) if kind)
+    kinds = ("behaviour", behaviours), ("group of performers", of_performers)
+    return "; ".join(_describe_kind(name, kind) for name, kind in kinds if kind)
 
 
-def _describe_kind(parts: Sequence[Difference]) -> str:
+def _describe_kind(name: str, parts: Sequence[Difference]) -> str:
     differing = [part for part in parts if part.verdict in ("worse", "better")]
     if not differing:
         if all(part.verdict == "same" for part in parts):
             return f"the same for {list_first([_part_name(part) for part in parts])}"
         largest = max(parts, key=lambda part: abs(part.difference))
         change = format_change_percent(percent_of_a(largest, largest.difference))
-        return f"no difference shown for any part alone, the largest is {change} for {_part_name(largest)}"
+        return f"no {name} alone shows a difference, the largest is {change} for {_part_name(largest)}"
     texts = []
     for verdict in ("worse", "better"):
         names = [_part_name(part) for part in differing if part.verdict == verdict]
