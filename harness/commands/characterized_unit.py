@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
 from harness.measure.episode_fit import SeriesEpisodes
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.mean_drift import drift_speed, mean_drift
-from harness.measure.measured import Measured
 from harness.measure.recording_time import events_for_precision
 from harness.measure.spectrum import measure_spectrum, pool_spectra
 from harness.measure.spread import rest_spread
@@ -67,7 +67,7 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
         parameters=(
             *(ParameterRow(key, number, defaults.get(key)) for key, number in parameters.items()),
             *(
-                ParameterRow(key, Measured.missing(reason), defaults.get(key))
+                ParameterRow(key, Interval.missing(reason), defaults.get(key))
                 for key, reason in found.unit.not_measured.items()
                 if key not in parameters
             ),
@@ -95,7 +95,7 @@ def unit_report(found: Characterization, path: Path, command: str, out: Path | N
     )
 
 
-def _figures(found: Characterization, station: str) -> dict[str, Measured]:
+def _figures(found: Characterization, station: str) -> dict[str, Interval]:
     profile = found.profile
     known = {
         **profile.noise.by_station.get(station, {}),
@@ -112,7 +112,7 @@ def _figures(found: Characterization, station: str) -> dict[str, Measured]:
     }
 
 
-def _slope_m_min(found: Characterization, station: str) -> Measured:
+def _slope_m_min(found: Characterization, station: str) -> Interval:
     """Speed at which the mean of the position moves while the station rests [m/min]."""
     own = [one for one in found.profile.episodes.found if one.series.station == station]
     velocity = mean_drift(
@@ -121,7 +121,7 @@ def _slope_m_min(found: Characterization, station: str) -> Measured:
     speed = drift_speed(velocity)
     if not speed.is_measured:
         return speed
-    return Measured(60.0 * speed.value, 60.0 * speed.low, 60.0 * speed.high, speed.count)
+    return Interval(60.0 * speed.value, 60.0 * speed.low, 60.0 * speed.high, speed.count)
 
 
 def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:
@@ -150,7 +150,7 @@ def _allan(found: tuple[SeriesEpisodes, ...], name: str) -> tuple[DeviationCurve
 
 
 def _allan_model(
-    noise: Mapping[str, Measured], rate_hz: float, white: int, drifts: tuple[int, int, int]
+    noise: Mapping[str, Interval], rate_hz: float, white: int, drifts: tuple[int, int, int]
 ) -> DeviationCurve | None:
     """Allan deviation of the fitted noise on one axis, the mean square of three; rows are those of `NOISE_KEYS`."""
     values = [noise[key] for key in NOISE_KEYS]

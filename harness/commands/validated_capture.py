@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.measure.measured import NORMAL_QUANTILE, Measured
+from harness.core.interval import NORMAL_QUANTILE, Interval
 from harness.report.lab.unit_content import CaptureSummary, DepartureCheck
 from harness.report.lab.validation_content import (
     ROOM,
@@ -82,7 +82,7 @@ def _mount(found: Validation, station: str) -> EstimatedPose:
     return EstimatedPose(station, mount.body, axes, mount.body_from_station, angle_rad)
 
 
-def _three(values: tuple[Measured, ...]) -> tuple[Measured, Measured, Measured]:
+def _three(values: tuple[Interval, ...]) -> tuple[Interval, Interval, Interval]:
     x, y, z = values
     return x, y, z
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_episodes, fit_episodes
 from harness.measure.excursions import ExcursionNoise
-from harness.measure.measured import Measured
 from harness.measure.noise_fit import NoiseFit, fit_noise
 from harness.measure.noise_start import start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
@@ -88,9 +88,9 @@ class UnitProfile:
         return tuple(one.series for one in self.episodes.found)
 
     @property
-    def parameters(self) -> dict[str, Measured]:
+    def parameters(self) -> dict[str, Interval]:
         """Dotted key of a scenario -> number."""
-        speed = self.rigid.ahead_s if self.rigid else Measured.missing("Two stations on a bar show it: --rigid A,B.")
+        speed = self.rigid.ahead_s if self.rigid else Interval.missing("Two stations on a bar show it: --rigid A,B.")
         return {
             **self.noise.all_stations,
             **self.episodes.parameters,

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.seeds import generator
 from harness.measure.departures import compare_with_expected
-from harness.measure.measured import Measured
 from harness.measure.rigid_pair import RigidPair, SpeedClass
 from harness.report.lab.unit_content import (
     CaptureSummary,
@@ -26,14 +26,14 @@ STATIONS = ("head", "pelvis", "left_wrist", "right_wrist", "left_foot", "right_f
 TOO_FEW = "4 gaps are too few: 20 are needed."
 
 
-def exact(value: float) -> Measured:
+def exact(value: float) -> Interval:
     """A number that is known exactly."""
-    return Measured(value, value, value)
+    return Interval(value, value, value)
 
 
-def number(value: float, share: float, count: int = 100) -> Measured:
+def number(value: float, share: float, count: int = 100) -> Interval:
     """A number whose interval reaches a share of it to both sides."""
-    return Measured(value, value * (1.0 - share), value * (1.0 + share), count)
+    return Interval(value, value * (1.0 - share), value * (1.0 + share), count)
 
 
 MEASURED = {
@@ -45,11 +45,11 @@ MEASURED = {
     "components.excursion.size_m.0": (number(0.0052, 0.1, 372), 0.005),
     "components.excursion.size_m.1": (number(0.0298, 0.02, 372), 0.03),
     "components.echo.share": (number(0.0304, 0.05, 2011), 0.03),
-    "components.dropout.tilt_rad": (Measured.missing(TOO_FEW), 0.00436),
+    "components.dropout.tilt_rad": (Interval.missing(TOO_FEW), 0.00436),
 }
 TIMING = {
     "timing.rate_hz": (number(40.0, 0.0001, 288_000), 40.0),
-    "components.clock.drift_ppm": (Measured(-21.0, -23.5, -18.5, 900), 20.0),
+    "components.clock.drift_ppm": (Interval(-21.0, -23.5, -18.5, 900), 20.0),
     "timing.duplicate_share": (exact(0.0), 0.0),
     "timing.stamp_resolution_s": (exact(6.1e-5), None),
 }
@@ -138,7 +138,7 @@ def made_up_pair() -> RigidPair:
 
 def without_content() -> UnitReport:
     """A unit of which hardly anything was measured."""
-    missing = tuple(ParameterRow(key, Measured.missing(TOO_FEW), default) for key, (_, default) in MEASURED.items())
+    missing = tuple(ParameterRow(key, Interval.missing(TOO_FEW), default) for key, (_, default) in MEASURED.items())
     return UnitReport(
         "lab", "harness characterize lab.is900rec", CaptureSummary("lab.is900rec", 30.0, STATIONS[:1], 40.0),
         "the preset default", missing, (), (), (),
@@ -164,7 +164,7 @@ def _figures(station: str, n: int) -> StationFigures:
             "rate_hz": number(40.0, 0.0001),
             "jitter_s": number(0.00002, 0.1),
             "lost_share": exact(0.0),
-            "duplicate_share": exact(0.0) if n else Measured.missing("no stamps"),
+            "duplicate_share": exact(0.0) if n else Interval.missing("no stamps"),
         },
     )
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.seeds import generator
 from harness.measure.departures import compare_with_expected
-from harness.measure.measured import Measured
 from harness.report.lab.unit_content import CaptureSummary, DepartureCheck, StretchSummary
 from harness.report.lab.validation_content import (
     ROOM,
@@ -34,24 +34,24 @@ def made_up_validation() -> ValidationReport:
         expected_frames=2400,
         expected_from="the preset default",
         numbers=(
-            RegistrationNumber("time_offset_orientation_s", Measured(0.0240, 0.0236, 0.0244, 300)),
-            RegistrationNumber("time_offset_position_s", Measured(0.0220, 0.0215, 0.0225, 300)),
-            RegistrationNumber("position_ahead_s", Measured(0.0020, 0.0014, 0.0026, 300)),
-            RegistrationNumber("clock_ratio_ppm", Measured(21.0, 14.0, 28.0, 300)),
-            RegistrationNumber("scale", Measured(0.0009, -0.0001, 0.0019, 300)),
+            RegistrationNumber("time_offset_orientation_s", Interval(0.0240, 0.0236, 0.0244, 300)),
+            RegistrationNumber("time_offset_position_s", Interval(0.0220, 0.0215, 0.0225, 300)),
+            RegistrationNumber("position_ahead_s", Interval(0.0020, 0.0014, 0.0026, 300)),
+            RegistrationNumber("clock_ratio_ppm", Interval(21.0, 14.0, 28.0, 300)),
+            RegistrationNumber("scale", Interval(0.0009, -0.0001, 0.0019, 300)),
             *(
-                RegistrationNumber("heading_rad", Measured(0.001 * n, 0.001 * n - 0.01, 0.02), station)
+                RegistrationNumber("heading_rad", Interval(0.001 * n, 0.001 * n - 0.01, 0.02), station)
                 for n, station in enumerate(STATIONS)
             ),
         ),
         poses=tuple(_pose(name, n) for n, name in enumerate((ROOM, *STATIONS))),
         accuracy=tuple(_accuracy(station, n) for n, station in enumerate(STATIONS)),
         checks=(
-            DepartureCheck(compare_with_expected("latency_s", "", Measured(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9),
+            DepartureCheck(compare_with_expected("latency_s", "", Interval(0.024, 0.0236, 0.0244), exact(0.004)), 1e-9),
             DepartureCheck(
-                compare_with_expected("mount_turn_rad", "head", Measured(0.052, 0.047, 0.057), exact(0.0)), 1e-6
+                compare_with_expected("mount_turn_rad", "head", Interval(0.052, 0.047, 0.057), exact(0.0)), 1e-6
             ),
-            DepartureCheck(compare_with_expected("scale", "", Measured(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3),
+            DepartureCheck(compare_with_expected("scale", "", Interval(0.0009, -0.0001, 0.0019), exact(0.0)), 0.3),
         ),
         residuals=tuple(_residuals(station, rng) for station in STATIONS),
         scores=(
@@ -74,7 +74,7 @@ def without_exchange() -> ValidationReport:
 def without_truth_of_time() -> ValidationReport:
     """A capture of which hardly anything could be told."""
     full = made_up_validation()
-    missing = RegistrationNumber("time_offset_position_s", Measured.missing(NO_STAMPS))
+    missing = RegistrationNumber("time_offset_position_s", Interval.missing(NO_STAMPS))
     return replace(
         full, numbers=(missing,), poses=(), accuracy=(), checks=(), residuals=(), scores=(), exchanged=(),
         notes=(),
@@ -83,7 +83,7 @@ def without_truth_of_time() -> ValidationReport:
 
 
 def _pose(name: str, n: int) -> EstimatedPose:
-    position = tuple(Measured(value, value - 0.0015, value + 0.0015, 300) for value in (0.05 * n, -0.02, 2.5 - 0.4 * n))
+    position = tuple(Interval(value, value - 0.0015, value + 0.0015, 300) for value in (0.05 * n, -0.02, 2.5 - 0.4 * n))
     body = "" if name == ROOM else f"{name}_bone"
     return EstimatedPose(name, body, position, np.array([1.0, 0.0, 0.0, 0.0]), 0.0035)  # type: ignore[arg-type]
 

@@ -7,7 +7,8 @@ import pytest
 
 from harness.report.comparison.writer import write_comparison_page
 from harness.report.coverage.page import coverage_page
-from harness.report.lab.trust_page import write_trust_page
+from harness.report.kit.page_html import write_page
+from harness.report.lab.trust_page import trust_page
 from harness.report.lab.unit_page import write_unit_page
 from harness.report.lab.validation_page import write_validation_page
 from harness.report.paper.writer import write_paper_page
@@ -61,7 +62,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "physics": write_physics_page(folder / "physics.html", made_up_physics()),
         "unit": write_unit_page(folder / "unit.html", made_up_unit()),
         "validation": write_validation_page(folder / "validation.html", made_up_validation()),
-        "trust": write_trust_page(folder / "trust.html", made_up_trust()),
+        "trust": write_page(trust_page(made_up_trust(), "harness trust plan.toml"), folder / "trust.html"),
     }
 
 

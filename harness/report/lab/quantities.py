@@ -5,8 +5,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, decimals_for, format_fixed
-from harness.measure.measured import Measured
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def is_known(key: str) -> bool:
     return key in _NAMES
 
 
-def format_value(number: Measured, shown: Quantity, *, with_unit: bool = True) -> str:
+def format_value(number: Interval, shown: Quantity, *, with_unit: bool = True) -> str:
     """The estimate with as many decimals as its interval deserves; "not measured" without one, and a plain 0."""
     if not number.is_measured:
         return NOT_MEASURED
@@ -128,7 +128,7 @@ def format_value(number: Measured, shown: Quantity, *, with_unit: bool = True) -
     return with_unit_of(text, shown) if with_unit else text
 
 
-def format_ends(number: Measured, shown: Quantity) -> str:
+def format_ends(number: Interval, shown: Quantity) -> str:
     """The interval, "1.48 to 1.53"; "exact" without a width, a dash where nothing was measured."""
     if not number.is_measured:
         return "–"
@@ -138,7 +138,7 @@ def format_ends(number: Measured, shown: Quantity) -> str:
     return " to ".join(_end(shown.factor * end, decimals) for end in (number.low, number.high))
 
 
-def format_both(number: Measured, shown: Quantity) -> str:
+def format_both(number: Interval, shown: Quantity) -> str:
     """ "1.50 mm (1.48 to 1.53)"; the interval is left out where it has no width."""
     if not number.is_measured or number.low == number.high:
         return format_value(number, shown)
@@ -156,7 +156,7 @@ def with_unit_of(text: str, shown: Quantity) -> str:
     return f"{text} {shown.unit}" if shown.unit else text
 
 
-def measured_decimals(number: Measured, shown: Quantity) -> int:
+def measured_decimals(number: Interval, shown: Quantity) -> int:
     """Decimals that show two digits of half the interval's width, and at most five digits of the value."""
     half, value = 0.5 * shown.factor * (number.high - number.low), shown.factor * number.value
     if half > 0.0 and math.isfinite(half):

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats, freeze
+from harness.core.interval import Interval
 from harness.errors import BadInput
 from harness.measure.departures import Departure
-from harness.measure.measured import Measured
 from harness.measure.rigid_pair import RigidPair
 
 EPISODE_KINDS = ("excursion", "echo", "gap", "coast")
@@ -48,7 +48,7 @@ class ParameterRow:
 
     key: str
     """Dotted key of a scenario, such as "components.white.position_m", or a name of the timing."""
-    measured: Measured
+    measured: Interval
     """The number; where it was not measured, its reason says why the unit file keeps the default."""
     default: float | None
     """Value of the preset, which the unit file keeps where nothing was measured; None without one."""
@@ -191,7 +191,7 @@ class StationFigures:
     """What was measured of one station."""
 
     station: str
-    figures: Mapping[str, Measured] = field(default_factory=dict)
+    figures: Mapping[str, Interval] = field(default_factory=dict)
     """One of `STATION_FIGURES` -> number; a name that is left out was not looked for."""
 
     def __post_init__(self) -> None:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
 from harness.core.text_table import Table
-from harness.measure.measured import Measured
 from harness.measure.rigid_pair import RigidPair
 from harness.report.kit.markup import Markup
 from harness.report.kit.table import stacked_cell
@@ -190,7 +190,7 @@ def pair_table(pair: RigidPair) -> Table:
     return Table([" and ".join(pair.stations), "measured", INTERVAL], rows)
 
 
-def _both(number: Measured, key: str) -> list[str]:
+def _both(number: Interval, key: str) -> list[str]:
     return [format_value(number, quantity(key)), format_ends(number, quantity(key))]
 
 

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
+from harness.core.interval import Interval
 from harness.core.number_format import count_noun, format_fixed
-from harness.measure.measured import Measured
 from harness.report.lab.departure_wording import departures_sentence
 from harness.report.lab.quantities import format_value, quantity
 from harness.report.lab.unit_content import RecordingAdvice, UnitReport
@@ -44,14 +44,14 @@ def _spread_sentence(report: UnitReport) -> str:
     return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
 
 
-def _range(numbers: Sequence[Measured], key: str) -> str:
+def _range(numbers: Sequence[Interval], key: str) -> str:
     shown = quantity(key)
     least, most = min(n.value for n in numbers), max(n.value for n in numbers)
     ends = [format_fixed(shown.factor * value, 2) for value in (least, most)]
     return f"{ends[0]} {shown.unit}" if ends[0] == ends[1] else f"{ends[0]} to {ends[1]} {shown.unit}"
 
 
-def _noise_sentence(values: dict[str, Measured]) -> str:
+def _noise_sentence(values: dict[str, Interval]) -> str:
     parts = [
         f"{format_value(values[key], quantity(key))} of {noun}"
         for key, noun in (
@@ -65,7 +65,7 @@ def _noise_sentence(values: dict[str, Measured]) -> str:
     return f"On each axis a position has {' and '.join(parts)}{tail}." if parts else ""
 
 
-def _excursion_sentence(values: dict[str, Measured]) -> str:
+def _excursion_sentence(values: dict[str, Interval]) -> str:
     rate = values.get("components.excursion.onsets_per_min")
     if rate is None:
         return ""
@@ -75,7 +75,7 @@ def _excursion_sentence(values: dict[str, Measured]) -> str:
     return f"A station has {number} excursions a minute{tail}."
 
 
-def _ends_text(values: dict[str, Measured], key: str) -> str:
+def _ends_text(values: dict[str, Interval], key: str) -> str:
     ends = [values.get(f"{key}.{i}") for i in (0, 1)]
     shown = quantity(f"{key}.0")
     if ends[0] is not None and ends[1] is not None:
@@ -84,7 +84,7 @@ def _ends_text(values: dict[str, Measured], key: str) -> str:
     return format_value(values[key], quantity(key)) if key in values else ""
 
 
-def _share_sentence(values: dict[str, Measured]) -> str:
+def _share_sentence(values: dict[str, Interval]) -> str:
     parts = [
         f"{format_value(values[key], quantity(key))} are {noun}"
         for key, noun in (
@@ -99,7 +99,7 @@ def _share_sentence(values: dict[str, Measured]) -> str:
     )
 
 
-def _timing_sentence(values: dict[str, Measured]) -> str:
+def _timing_sentence(values: dict[str, Interval]) -> str:
     rate = values.get("tracker.rate_hz") or values.get("timing.rate_hz")
     clock = values.get("components.clock.drift_ppm")
     parts = []
@@ -112,11 +112,11 @@ def _timing_sentence(values: dict[str, Measured]) -> str:
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
-def _absolute(number: Measured) -> Measured:
+def _absolute(number: Interval) -> Interval:
     """The size of a number, with the interval on the same side."""
     if number.value >= 0.0:
         return number
-    return Measured(-number.value, -number.high, -number.low, number.count)
+    return Interval(-number.value, -number.high, -number.low, number.count)
 
 
 def advice_text(advice: RecordingAdvice) -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from harness.core.arrays import Floats, freeze
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 from harness.report.lab.unit_content import CaptureSummary, DepartureCheck
 
 ROOM = "room"
@@ -18,7 +18,7 @@ class EstimatedPose:
     """`ROOM`, or the station."""
     body: str
     """Body of the reference that carries the station; "" for the room."""
-    position_m: tuple[Measured, Measured, Measured]
+    position_m: tuple[Interval, Interval, Interval]
     """Coordinates with their intervals [m]."""
     rotation: Floats
     """(4,) unit quaternion (w, x, y, z)."""
@@ -35,7 +35,7 @@ class RegistrationNumber:
 
     key: str
     """Name such as "time_offset_orientation_s"."""
-    measured: Measured
+    measured: Interval
     station: str = ""
     """Station that it is of; "" is all together."""
 
@@ -45,13 +45,13 @@ class StationAccuracy:
     """Errors of one station against the reference, after the registration."""
 
     station: str
-    position_rms_m: Measured
-    position_median_m: Measured
-    position_95_m: Measured
+    position_rms_m: Interval
+    position_median_m: Interval
+    position_95_m: Interval
     """95 % quantile [m]."""
-    orientation_rms_rad: Measured
-    orientation_median_rad: Measured
-    orientation_95_rad: Measured
+    orientation_rms_rad: Interval
+    orientation_median_rad: Interval
+    orientation_95_rad: Interval
     readings: int
     """Number of readings that were compared."""
     lost_share: float

@@ -2,9 +2,9 @@
 
 import math
 
+from harness.core.interval import Interval
 from harness.core.number_format import format_fixed, format_number, format_share
 from harness.core.text_table import Table
-from harness.measure.measured import Measured
 from harness.report.kit.metric_labels import metric_label
 from harness.report.lab.check_table import ALL_STATIONS
 from harness.report.lab.quantities import Quantity, format_ends, format_value, quantity
@@ -82,7 +82,7 @@ def accuracy_reasons(report: ValidationReport) -> list[str]:
     return [f"{', '.join(names)}: {reason}" for reason, names in stations.items()]
 
 
-def _both(number: Measured, shown: Quantity) -> list[str]:
+def _both(number: Interval, shown: Quantity) -> list[str]:
     return [format_value(number, shown), format_ends(number, shown)]
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
-from harness.measure.measured import Measured
 from harness.measure.profile import UnitProfile, measure_profile
 from harness.measure.recording_time import events_for_precision
 from harness.measure.unit_file import UnitFile
@@ -100,7 +100,7 @@ def make_unit_file(profile: UnitProfile, name: str, path: Path) -> UnitFile:
     )
 
 
-def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Measured]:
+def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Interval]:
     """Everything that is checked: (key, station) -> number; of a uniform distribution its mean, not its ends."""
     parameters = {key: one for key, one in profile.parameters.items() if not key[-1].isdecimal()}
     numbers = {(key, ""): one for key, one in {**parameters, **_means(profile)}.items()}
@@ -111,7 +111,7 @@ def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Measured]:
     return numbers
 
 
-def expected_numbers(profile: UnitProfile, known: Mapping[str, Measured]) -> dict[tuple[str, str], Measured]:
+def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dict[tuple[str, str], Interval]:
     """What is expected of the measured numbers: the known ones, and of the line that no record is lost or repeated."""
     line = dict.fromkeys(("timing.lost_share", "timing.duplicate_share", "timing.clock_age_s"), 0.0)
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
@@ -120,7 +120,7 @@ def expected_numbers(profile: UnitProfile, known: Mapping[str, Measured]) -> dic
     return {(key, ""): one for key, one in {**known, **{key: _exact(value) for key, value in line.items()}}.items()}
 
 
-def _means(profile: UnitProfile) -> dict[str, Measured]:
+def _means(profile: UnitProfile) -> dict[str, Interval]:
     return {key: profile.episodes.means[key] for key in UNIFORM_KEYS if key in profile.episodes.means}
 
 
@@ -145,5 +145,5 @@ def _describe_capture(profile: UnitProfile, path: Path) -> dict[str, Any]:
     }
 
 
-def _exact(value: float) -> Measured:
-    return Measured(value, value, value)
+def _exact(value: float) -> Interval:
+    return Interval(value, value, value)

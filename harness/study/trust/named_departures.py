@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from harness.compare.significance import SIGNIFICANCE, holm
+from harness.core.interval import Interval
 from harness.measure.departures import Departure, compare_with_expected
-from harness.measure.measured import Measured
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class NamedDeparture:
 
 
 def check_departures(
-    measured: Mapping[tuple[str, str], Measured], expected: Mapping[tuple[str, str], Measured]
+    measured: Mapping[tuple[str, str], Interval], expected: Mapping[tuple[str, str], Interval]
 ) -> list[NamedDeparture]:
     """Compare every number that was measured and is expected; both map (key, station) to a number.
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.experiment.score_recording import find_playback
 from harness.measure.accuracy import ErrorQuantiles, error_quantiles
 from harness.measure.departures import Departure, compare_with_expected
-from harness.measure.measured import Measured
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
@@ -74,7 +74,7 @@ class Validation:
     registration: Registration
     exchanged: Mapping[str, str]
     """Station -> body that carries it, where that is not the stated one."""
-    numbers: Mapping[str, Measured]
+    numbers: Mapping[str, Interval]
     """Time offsets, clock, scale, heading, latency, by key."""
     stations: Mapping[str, StationResult]
     checks: tuple[NamedDeparture, ...]
@@ -254,10 +254,10 @@ def _identify(poses: Mapping[str, MeasuredPoses], truth: TruthMotion) -> tuple[d
     return found, {station: body for station, body in found.items() if body != stated[station]}
 
 
-def _latency_s(readings: Mapping[str, StationReadings], registration: Registration, truth: TruthMotion) -> Measured:
+def _latency_s(readings: Mapping[str, StationReadings], registration: Registration, truth: TruthMotion) -> Interval:
     """Median time from the sample to the reception of its record."""
     if not truth.host_clock:
-        return Measured.missing(_NO_HOST_CLOCK)
+        return Interval.missing(_NO_HOST_CLOCK)
     delays = []
     for station in registration.mounts:
         known = np.isfinite(readings[station].measured_s)
@@ -266,11 +266,11 @@ def _latency_s(readings: Mapping[str, StationReadings], registration: Registrati
     middle = float(np.median(np.concatenate(delays)))
     offset = registration.values["time_offset_orientation_s"]
     half = 0.5 * (offset.high - offset.low)
-    return Measured(middle, middle - half, middle + half, offset.count)
+    return Interval(middle, middle - half, middle + half, offset.count)
 
 
 def _checks(
-    numbers: Mapping[str, Measured],
+    numbers: Mapping[str, Interval],
     registration: Registration,
     truth: TruthMotion,
     pairs: Mapping[str, str],
@@ -284,9 +284,9 @@ def _checks(
     known = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
-        "scale": Measured.normal(0.0, preset["session"]["scale"]),
-        "heading_rad": Measured.normal(0.0, 0.0),
-        "latency_s": Measured.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
+        "scale": Interval.normal(0.0, preset["session"]["scale"]),
+        "heading_rad": Interval.normal(0.0, 0.0),
+        "latency_s": Interval.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
     }
     if expected is not None:
         known |= {key: one for key, one in expected.measured.items() if key in known}
@@ -303,7 +303,7 @@ def _checks(
 def _mount_checks(registration: Registration, truth: TruthMotion, station: str, offset_m: float) -> list[Departure]:
     """Rotation and displacement of a station from its nominal mount, by chi-square with three degrees of freedom."""
     mount, nominal = registration.mounts[station], truth.nominal[station]
-    exact = Measured(0.0, 0.0, 0.0)
+    exact = Interval(0.0, 0.0, 0.0)
     vector = np.array([one.value for one in mount.turn_from(nominal.body_from_station)])
     moved_m = mount.position_m - nominal.position_m
     spread = mount.covariance[3:, 3:] + offset_m**2 * np.eye(3)  # the origin in the housing is known to a millimetre

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from harness.core.interval import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.measured import Measured
 from harness.measure.timing import TIMING_KEYS
 from harness.report.lab.quantities import (
     Quantity,
@@ -56,25 +56,25 @@ def test_an_unknown_key_is_its_own_name_with_the_unit_of_its_end(key: str, unit:
 
 def test_the_interval_sets_the_decimals() -> None:
     length = Quantity("length", "mm", 1e3)
-    assert format_both(Measured(0.0015, 0.0014, 0.0016), length) == "1.50 mm (1.40 to 1.60)"
-    assert format_both(Measured(0.0015, 0.0005, 0.0025), length) == "1.5 mm (0.5 to 2.5)"
-    assert format_value(Measured(1.23456, 1.2, 1.3), length) == "1,235 mm"
-    assert format_value(Measured(1.23456, 1.2, 1.3), length, with_unit=False) == "1,235"
-    assert measured_decimals(Measured(0.0015, 0.0, math.inf), length) == 1
-    assert format_ends(Measured(-0.001, -0.002, math.inf), length) == "−2 to ∞"
+    assert format_both(Interval(0.0015, 0.0014, 0.0016), length) == "1.50 mm (1.40 to 1.60)"
+    assert format_both(Interval(0.0015, 0.0005, 0.0025), length) == "1.5 mm (0.5 to 2.5)"
+    assert format_value(Interval(1.23456, 1.2, 1.3), length) == "1,235 mm"
+    assert format_value(Interval(1.23456, 1.2, 1.3), length, with_unit=False) == "1,235"
+    assert measured_decimals(Interval(0.0015, 0.0, math.inf), length) == 1
+    assert format_ends(Interval(-0.001, -0.002, math.inf), length) == "−2 to ∞"
 
 
 def test_at_most_five_digits_of_a_value_are_shown() -> None:
     rate = Quantity("rate", "Hz")
-    assert format_both(Measured(39.9992, 39.999199, 39.999201), rate) == "39.999 Hz (39.999 to 39.999)"
-    assert format_value(Measured(0.0, 0.0, 5e-5), Quantity("share", "%", 100.0)) == "0 %"
+    assert format_both(Interval(39.9992, 39.999199, 39.999201), rate) == "39.999 Hz (39.999 to 39.999)"
+    assert format_value(Interval(0.0, 0.0, 5e-5), Quantity("share", "%", 100.0)) == "0 %"
 
 
 def test_a_number_without_width_is_exact_and_one_that_is_missing_says_so() -> None:
     length = Quantity("length", "mm", 1e3)
-    exact = Measured(0.002, 0.002, 0.002)
+    exact = Interval(0.002, 0.002, 0.002)
     assert (format_both(exact, length), format_ends(exact, length)) == ("2 mm", "exact")
-    missing = Measured.missing("no events")
+    missing = Interval.missing("no events")
     assert (format_value(missing, length), format_ends(missing, length)) == ("not measured", "–")
     assert format_both(missing, length) == "not measured"
     assert format_plain(0.0, length) == "0 mm"

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.measure.departures import compare_with_expected
-from harness.measure.measured import Measured
 from harness.report.lab.departure_wording import condense_departures, departure_text
 from harness.report.lab.unit_content import DepartureCheck, ParameterRow, RecordingAdvice
 from harness.report.lab.unit_wording import advice_text, answer, description
 from tests.report.fabricate_lab import exact, made_up_unit, number, without_content, without_faults
 
 
-def check(key: str, measured: Measured, expected: float, station: str = "") -> DepartureCheck:
+def check(key: str, measured: Interval, expected: float, station: str = "") -> DepartureCheck:
     return DepartureCheck(compare_with_expected(key, station, measured, exact(expected)), 0.001)
 
 
@@ -56,7 +56,7 @@ def test_ratios_are_left_out_where_they_say_nothing() -> None:
     duplicates = check("timing.duplicate_share", number(0.01, 0.1), 0.0)
     assert departure_text(duplicates) == "Share of duplicate records: 1.00 % (0.90 to 1.10), expected 0 %."
     assert departure_text(check("timing.rate_hz", number(40.5, 0.001), 40.0)).endswith("expected 40 Hz.")
-    assert departure_text(check("components.clock.drift_ppm", Measured(-30.0, -31.0, -29.0), 20.0)).endswith("20 ppm.")
+    assert departure_text(check("components.clock.drift_ppm", Interval(-30.0, -31.0, -29.0), 20.0)).endswith("20 ppm.")
     assert departure_text(check("timing.jitter_s", number(0.02, 0.1), 0.001)).endswith("20 times as much.")
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from harness.core.interval import Interval
 from harness.errors import ShapeError
-from harness.measure.measured import Measured
 from harness.report.kit.style import to_svg
 from harness.report.lab import validation_page
 from harness.report.lab.validation_charts import charts, largest_of_stretches
@@ -97,7 +97,7 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path) -> None:
 
 def test_reasons_stand_below_the_accuracy(tmp_path: Path) -> None:
     full = made_up_validation()
-    short = Measured.missing("The capture is too short.")
+    short = Interval.missing("The capture is too short.")
     rows = tuple(replace(row, position_rms_m=short, position_median_m=short) for row in full.accuracy[:2])
     report = replace(full, accuracy=(*rows, *full.accuracy[2:]))
     text = f"{STATIONS[0]}, {STATIONS[1]}: The capture is too short."

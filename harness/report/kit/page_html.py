@@ -1,0 +1,147 @@
+"""The browser's rendering of a page, and its file."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from harness.core.files import write_text
+from harness.core.interval import Interval
+from harness.core.number_format import NOT_MEASURED
+from harness.core.text_table import Table
+from harness.report.kit.document import chart_figure, document
+from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, tag
+from harness.report.kit.page import (
+    Badge,
+    Block,
+    Bullets,
+    Code,
+    DataTable,
+    Drawing,
+    Folded,
+    OnlyHtml,
+    Page,
+    Prose,
+    Section,
+    Stack,
+    Tally,
+)
+from harness.report.kit.page_text import NUMBER
+from harness.report.kit.style import Chart
+from harness.report.kit.table import NOT_MEASURED_CELL, html_table, stacked_cell
+from harness.report.kit.text import to_file_name
+from harness.report.kit.verdict_badge import tally_list, verdict_badge
+
+_LETTER_EM, _WIDE_EM, _WIDEST_EM, _LONG_CELL_LETTERS = 0.55, 22.0, 44.0, 300
+"""Width of an average letter; greatest widths of columns of words, and of those with a cell of more letters than the
+last number."""
+
+
+def write_page(page: Page, path: Path, plots: Path | None = None) -> Path:
+    """Write the page to `path` and return it; its folder is created. Charts are also written to the folder `plots`."""
+    renderer = _Renderer(plots)
+    text = renderer.page(page)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, text)
+    return path
+
+
+class _Renderer:
+    """Renders blocks, and writes each chart when it is drawn."""
+
+    def __init__(self, plots: Path | None) -> None:
+        self._plots = plots
+
+    def page(self, page: Page) -> str:
+        made_by = Section("Made by", "command", [Code(page.command)] if page.command else [])
+        heading: Any = page.headline
+        if page.verdict:
+            word = to_file_name(page.verdict.outcome.word)
+            heading = join(tag("span", page.verdict.word, class_=f"big {word}"), page.headline)
+        return document(
+            title=f"{page.name}: harness {page.verb}" if page.name else f"harness {page.verb}",
+            kicker=f"harness {page.verb}" + (f" · {page.name}" if page.name else ""),
+            heading=heading,
+            facts={title: text for title, text in page.facts.items() if text},
+            missing=page.missing,
+            sections=[(s.title, s.name, self.blocks(s.blocks, s.title)) for s in (*page.sections, made_by)],
+            lead=self.blocks(page.lead, page.name) or None,
+        )
+
+    def blocks(self, blocks: Sequence[Block], label: str) -> Markup:
+        several = sum(isinstance(block, Drawing) for block in blocks) > 1
+        return join(*(self.block(block, label, 3 if several else 0) for block in blocks))
+
+    def block(self, block: Block, label: str, level: int) -> Markup:
+        match block:
+            case Prose():
+                return tag("p", inline_code(block.text), class_="missing" if block.is_warning else None)
+            case Bullets():
+                title = tag("h3", block.title) if block.title and block.items else None
+                return join(title, bullet_list([inline_code(item) for item in block.items]))
+            case Code():
+                listing = tag("pre", block.text if block.title else tag("code", block.text))
+                return details(block.title, listing) if block.title else listing
+            case Tally():
+                return tally_list(block.counts, block.marks, block.meanings)
+            case DataTable():
+                table = page_table(block, label)
+                return details(block.fold, table) if block.fold and table else table
+            case Drawing():
+                return self._drawing(block, label, level)
+            case Folded():
+                content = self.blocks(block.blocks, block.title)
+                return details(block.title, content) if content else content
+            case OnlyHtml():
+                return block.content
+
+    def _drawing(self, block: Drawing, label: str, level: int) -> Markup:
+        numbers = join(*(page_table(table, label) for table in block.tables))
+        chart = block.draw()
+        if chart is None:
+            return numbers
+        self._write(chart)
+        return join(chart_figure(chart, level), details(block.fold, numbers) if numbers else None)
+
+    def _write(self, chart: Chart) -> None:
+        if self._plots is not None:
+            chart.write(self._plots)
+
+
+def page_table(table: DataTable, label: str = "") -> Markup:
+    """A table as HTML: numbers are aligned right, columns of words left; nothing without rows."""
+    if not table.rows:
+        return Markup()
+    columns = zip(table.head, *table.rows, strict=True)
+    cells = [[inline_code(str(cell)) for cell in next(columns)], *map(_column, columns)]
+    head, *rows = map(list, zip(*cells, strict=True))
+    title = tag("b", table.title) if table.title else None
+    caption = join(title, " " if title and table.caption else None, inline_code(table.caption))
+    return html_table(Table(head, rows), caption, label=table.label or table.title or label.lower())
+
+
+def _column(cells: Sequence[Any]) -> list[Any]:
+    """The cells of one column, its head first."""
+    texts = [cell for cell in cells[1:] if isinstance(cell, str)]
+    if all(NUMBER.fullmatch(text) for text in texts):
+        return [cells[0], *map(_cell, cells[1:])]
+    longest = max(map(len, map(str, cells)))
+    most = _WIDEST_EM if longest > _LONG_CELL_LETTERS else _WIDE_EM
+    width = f"width: {min(_LETTER_EM * longest + 1.0, most):.0f}em"
+    return [
+        tag("span", inline_code(cell), class_="words", style=width) if isinstance(cell, str) else _cell(cell)
+        for cell in cells
+    ]
+
+
+def _cell(cell: Any) -> Any:
+    match cell:
+        case Interval():
+            return stacked_cell(cell.number, cell.ends) if cell.is_measured else NOT_MEASURED_CELL
+        case Badge():
+            return stacked_cell(verdict_badge(cell.verdict, cell.mark), cell.why, "why")
+        case Stack():
+            return stacked_cell(_cell(cell.upper), cell.lower)
+        case str():
+            return NOT_MEASURED_CELL if cell == NOT_MEASURED else inline_code(cell)
+        case _:
+            return cell
