@@ -31,12 +31,12 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
-    from harness.commands.validated_capture import validation_report
     from harness.core.options import split_outside_brackets
     from harness.core.output_file import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
-    from harness.report.lab.validation_page import write_validation_page
-    from harness.report.lab.validation_text import format_validation
+    from harness.report.kit.page_html import write_page
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.validation_page import validation_page
     from harness.study.trust.reconstruction_scores import score_registered
     from harness.study.trust.validation import load_truth, session_unit, validate_capture
 
@@ -53,7 +53,8 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
         scores = score_registered(args.capture, found, methods, progress) if methods else []
-    report = validation_report(found, args.capture, this_command(), scores)
+    report = found.report(args.capture)
+    page = validation_page(report, scores, this_command())
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
@@ -61,10 +62,10 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "exchanged": dict(found.exchanged),
         "departures": [
             {
-                "key": check.departure.key,
-                "station": check.departure.station,
-                "measured": check.departure.measured.as_dict(),
-                "expected": check.departure.expected.as_dict(),
+                "key": check.key,
+                "station": check.station,
+                "measured": check.measured.as_dict(),
+                "expected": check.expected.as_dict(),
                 "p_holm": check.p_holm,
             }
             for check in found.named
@@ -72,13 +73,13 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "scores": [{"method": one.method, "metric": one.metric, "value": one.value} for one in scores],
         "damage": list(found.reader.damage),
     }
-    lines = [format_validation(report)]
+    lines = [page_text(page)]
     if args.out is not None:
         write_unit_file(args.out, session_unit(found, expected, args.out.stem), force=args.force)
         with show_steps("parts of the report"):
-            page = write_validation_page(args.out.with_suffix(".html"), report)
-        lines += [f"unit file: {args.out}", f"report: {page}"]
-        content |= {"unit_file": str(args.out), "page": str(page)}
+            file = write_page(page, args.out.with_suffix(".html"))
+        lines += [f"unit file: {args.out}", f"report: {file}"]
+        content |= {"unit_file": str(args.out), "page": str(file)}
     failures = {one.method: one.failure for one in scores if one.failure}
     lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
     content |= {"failures": failures} if failures else {}

@@ -86,8 +86,8 @@ class Interval:
 
     def scaled(self, factor: float, unit: str = "") -> "Interval":
         """The same number in another unit, of which `factor` make one of the present unit."""
-        value, low, high = (factor * number for number in (self.value, self.low, self.high))
-        return replace(self, value=value, low=low, high=high, unit=unit)
+        low, high = sorted((factor * self.low, factor * self.high))
+        return replace(self, value=factor * self.value, low=low, high=high, unit=unit)
 
     def as_dict(self) -> dict[str, Any]:
         """Value, ends of the interval and count, or the reason."""

@@ -23,6 +23,20 @@ class ErrorQuantiles:
     quantile95: Interval
 
 
+@dataclass(frozen=True)
+class StationAccuracy:
+    """Errors of one station against the reference, after the registration."""
+
+    position: ErrorQuantiles
+    """Errors of the position [m]."""
+    orientation: ErrorQuantiles
+    """Errors of the orientation [rad]."""
+    readings: int
+    """Number of readings that were compared."""
+    lost_share: float
+    """Share of the readings without a position."""
+
+
 def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuantiles:
     """Summarise errors (N, 3) at records `period_s` apart; `valid` (N,) are those that were measured.
 

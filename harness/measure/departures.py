@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 from harness.core.interval import Interval
 
+NAMED_LEVEL = 0.05
+"""Largest corrected p-value with which a departure is named."""
+
 
 @dataclass(frozen=True)
 class Departure:
@@ -19,6 +22,13 @@ class Departure:
     """The expected number; its interval has no width where it is known exactly, as that of a preset."""
     p: float
     """Two-sided p-value of the difference, not corrected for the number of checks."""
+    p_holm: float = 1.0
+    """`p` corrected for the number of checks (Holm 1979); 1 before the correction."""
+
+    @property
+    def is_named(self) -> bool:
+        """Whether the measured number differs from the expected one at the 5 % level over all checks."""
+        return self.p_holm <= NAMED_LEVEL
 
 
 def compare_with_expected(key: str, station: str, measured: Interval, expected: Interval) -> Departure:

@@ -48,7 +48,7 @@ class StretchLength:
 
 
 @dataclass(frozen=True)
-class QualityError:
+class QualityClass:
     """Errors at rest of the readings in one class of quality."""
 
     above: float
@@ -77,7 +77,7 @@ class UnitProfile:
     timing: TimingMeasurement
     noise: NoiseFit
     episodes: EpisodeFit
-    quality: tuple[QualityError, ...]
+    quality: tuple[QualityClass, ...]
     rigid: RigidPair | None
     limits: tuple[str, ...]
     """What this capture cannot show, a sentence each."""
@@ -248,7 +248,7 @@ def _excursion_noise(noise: NoiseFit, start: Floats) -> ExcursionNoise:
     )
 
 
-def _quality_errors(series: list[StaticSeries]) -> tuple[QualityError, ...]:
+def _quality_errors(series: list[StaticSeries]) -> tuple[QualityClass, ...]:
     """Distance from the resting place, by classes of quality; the first class holds the lost readings."""
     quality = np.concatenate([one.quality for one in series])
     away_m = np.concatenate([np.linalg.norm(one.position_m, axis=1) for one in series])
@@ -261,5 +261,5 @@ def _quality_errors(series: list[StaticSeries]) -> tuple[QualityError, ...]:
     for above, to, inside in classes:
         known = away_m[inside & np.isfinite(away_m)]
         middle, high = np.quantile(known, [0.5, 0.95]).tolist() if len(known) else (np.nan, np.nan)
-        out.append(QualityError(above, to, float(inside.sum()) / total, middle, high))
+        out.append(QualityClass(above, to, float(inside.sum()) / total, middle, high))
     return tuple(out)

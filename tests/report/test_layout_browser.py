@@ -9,8 +9,8 @@ from harness.report.comparison.writer import write_comparison_page
 from harness.report.coverage.page import coverage_page
 from harness.report.kit.page_html import write_page
 from harness.report.lab.trust_page import trust_page
-from harness.report.lab.unit_page import write_unit_page
-from harness.report.lab.validation_page import write_validation_page
+from harness.report.lab.unit_page import unit_page
+from harness.report.lab.validation_page import validation_page
 from harness.report.paper.writer import write_paper_page
 from harness.report.physics.writer import write_physics_page
 from harness.report.placement import writer as placement_writer
@@ -25,7 +25,7 @@ from tests.report.fabricate_physics import made_up as made_up_physics
 from tests.report.fabricate_placement import write_made_up
 from tests.report.fabricate_sweep import fabricate_sweep
 from tests.report.fabricate_trust import made_up_trust
-from tests.report.fabricate_validation import made_up_validation
+from tests.report.fabricate_validation import SCORES, made_up_validation
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
@@ -60,8 +60,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "placement": placement,
         "paper": write_paper_page(write_study(folder / "paper", liu())),
         "physics": write_physics_page(folder / "physics.html", made_up_physics()),
-        "unit": write_unit_page(folder / "unit.html", made_up_unit()),
-        "validation": write_validation_page(folder / "validation.html", made_up_validation()),
+        "unit": write_page(unit_page(made_up_unit(), "harness characterize"), folder / "unit.html"),
+        "validation": write_page(
+            validation_page(made_up_validation(), SCORES, "harness validate"), folder / "validation.html"
+        ),
         "trust": write_page(trust_page(made_up_trust(), "harness trust plan.toml"), folder / "trust.html"),
     }
 

@@ -1,9 +1,9 @@
 """A page as data: what it says is written once, `page_html` and `page_text` render it for a browser and a terminal."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
-from harness.core.interval import Interval
 from harness.errors import Outcome
 from harness.report.kit.markup import Markup
 from harness.report.kit.style import Chart
@@ -40,10 +40,6 @@ class Stack:
         return f"{self.upper} ({self.lower})" if self.lower else str(self.upper)
 
 
-Cell = str | int | Interval | Badge | Stack
-"""Cell of a table. Text is escaped; code stands between backticks. An interval stands below its number."""
-
-
 @dataclass(frozen=True)
 class Prose:
     """A paragraph; code stands between backticks."""
@@ -76,9 +72,9 @@ class Code:
 class Tally:
     """Number of cases of each verdict."""
 
-    counts: Mapping[str, int]
-    marks: Mapping[str, str]
-    meanings: Mapping[str, str]
+    counts: Mapping[Any, int]
+    marks: Mapping[Any, str]
+    meanings: Mapping[Any, str]
 
 
 @dataclass(frozen=True)
@@ -86,7 +82,8 @@ class DataTable:
     """A table whose first column names the rows; nothing without rows."""
 
     head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[object]]
+    """Cells are text, whole numbers, `Interval`, `Badge` or `Stack`; code stands between backticks."""
     title: str = ""
     caption: str = ""
     """What the numbers are; only a browser shows it."""
@@ -166,5 +163,5 @@ class Page:
     """Parts that are not on the page, and why."""
     command: str = ""
     """The command that makes the page; it is the last section."""
-    printed_facts: Sequence[str] | None = field(default=None)
+    printed_facts: Sequence[str] | None = None
     """Titles of the facts that the terminal prints; None prints all."""

@@ -2,7 +2,6 @@
 
 import re
 import textwrap
-from collections.abc import Sequence
 
 from harness.core.interval import Interval
 from harness.core.text_table import Table
@@ -10,7 +9,7 @@ from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Pr
 
 WIDTH = 118
 """Most characters of a line, unless a word or a number is longer."""
-NUMBER = re.compile(r"[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|not measured")
+NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|not measured")
 """Texts that are aligned right, as numbers are."""
 
 
@@ -64,8 +63,3 @@ def _text(cell: object, with_interval: bool) -> str:
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     return textwrap.wrap(" ".join(text.split()), width, subsequent_indent=indent, break_long_words=False)
-
-
-def joined(blocks: Sequence[Block], width: int = WIDTH) -> str:
-    """Several blocks as one text."""
-    return "\n".join(line for block in blocks for line in block_lines(block, width))

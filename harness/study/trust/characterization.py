@@ -1,6 +1,5 @@
 """Characterisation of a unit: its profile as a unit file, and its departures from what is expected."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +9,10 @@ import numpy as np
 
 from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
+from harness.measure.departures import Departure
 from harness.measure.profile import UnitProfile, measure_profile
-from harness.measure.recording_time import events_for_precision
 from harness.measure.unit_file import UnitFile
+from harness.measure.unit_report import UnitReport, unit_report
 from harness.results.digests import file_digest
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.study.trust.expected_values import (
@@ -23,7 +23,7 @@ from harness.study.trust.expected_values import (
     preset_values,
     unit_values,
 )
-from harness.study.trust.named_departures import NamedDeparture, check_departures
+from harness.study.trust.named_departures import check_departures
 
 REFERENCE_NEEDED = "A reference is needed: `harness validate`."
 DEFAULT_KEPT = {
@@ -36,8 +36,6 @@ DEFAULT_KEPT = {
 CHECKED_TIMING = ("timing.lost_share", "timing.duplicate_share", "timing.stamp_resolution_s", "timing.clock_age_s")
 STATION_CHECKS = ("components.dropout.share", "components.echo.share", "components.white.position_m")
 """Parameters that are also checked for each station."""
-PRECISION = 0.2
-"""Relative half width of the interval of a rate that is aimed at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +44,20 @@ class Characterization:
 
     profile: UnitProfile
     unit: UnitFile
-    checks: tuple[NamedDeparture, ...]
+    checks: tuple[Departure, ...]
     expected_from: str
     """Origin of the expected numbers: the preset, or the name of an earlier unit."""
 
     @property
-    def named(self) -> tuple[NamedDeparture, ...]:
+    def named(self) -> tuple[Departure, ...]:
         """The departures that are significant after the correction."""
         return tuple(check for check in self.checks if check.is_named)
 
     @property
-    def needed_minutes(self) -> float:
-        """Minutes of rest after which the rate of excursions has the precision; NaN without any excursion."""
-        rate = self.profile.parameters["components.excursion.onsets_per_min"]
-        if not rate.is_measured or not rate.value > 0.0:
-            return math.nan
-        return events_for_precision(PRECISION) / (rate.value * len(self.profile.stations))
+    def report(self) -> UnitReport:
+        """All that the unit's page shows."""
+        defaults = {key: number.value for key, number in preset_values().items()}
+        return unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
 
 
 def characterize_capture(

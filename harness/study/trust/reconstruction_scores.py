@@ -1,7 +1,6 @@
 """Reconstruction from a registered capture: methods run on its frames and are scored against the reference."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_run import describe_failure
 from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.measure.registration import Registration
+from harness.results.reconstruction_score import ReconstructionScore
 from harness.score.score import WARM_UP_S, score_estimate
 from harness.simulate.trajectory import Trajectory
 from harness.stream.frame import TrackerFrame
@@ -22,18 +22,6 @@ from harness.stream.recording.replay import RecordingStream
 from harness.study.trust.validation import Validation
 
 SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
-
-
-@dataclass(frozen=True)
-class RegisteredScore:
-    """One metric of one method."""
-
-    method: str
-    metric: str
-    value: float | None
-    """Mean over the frames, in the metric's unit; None if it was not measured."""
-    failure: str = ""
-    """Why the method has no result, as for a failed cell; "" if it has one."""
 
 
 def measured_calibration(registration: Registration, names: Sequence[str] = ()) -> Calibration:
@@ -55,7 +43,7 @@ def score_registered(
     found: Validation,
     methods: Sequence[str],
     progress: ProgressCallback = lambda step, done, planned: None,
-) -> list[RegisteredScore]:
+) -> list[ReconstructionScore]:
     """Run methods on the frames of a capture with the registered calibration, and score them on the performer's body.
 
     A frame's true pose is that of the reference at the frame's mean time. Frames outside the reference, and those of
@@ -104,7 +92,7 @@ def score_registered(
             raise
         except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
             failure = describe_failure(error)
-        out += [RegisteredScore(name, metric, values.get(metric), failure) for metric in SCORED_METRICS]
+        out += [ReconstructionScore(name, metric, values.get(metric), failure) for metric in SCORED_METRICS]
     return out
 
 

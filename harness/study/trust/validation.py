@@ -12,7 +12,7 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.experiment.score_recording import find_playback
-from harness.measure.accuracy import ErrorQuantiles, error_quantiles
+from harness.measure.accuracy import StationAccuracy, error_quantiles
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
@@ -26,6 +26,8 @@ from harness.measure.registration import (
 )
 from harness.measure.station_identity import identify_stations
 from harness.measure.unit_file import UnitFile
+from harness.measure.unit_report import CaptureSummary
+from harness.measure.validation_report import ValidationReport, estimated_poses, residual_series
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
@@ -33,7 +35,7 @@ from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
 from harness.study.trust.expected_values import preset_components, preset_values
-from harness.study.trust.named_departures import NamedDeparture, correct_departures
+from harness.study.trust.named_departures import correct_departures
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,
@@ -55,16 +57,6 @@ _LOOPED_CORRELATION = 0.8
 """Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
 
 
-@dataclass(frozen=True)
-class StationResult:
-    """Errors of one station after the registration."""
-
-    position: ErrorQuantiles
-    orientation: ErrorQuantiles
-    readings: int
-    lost_share: float
-
-
 @dataclass(frozen=True, eq=False)
 class Validation:
     """What a reference shows of a capture."""
@@ -76,8 +68,8 @@ class Validation:
     """Station -> body that carries it, where that is not the stated one."""
     numbers: Mapping[str, Interval]
     """Time offsets, clock, scale, heading, latency, by key."""
-    stations: Mapping[str, StationResult]
-    checks: tuple[NamedDeparture, ...]
+    stations: Mapping[str, StationAccuracy]
+    checks: tuple[Departure, ...]
     expected_from: str
     duration_s: float
     records: int
@@ -85,9 +77,38 @@ class Validation:
     """What of the capture was left out, a sentence each."""
 
     @property
-    def named(self) -> tuple[NamedDeparture, ...]:
+    def named(self) -> tuple[Departure, ...]:
         """The departures that are significant after the correction."""
         return tuple(check for check in self.checks if check.is_named)
+
+    def report(self, capture: Path) -> ValidationReport:
+        """All that the page of the capture at this path shows."""
+        wire = self.reader.wire
+        expected = round(self.registration.overlap_s * wire.rate_hz)
+        return ValidationReport(
+            name=capture.stem,
+            capture=CaptureSummary(
+                capture.name, self.duration_s, wire.stations, wire.rate_hz, damage=tuple(self.reader.damage)
+            ),
+            truth=self.truth.title,
+            matched_frames=round(self.registration.matched * expected),
+            expected_frames=expected,
+            expected_from=self.expected_from,
+            numbers=self.numbers,
+            poses=estimated_poses(self.registration),
+            accuracy=self.stations,
+            checks=self.checks,
+            residuals=residual_series(self.registration),
+            exchanged=tuple(
+                f"{station} is on {body}, not on {self.truth.body_of[station]}: stations are exchanged."
+                for station, body in self.exchanged.items()
+            ),
+            notes=(
+                *self.notes,
+                *self.truth.notes,
+                "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
+            ),
+        )
 
 
 def load_truth(
@@ -188,7 +209,7 @@ def validate_capture(
     period_s = record_period_s(poses)
     stations = {}
     for station, errors in registration.errors.items():
-        stations[station] = StationResult(
+        stations[station] = StationAccuracy(
             error_quantiles(errors.position_m, errors.valid, period_s),
             error_quantiles(errors.rotation_rad, errors.valid, period_s),
             int(errors.valid.sum()),
