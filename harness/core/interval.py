@@ -120,11 +120,11 @@ class Interval:
     def _decimals(self) -> int:
         """Decimals that show two digits of half the width, without zeros that end all three numbers.
 
-        Without a finite width, those of four significant digits.
+        Without a finite width, those of three significant digits; of four where the number is exact.
         """
         half = 0.5 * (self.high - self.low)
         if not (self.has_interval and math.isfinite(half)):
-            text = f"{self.value:.4g}"
+            text = f"{self.value:.{4 if self.low == self.high else 3}g}"
             return len(text.partition(".")[2]) if "e" not in text else 0
         decimals = decimals_for(half, digits=2, most=_MOST_DECIMALS)
         texts = [f"{number:.{decimals}f}" for number in (self.value, self.low, self.high)]

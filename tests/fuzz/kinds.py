@@ -31,8 +31,8 @@ from harness.mocap.read.c3d import read_c3d
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 from harness.report.comparison.text import text as comparison_text
-from harness.report.paper.page import PaperContent, paper_page
-from harness.report.paper.text import text_tables
+from harness.report.kit.page_html import page_html
+from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import PlacementContent, placement_page
 from harness.report.placement.text import text as placement_text
 from harness.report.run.data import read_run
@@ -247,7 +247,7 @@ def _make_paper(folder: Path) -> None:
 
 def _read_paper(folder: Path) -> object:
     findings = read_findings(folder / "findings.json")
-    return text_tables(findings), paper_page(PaperContent(findings, {}, {}, ()))
+    return paper_text(findings), page_html(paper_page(findings), with_charts=False)
 
 
 def _make_placement(folder: Path) -> None:

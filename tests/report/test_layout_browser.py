@@ -11,7 +11,7 @@ from harness.report.kit.page_html import write_page
 from harness.report.lab.trust_page import trust_page
 from harness.report.lab.unit_page import unit_page
 from harness.report.lab.validation_page import validation_page
-from harness.report.paper.writer import write_paper_page
+from harness.report.paper.page import write_paper_page
 from harness.report.physics.writer import write_physics_page
 from harness.report.placement import writer as placement_writer
 from harness.report.run.writer import write_run_page

@@ -46,13 +46,11 @@ class Prose:
 
     text: str
     is_warning: bool = False
-    terminal: bool = True
-    """Whether the terminal prints it too; not so for explanations of a chart or of a table's columns."""
 
 
 @dataclass(frozen=True)
 class Bullets:
-    """A list; nothing without items."""
+    """A list; nothing without items. Code stands between backticks; Markup is for lists that only a browser shows."""
 
     items: Sequence[str]
     title: str = ""
@@ -79,7 +77,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class DataTable:
-    """A table whose first column names the rows; nothing without rows."""
+    """A table whose first column names the rows; nothing without rows. A row of one cell is a heading of rows."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -93,6 +91,8 @@ class DataTable:
     """Title under which a browser folds the table; "" leaves it open."""
     most_printed: int | None = None
     """Most rows in a terminal; None prints all."""
+    cards: bool = False
+    """Whether a phone shows each row as a card, for rows of many words."""
     intervals_printed: bool = True
     """Whether a terminal shows intervals; not so in tables that are too wide for them."""
 
@@ -113,21 +113,22 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Folded:
-    """Blocks that a browser folds under a title; the terminal leaves them out."""
+class BrowserOnly:
+    """Blocks that the terminal leaves out; a browser folds them under the title if there is one."""
 
-    title: str
-    blocks: "Sequence[Block]"
+    blocks: "Sequence[Block | Markup]"
+    """Markup is HTML that has no text, such as a player of motion."""
+    fold: str = ""
 
 
 @dataclass(frozen=True)
-class OnlyHtml:
-    """HTML that has no text for a terminal, such as a player of motion."""
+class TerminalOnly:
+    """Blocks that a browser leaves out."""
 
-    content: Markup
+    blocks: "Sequence[Block]"
 
 
-Block = Prose | Bullets | Code | Tally | DataTable | Drawing | Folded | OnlyHtml
+Block = Prose | Bullets | Code | Tally | DataTable | Drawing | BrowserOnly | TerminalOnly
 
 
 @dataclass(frozen=True)

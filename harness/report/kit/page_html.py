@@ -13,20 +13,19 @@ from harness.report.kit.markup import Markup, bullet_list, details, inline_code,
 from harness.report.kit.page import (
     Badge,
     Block,
+    BrowserOnly,
     Bullets,
     Code,
     DataTable,
     Drawing,
-    Folded,
-    OnlyHtml,
     Page,
     Prose,
     Section,
     Stack,
     Tally,
+    TerminalOnly,
 )
 from harness.report.kit.page_text import NUMBER
-from harness.report.kit.style import Chart
 from harness.report.kit.table import NOT_MEASURED_CELL, html_table, stacked_cell
 from harness.report.kit.text import to_file_name
 from harness.report.kit.verdict_badge import tally_list, verdict_badge
@@ -38,18 +37,22 @@ last number."""
 
 def write_page(page: Page, path: Path, plots: Path | None = None) -> Path:
     """Write the page to `path` and return it; its folder is created. Charts are also written to the folder `plots`."""
-    renderer = _Renderer(plots)
-    text = renderer.page(page)
+    text = page_html(page, plots)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
     return path
 
 
+def page_html(page: Page, plots: Path | None = None, *, with_charts: bool = True) -> str:
+    """The HTML of a page; without charts their numbers are open."""
+    return _Renderer(plots, with_charts).page(page)
+
+
 class _Renderer:
     """Renders blocks, and writes each chart when it is drawn."""
 
-    def __init__(self, plots: Path | None) -> None:
-        self._plots = plots
+    def __init__(self, plots: Path | None, with_charts: bool) -> None:
+        self._plots, self._with_charts = plots, with_charts
 
     def page(self, page: Page) -> str:
         made_by = Section("Made by", "command", [Code(page.command)] if page.command else [])
@@ -67,17 +70,19 @@ class _Renderer:
             lead=self.blocks(page.lead, page.name) or None,
         )
 
-    def blocks(self, blocks: Sequence[Block], label: str) -> Markup:
+    def blocks(self, blocks: Sequence[Block | Markup], label: str) -> Markup:
         several = sum(isinstance(block, Drawing) for block in blocks) > 1
-        return join(*(self.block(block, label, 3 if several else 0) for block in blocks))
+        return join(*(self._block(block, label, 3 if several else 0) for block in blocks))
 
-    def block(self, block: Block, label: str, level: int) -> Markup:
+    def _block(self, block: Block | Markup, label: str, level: int) -> Markup:
         match block:
+            case Markup():
+                return block
             case Prose():
-                return tag("p", inline_code(block.text), class_="missing" if block.is_warning else None)
+                return tag("p", _words(block.text), class_="missing" if block.is_warning else None)
             case Bullets():
                 title = tag("h3", block.title) if block.title and block.items else None
-                return join(title, bullet_list([inline_code(item) for item in block.items]))
+                return join(title, bullet_list([_words(item) for item in block.items]))
             case Code():
                 listing = tag("pre", block.text if block.title else tag("code", block.text))
                 return details(block.title, listing) if block.title else listing
@@ -88,35 +93,60 @@ class _Renderer:
                 return details(block.fold, table) if block.fold and table else table
             case Drawing():
                 return self._drawing(block, label, level)
-            case Folded():
-                content = self.blocks(block.blocks, block.title)
-                return details(block.title, content) if content else content
-            case OnlyHtml():
-                return block.content
+            case BrowserOnly():
+                content = self.blocks(block.blocks, block.fold or label)
+                return details(block.fold, content) if block.fold and content else content
+            case TerminalOnly():
+                return Markup()
 
     def _drawing(self, block: Drawing, label: str, level: int) -> Markup:
         numbers = join(*(page_table(table, label) for table in block.tables))
-        chart = block.draw()
+        chart = block.draw() if self._with_charts else None
         if chart is None:
             return numbers
-        self._write(chart)
-        return join(chart_figure(chart, level), details(block.fold, numbers) if numbers else None)
-
-    def _write(self, chart: Chart) -> None:
         if self._plots is not None:
             chart.write(self._plots)
+        return join(chart_figure(chart, level), details(block.fold, numbers) if numbers else None)
 
 
 def page_table(table: DataTable, label: str = "") -> Markup:
     """A table as HTML: numbers are aligned right, columns of words left; nothing without rows."""
     if not table.rows:
         return Markup()
-    columns = zip(table.head, *table.rows, strict=True)
-    cells = [[inline_code(str(cell)) for cell in next(columns)], *map(_column, columns)]
-    head, *rows = map(list, zip(*cells, strict=True))
+    label = table.label or table.title or label.lower()
     title = tag("b", table.title) if table.title else None
-    caption = join(title, " " if title and table.caption else None, inline_code(table.caption))
-    return html_table(Table(head, rows), caption, label=table.label or table.title or label.lower())
+    caption = join(title, " " if title and table.caption else None, _words(table.caption))
+    if table.cards:
+        return join(tag("p", caption, class_="caption"), _cards(table, label))
+    columns = zip(table.head, *table.rows, strict=True)
+    cells = [[_cell(cell) for cell in next(columns)], *map(_column, columns)]
+    head, *rows = map(list, zip(*cells, strict=True))
+    return html_table(Table(head, rows), caption, label=label)
+
+
+def _cards(table: DataTable, label: str) -> Markup:
+    """A table as wide as the page, whose rows are cards on a phone; roles say there what the look no longer does."""
+    head = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in table.head), role="row")
+    rows = [_card(table, row) if len(row) > 1 else _group(table, row[0]) for row in table.rows]
+    body = tag("thead", head, role="rowgroup"), tag("tbody", *rows, role="rowgroup")
+    return tag("table", *body, class_="claims", role="table", aria_label=label)
+
+
+def _card(table: DataTable, row: Sequence[object]) -> Markup:
+    cells = [
+        tag("td", _cell(cell), data_label=name, role="cell", class_=None if str(cell) else "empty")
+        for name, cell in zip(table.head[1:], row[1:], strict=True)
+    ]
+    return tag("tr", tag("th", _cell(row[0]), scope="row", role="rowheader"), *cells, role="row")
+
+
+def _group(table: DataTable, title: object) -> Markup:
+    content = tag("th", _cell(title), scope="rowgroup", colspan=len(table.head), role="rowheader")
+    return tag("tr", content, class_="group", role="row")
+
+
+def _words(text: str) -> Markup:
+    return text if isinstance(text, Markup) else inline_code(text)
 
 
 def _column(cells: Sequence[Any]) -> list[Any]:
@@ -140,8 +170,8 @@ def _cell(cell: Any) -> Any:
         case Badge():
             return stacked_cell(verdict_badge(cell.verdict, cell.mark), cell.why, "why")
         case Stack():
-            return stacked_cell(_cell(cell.upper), cell.lower)
+            return stacked_cell(_cell(cell.upper), _words(cell.lower))
         case str():
-            return NOT_MEASURED_CELL if cell == NOT_MEASURED else inline_code(cell)
+            return NOT_MEASURED_CELL if cell == NOT_MEASURED else _words(cell)
         case _:
             return cell

@@ -33,7 +33,8 @@ class Quantity:
 
     def exact(self, value: float) -> str:
         """A number that is known exactly, with its unit, in at most four significant digits."""
-        return Interval(float(f"{self.factor * value:.4g}"), unit=self.unit).number
+        rounded = float(f"{self.factor * value:.4g}")
+        return Interval(rounded, rounded, rounded, unit=self.unit).number
 
 
 _MM, _DEG, _MS, _PERCENT = ("mm", 1e3), ("deg", math.degrees(1.0)), ("ms", 1e3), ("%", 100.0)

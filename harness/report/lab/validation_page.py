@@ -8,7 +8,7 @@ from harness.core.interval import Interval
 from harness.core.number_format import format_fixed, format_number, format_share
 from harness.measure.validation_report import ValidationReport
 from harness.report.kit.metric_labels import metric_label
-from harness.report.kit.page import Bullets, DataTable, Drawing, Page, Prose, Section
+from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
 from harness.report.lab.quantities import quantity
 from harness.report.lab.unit_page import capture_text, stretches_table
@@ -49,7 +49,7 @@ def validation_page(report: ValidationReport, scores: Sequence[ReconstructionSco
                 "Registration",
                 "registration",
                 [
-                    *([Prose(_REGISTRATION, terminal=False)] if report.numbers else []),
+                    *([BrowserOnly([Prose(_REGISTRATION)])] if report.numbers else []),
                     Drawing(partial(offsets_chart, report)),
                     _numbers_table(report),
                     Bullets(_number_reasons(report), prefix="not measured: "),

@@ -11,17 +11,17 @@ from harness.report.kit.markup import Markup
 from harness.report.kit.page import (
     Badge,
     Block,
+    BrowserOnly,
     Bullets,
     Code,
     DataTable,
     Drawing,
-    Folded,
-    OnlyHtml,
     Page,
     Prose,
     Section,
     Stack,
     Tally,
+    TerminalOnly,
     Verdict,
 )
 from harness.report.kit.page_html import write_page
@@ -75,11 +75,12 @@ def test_what_only_a_browser_shows_is_not_printed(tmp_path: Path) -> None:
     numbers = DataTable(["a", "b"], [["x", "1"]])
     page = page_of(
         Drawing(chart, numbers),
-        Folded("More", [Prose("hidden")]),
+        BrowserOnly([Prose("hidden")], "More"),
         Code("harness run", "Listing"),
-        OnlyHtml(Markup("<b>player</b>")),
+        BrowserOnly([Markup("<b>player</b>")]),
         Tally({"met": 2}, {"met": "✓"}, {"met": "as wanted"}),
-        Prose("How to read it.", terminal=False),
+        BrowserOnly([Prose("How to read it.")]),
+        TerminalOnly([Prose("In a terminal alone.")]),
     )
     file = write_page(page, tmp_path / "page.html", tmp_path)
     html, text = text_of(file), page_text(page)
@@ -87,6 +88,8 @@ def test_what_only_a_browser_shows_is_not_printed(tmp_path: Path) -> None:
         assert part in html
         assert part not in text
     assert "x  1" in text
+    assert "In a terminal alone." in text
+    assert "In a terminal alone." not in html
     assert (tmp_path / "pairs.svg").read_text() == chart().svg
     folded = [name for name, _ in read(file).found if name == "details"]
     assert len(folded) == 3
@@ -109,7 +112,9 @@ def test_a_section_without_content_is_left_out(tmp_path: Path) -> None:
 def test_no_name_becomes_markup(tmp_path: Path) -> None:
     cells = [HOSTILE, Badge(HOSTILE, "✗", HOSTILE), Stack(HOSTILE, HOSTILE)]
     table = DataTable([HOSTILE] * 3, [cells], HOSTILE, HOSTILE, HOSTILE)
-    page = page_of(table, Prose(HOSTILE), Bullets([HOSTILE]), Code(HOSTILE, HOSTILE), Folded(HOSTILE, [Prose(HOSTILE)]))
+    page = page_of(
+        table, Prose(HOSTILE), Bullets([HOSTILE]), Code(HOSTILE, HOSTILE), BrowserOnly([Prose(HOSTILE)], HOSTILE)
+    )
     file = write_page(page, tmp_path / "page.html")
     assert "<script>alert" not in file.read_text(encoding="utf-8")
     assert text_of(file).count(HOSTILE) > 10
@@ -129,3 +134,14 @@ def test_a_terminal_cuts_long_tables_and_leaves_out_empty_columns() -> None:
     assert "nothing" not in "\n".join(lines)
     narrow = DataTable(["a", "b"], [["row", LENGTH]], intervals_printed=False)
     assert page_text(page_of(narrow)).splitlines()[-1] == "row  1.20 mm"
+
+
+def test_a_row_of_one_cell_is_a_heading_of_rows(tmp_path: Path) -> None:
+    table = DataTable(["claim", "verdict"], [["first group"], ["a", Badge("met", "✓")], ["b", ""]], cards=True)
+    file = write_page(page_of(table), tmp_path / "page.html")
+    assert page_text(page_of(table)).splitlines()[-5:] == ["claim  verdict", "", "first group", "a      ✓ met", "b"]
+    found = read(file).found
+    assert [a.get("data-label") for name, a in found if name == "td"] == ["verdict"] * 2
+    assert [a for name, a in found if a.get("colspan") == "2"] == [
+        {"scope": "rowgroup", "colspan": "2", "role": "rowheader"}
+    ]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.paper.writer import write_paper_page
+from harness.report.paper.page import write_paper_page
 from tests.report.fabricate_paper import liu, write_study
 
 
