@@ -57,7 +57,7 @@ def _report_sweep(args: argparse.Namespace) -> Outcome:
 
 
 def _report_placement(args: argparse.Namespace) -> Outcome:
-    from harness.report.placement.writer import write_placement_page
+    from harness.report.placement.page import write_placement_page
 
     with show_steps("parts of the report"):
         page = write_placement_page(args.run)

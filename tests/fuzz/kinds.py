@@ -33,8 +33,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.report.comparison.text import text as comparison_text
 from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
-from harness.report.placement.page import PlacementContent, placement_page
-from harness.report.placement.text import text as placement_text
+from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
 from harness.report.run.text import run_table
 from harness.report.run.writer import write_run_page
@@ -256,7 +255,7 @@ def _make_placement(folder: Path) -> None:
 
 def _read_placement_findings(folder: Path) -> object:
     findings = read_placement(folder / "findings.json")
-    return placement_text(findings), placement_page(PlacementContent(findings, {}, ()))
+    return placement_text(findings), page_html(placement_page(findings), with_charts=False)
 
 
 def _make_database(folder: Path) -> None:

@@ -13,7 +13,7 @@ from harness.report.lab.unit_page import unit_page
 from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
 from harness.report.physics.writer import write_physics_page
-from harness.report.placement import writer as placement_writer
+from harness.report.placement import page as placement_page
 from harness.report.run.writer import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from tests.report.fabricate import Plan, fabricate
@@ -48,8 +48,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     methods = {f"a_method_with_a_long_name_{n}": 1.0 + n for n in range(12)} | {"ik": 3.0}
     plan = Plan(behaviours=("walking", "boxing"), methods=methods, duration_s=3.0, failing=("ik",))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement_writer, "draw_body_map", lambda *args, **options: (None, "not in this test"))
-        placement = placement_writer.write_placement_page(write_made_up(folder / "placement"))
+        patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
+        placement = placement_page.write_placement_page(write_made_up(folder / "placement"))
     coverage = folder / "coverage.html"
     coverage.write_text(coverage_page(fabricate_coverage()), encoding="utf-8")
     return {

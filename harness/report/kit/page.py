@@ -91,6 +91,8 @@ class DataTable:
     """Title under which a browser folds the table; "" leaves it open."""
     most_printed: int | None = None
     """Most rows in a terminal; None prints all."""
+    omitted: int = 0
+    """Rows that the table leaves out; both renderings say how many."""
     cards: bool = False
     """Whether a phone shows each row as a card, for rows of many words."""
     intervals_printed: bool = True

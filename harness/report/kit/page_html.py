@@ -115,7 +115,9 @@ def page_table(table: DataTable, label: str = "") -> Markup:
         return Markup()
     label = table.label or table.title or label.lower()
     title = tag("b", table.title) if table.title else None
-    caption = join(title, " " if title and table.caption else None, _words(table.caption))
+    more = f"{table.omitted:,} more are left out." if table.omitted else ""
+    texts = [title, _words(table.caption) if table.caption else None, more or None]
+    caption = join(*(part for n, text in enumerate(filter(None, texts)) for part in (" " if n else "", text)))
     if table.cards:
         return join(tag("p", caption, class_="caption"), _cards(table, label))
     columns = zip(table.head, *table.rows, strict=True)
@@ -151,14 +153,15 @@ def _words(text: str) -> Markup:
 
 def _column(cells: Sequence[Any]) -> list[Any]:
     """The cells of one column, its head first."""
-    texts = [cell for cell in cells[1:] if isinstance(cell, str)]
-    if all(NUMBER.fullmatch(text) for text in texts):
-        return [cells[0], *map(_cell, cells[1:])]
+    head, *rest = cells
+    texts = [str(cell.upper) if isinstance(cell, Stack) else cell for cell in rest]
+    if all(NUMBER.fullmatch(text) for text in texts if isinstance(text, str)):
+        return [head, *map(_cell, rest)]
     longest = max(map(len, map(str, cells)))
     most = _WIDEST_EM if longest > _LONG_CELL_LETTERS else _WIDE_EM
     width = f"width: {min(_LETTER_EM * longest + 1.0, most):.0f}em"
     return [
-        tag("span", inline_code(cell), class_="words", style=width) if isinstance(cell, str) else _cell(cell)
+        tag("span", _cell(cell), class_="words", style=width) if isinstance(cell, str | Stack) else _cell(cell)
         for cell in cells
     ]
 

@@ -2,6 +2,7 @@
 
 import re
 import textwrap
+from collections.abc import Sequence
 
 from harness.core.interval import Interval
 from harness.core.text_table import Table
@@ -15,9 +16,7 @@ NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|n
 
 def page_text(page: Page, width: int = WIDTH) -> str:
     """The text of a page; what a terminal cannot show, and explanations of columns, are left out."""
-    lines = _wrapped(page.headline, width)
-    for block in page.lead:
-        lines += block_lines(block, width)
+    lines = _wrapped(page.headline, width) + _joined(page.lead, width, after_text=True)
     facts = [
         f"{title.lower()}: {text}"
         for title, text in page.facts.items()
@@ -25,9 +24,19 @@ def page_text(page: Page, width: int = WIDTH) -> str:
     ]
     lines += ["", *(line for fact in facts for line in _wrapped(fact, width, "  "))] if facts else []
     for section in page.sections:
-        if section.terminal and (content := [line for b in section.blocks for line in block_lines(b, width)]):
+        if section.terminal and (content := _joined(section.blocks, width)):
             lines += ["", *_wrapped(section.heading or section.title.lower(), width), *content]
     return "\n".join(lines)
+
+
+def _joined(blocks: Sequence[Block], width: int, *, after_text: bool = False) -> list[str]:
+    """The lines of several blocks; a table stands apart from what is above it."""
+    lines: list[str] = []
+    for block in blocks:
+        content = block_lines(block, width)
+        is_apart = isinstance(block, DataTable | Drawing | TerminalOnly) and (lines or after_text)
+        lines += ["", *content] if content and is_apart else content
+    return lines
 
 
 def block_lines(block: Block, width: int = WIDTH) -> list[str]:
@@ -40,9 +49,9 @@ def block_lines(block: Block, width: int = WIDTH) -> list[str]:
         case DataTable() if block.rows:
             return table_lines(block, width)
         case Drawing():
-            return [line for table in block.tables for line in block_lines(table, width)]
+            return _joined(block.tables, width)
         case TerminalOnly():
-            return [line for one in block.blocks for line in block_lines(one, width)]
+            return _joined(block.blocks, width)
         case _:
             return []
 
@@ -55,10 +64,10 @@ def table_lines(table: DataTable, width: int = WIDTH) -> list[str]:
     words = [n for n, at in enumerate(used) if at == 0 or not all(NUMBER.fullmatch(row[at]) for row in rows)]
     content = Table([table.head[n] for n in used], [[row[n] for n in used] for row in rows], text_columns=words)
     head, *wrapped = content.wrapped_rows(width, words)
-    lines, rest = [table.title, *head] if table.title else head, iter(wrapped)
+    lines, rest = [*_wrapped(table.title, width), *head], iter(wrapped)
     for row in shown:
         lines += next(rest) if len(row) > 1 else ["", str(row[0])]
-    more = len(table.rows) - len(shown)
+    more = len(table.rows) - len(shown) + table.omitted
     return [*lines, *([f"and {more:,} more"] if more else [])]
 
 
