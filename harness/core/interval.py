@@ -104,10 +104,15 @@ class Interval:
 
     @property
     def ends(self) -> str:
-        """The interval without a unit, "1.19 to 1.21"; "" where it was not computed, "exact" where it has no width."""
-        if self.has_interval:
-            return f"{self._write(self.low)} to {self._write(self.high)}"
-        return "exact" if self.is_measured and self.low == self.high else ""
+        """The interval without a unit, "1.19 to 1.21"; "" where it was not computed.
+
+        "exact" where it has no width, unless the number is a difference.
+        """
+        if not self.is_measured or math.isnan(self.low):
+            return ""
+        if self.low == self.high and not self.signed:
+            return "exact"
+        return f"{self._write(self.low)} to {self._write(self.high)}"
 
     def __str__(self) -> str:
         return f"{self.number} ({self.ends})" if self.has_interval else self.number

@@ -38,6 +38,7 @@ def test_digits_suit_the_width(number: Interval, text: str) -> None:
 def test_number_and_ends_stand_apart_in_a_table() -> None:
     number = Interval(1.2, 1.19, 1.21, unit="mm")
     assert (number.number, number.ends) == ("1.20 mm", "1.19 to 1.21")
+    assert Interval(0.0, 0.0, 0.0, signed=True).ends == "0 to 0"
     assert (Interval(2.0, 2.0, 2.0).ends, Interval(2.0).ends, Interval.missing("no events").ends) == ("exact", "", "")
 
 

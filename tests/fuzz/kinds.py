@@ -30,7 +30,7 @@ from harness.mocap.library import MotionLibrary
 from harness.mocap.read.c3d import read_c3d
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
-from harness.report.comparison.text import text as comparison_text
+from harness.report.comparison.page import comparison_text
 from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.comparison.writer import write_comparison_page
+from harness.report.comparison.page import write_comparison_page
 from harness.report.coverage.page import coverage_page
 from harness.report.kit.page_html import write_page
 from harness.report.lab.trust_page import trust_page

@@ -115,6 +115,15 @@ class Drawing:
 
 
 @dataclass(frozen=True)
+class Panels:
+    """Small charts in a grid; the terminal leaves them out."""
+
+    charts: Sequence[tuple[Markup | None, Callable[[], Chart | None]]]
+    """A heading, or None for the title of the chart, and what draws the chart."""
+    broad: bool = False
+
+
+@dataclass(frozen=True)
 class BrowserOnly:
     """Blocks that the terminal leaves out; a browser folds them under the title if there is one."""
 
@@ -130,7 +139,7 @@ class TerminalOnly:
     blocks: "Sequence[Block]"
 
 
-Block = Prose | Bullets | Code | Tally | DataTable | Drawing | BrowserOnly | TerminalOnly
+Block = Prose | Bullets | Code | Tally | DataTable | Drawing | Panels | BrowserOnly | TerminalOnly
 
 
 @dataclass(frozen=True)

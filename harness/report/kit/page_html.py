@@ -8,7 +8,7 @@ from harness.core.files import write_text
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED
 from harness.core.text_table import Table
-from harness.report.kit.document import chart_figure, document
+from harness.report.kit.document import chart_figure, chart_panel, document
 from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, tag
 from harness.report.kit.page import (
     Badge,
@@ -19,6 +19,7 @@ from harness.report.kit.page import (
     DataTable,
     Drawing,
     Page,
+    Panels,
     Prose,
     Section,
     Stack,
@@ -93,6 +94,10 @@ class _Renderer:
                 return details(block.fold, table) if block.fold and table else table
             case Drawing():
                 return self._drawing(block, label, level)
+            case Panels():
+                drawn = [(heading, draw()) for heading, draw in block.charts] if self._with_charts else []
+                panels = [chart_panel(chart, heading) for heading, chart in drawn if chart]
+                return tag("div", *panels, class_=f"panels{' broad' * block.broad}") if panels else Markup()
             case BrowserOnly():
                 content = self.blocks(block.blocks, block.fold or label)
                 return details(block.fold, content) if block.fold and content else content
@@ -120,7 +125,8 @@ def page_table(table: DataTable, label: str = "") -> Markup:
     caption = join(*(part for n, text in enumerate(filter(None, texts)) for part in (" " if n else "", text)))
     if table.cards:
         return join(tag("p", caption, class_="caption"), _cards(table, label))
-    columns = zip(table.head, *table.rows, strict=True)
+    every = zip(table.head, *table.rows, strict=True)
+    columns = (column for n, column in enumerate(every) if n == 0 or any(map(str, column[1:])))
     cells = [[_cell(cell) for cell in next(columns)], *map(_column, columns)]
     head, *rows = map(list, zip(*cells, strict=True))
     return html_table(Table(head, rows), caption, label=label)

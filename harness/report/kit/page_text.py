@@ -18,14 +18,14 @@ def page_text(page: Page, width: int = WIDTH) -> str:
     """The text of a page; what a terminal cannot show, and explanations of columns, are left out."""
     lines = _wrapped(page.headline, width) + _joined(page.lead, width, after_text=True)
     facts = [
-        f"{title.lower()}: {text}"
+        f"{_uncapitalised(title)}: {text}"
         for title, text in page.facts.items()
         if text and (page.printed_facts is None or title in page.printed_facts)
     ]
     lines += ["", *(line for fact in facts for line in _wrapped(fact, width, "  "))] if facts else []
     for section in page.sections:
         if section.terminal and (content := _joined(section.blocks, width)):
-            lines += ["", *_wrapped(section.heading or section.title.lower(), width), *content]
+            lines += ["", *_wrapped(section.heading or _uncapitalised(section.title), width), *content]
     return "\n".join(lines)
 
 
@@ -69,6 +69,10 @@ def table_lines(table: DataTable, width: int = WIDTH) -> list[str]:
         lines += next(rest) if len(row) > 1 else ["", str(row[0])]
     more = len(table.rows) - len(shown) + table.omitted
     return [*lines, *([f"and {more:,} more"] if more else [])]
+
+
+def _uncapitalised(title: str) -> str:
+    return title if title[1:2] in ("", " ") else title[0].lower() + title[1:]
 
 
 def _text(cell: object, with_interval: bool) -> str:
