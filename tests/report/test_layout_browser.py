@@ -12,7 +12,7 @@ from harness.report.lab.trust_page import trust_page
 from harness.report.lab.unit_page import unit_page
 from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
-from harness.report.physics.writer import write_physics_page
+from harness.report.physics.page import write_physics_page
 from harness.report.placement import page as placement_page
 from harness.report.run.writer import write_run_page
 from harness.report.sweep.page import write_sweep_page
@@ -50,10 +50,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
         placement = placement_page.write_placement_page(write_made_up(folder / "placement"))
-    coverage = folder / "coverage.html"
-    coverage.write_text(coverage_page(fabricate_coverage()), encoding="utf-8")
     return {
-        "coverage": coverage,
+        "coverage": write_page(coverage_page(fabricate_coverage()), folder / "coverage.html"),
         "run": write_run_page(fabricate(folder / "run", plan), rendered=False),
         "comparison": write_comparison_page(comparison(7, ("local_pca",)), folder / "comparison.html"),
         "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),

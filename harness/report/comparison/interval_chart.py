@@ -38,7 +38,7 @@ def interval_charts(comparison: Comparison, gated: bool) -> list[Callable[[], Ch
     """
     chosen = [line for line in comparison.differences if line.gated == gated and line.mean_a]
     metrics = dict.fromkeys(line.metric for line in chosen)
-    charts = []
+    charts: list[Callable[[], Chart]] = []
     for number, metric in enumerate(metrics, start=1):
         lines = [line for line in chosen if line.metric == metric]
         name = f"intervals_{'gated' if gated else 'other'}_{number}"

@@ -10,7 +10,7 @@ from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Pr
 
 WIDTH = 118
 """Most characters of a line, unless a word or a number is longer."""
-NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|not measured")
+NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|no fix|not measured")
 """Texts that are aligned right, as numbers are."""
 
 

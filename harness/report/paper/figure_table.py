@@ -50,7 +50,7 @@ def series_values(values: SeriesValues, series: str, count: int) -> Floats:
     return np.array([np.nan if value is None else value for value in row], dtype=float)
 
 
-def _label_value(column: str, text: str) -> str:
+def _label_value(column: str, text: object) -> str:
     return f"{column} {text}"
 
 

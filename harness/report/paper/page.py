@@ -106,7 +106,10 @@ def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
     """The page of a study; runs in its `folder` become links."""
     claims = all_claims(findings)
     printed = [claim for claim in claims if claim.kind == "printed"]
-    groups = [row for e in findings.experiments if e.claims for row in ([_link(e)], *map(_claim_row, e.claims))]
+    groups: list[list[object]] = []
+    for experiment in findings.experiments:
+        if experiment.claims:
+            groups += [[_link(experiment)], *map(_claim_row, experiment.claims)]
     return Page(
         verb="paper",
         name=f"{findings.paper} · {findings.motion}",
