@@ -37,9 +37,8 @@ from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
 from harness.report.run.text import run_table
 from harness.report.run.writer import write_run_page
-from harness.report.sweep.page import write_sweep_page
+from harness.report.sweep.page import sweep_text, write_sweep_page
 from harness.report.sweep.reader import read_sweep
-from harness.report.sweep.text import text as sweep_text
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run

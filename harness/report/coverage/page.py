@@ -6,7 +6,7 @@ from functools import partial
 from harness.core.number_format import format_fixed
 from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
 from harness.report.coverage.content import CoverageContent, CoverageRow, StationRow, format_dilution
-from harness.report.kit.page import BrowserOnly, DataTable, Drawing, Page, Prose, Section
+from harness.report.kit.page import Block, BrowserOnly, DataTable, Drawing, Page, Prose, Section
 
 _DILUTION_NOTE = (
     "The dilution of precision (DOP) is the standard deviation of the position over that of a range: it tells how the "
@@ -17,7 +17,7 @@ _DILUTION_NOTE = (
 def coverage_page(content: CoverageContent) -> Page:
     """The page of a constellation."""
     by_place = [Drawing(partial(draw, content)) for draw in (heard_chart, dilution_chart)]
-    by_station = [Drawing(partial(station_chart, content)), station_table(content.stations, content.clip)]
+    by_station: list[Block] = [Drawing(partial(station_chart, content)), station_table(content.stations, content.clip)]
     return Page(
         verb="inspect",
         name=content.name,

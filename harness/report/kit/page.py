@@ -41,6 +41,16 @@ class Stack:
 
 
 @dataclass(frozen=True)
+class Strong:
+    """A cell that a browser sets in bold, such as the best of a column."""
+
+    cell: object
+
+    def __str__(self) -> str:
+        return str(self.cell)
+
+
+@dataclass(frozen=True)
 class Prose:
     """A paragraph; code stands between backticks."""
 
@@ -81,7 +91,7 @@ class DataTable:
 
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
-    """Cells are text, whole numbers, `Interval`, `Badge` or `Stack`; code stands between backticks."""
+    """Cells are text, whole numbers, `Interval`, `Badge`, `Stack` or `Strong`; code stands between backticks."""
     title: str = ""
     caption: str = ""
     """What the numbers are; only a browser shows it."""

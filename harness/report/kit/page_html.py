@@ -23,6 +23,7 @@ from harness.report.kit.page import (
     Prose,
     Section,
     Stack,
+    Strong,
     Tally,
     TerminalOnly,
 )
@@ -178,6 +179,8 @@ def _cell(cell: Any) -> Any:
             return stacked_cell(cell.number, cell.ends) if cell.is_measured else NOT_MEASURED_CELL
         case Badge():
             return stacked_cell(verdict_badge(cell.verdict, cell.mark), cell.why, "why")
+        case Strong():
+            return tag("strong", _cell(cell.cell))
         case Stack():
             return stacked_cell(_cell(cell.upper), _words(cell.lower))
         case str():
