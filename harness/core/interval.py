@@ -85,7 +85,7 @@ class Interval:
         return side / NORMAL_QUANTILE
 
     def scaled(self, factor: float, unit: str = "") -> "Interval":
-        """The same number in another unit, of which `factor` make one of the present unit."""
+        """Convert to another unit, of which `factor` make one of the present unit."""
         low, high = sorted((factor * self.low, factor * self.high))
         return replace(self, value=factor * self.value, low=low, high=high, unit=unit)
 

@@ -28,7 +28,7 @@ class Quantity:
         return number.scaled(self.factor, self.unit)
 
     def bare(self, number: Interval) -> Interval:
-        """The same without the unit, which the head of a column or a row names."""
+        """A number in the unit of the quantity, which the head of a column or a row names."""
         return number.scaled(self.factor)
 
     def exact(self, value: float) -> str:
