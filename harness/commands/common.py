@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.commands.ending import print_data
+from harness.commands.removed_flags import refuse_removed_flags
 from harness.core.interrupts import refuse_interrupts
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -44,6 +45,7 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
     if "mocap" in flags:
         add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
+    refuse_removed_flags(name, verb)
     return verb
 
 
