@@ -90,9 +90,7 @@ def budget_line(budget: Mapping[str, int]) -> str:
 def write_budget(root: Path) -> None:
     """Set the limits to today's sizes, rounded up, and print the line that the changelog needs."""
     budget = {name: -(-lines // _STEP) * _STEP for name, lines in budgeted_sizes(root).items()}
-    head = (
-        "# Most code lines of each folder; `python -m tests.code_size --write` sets them (tests/test_code_size.py).\n"
-    )
+    head = "# Most code lines of each folder. `python -m tests.code_size --write` sets them.\n"
     BUDGET.write_text(head + "".join(f"{name} = {lines}\n" for name, lines in budget.items()), encoding="utf-8")
     print(f"{BUDGET}: written. docs/CHANGELOG.md needs:\n{budget_line(budget)} Grown for: WHAT. Gone: WHAT.")
 

@@ -18,7 +18,7 @@ def test_no_folder_grows_beyond_its_budget() -> None:
     budget = read_budget()
     over = {name: lines for name, lines in budgeted_sizes(ROOT).items() if lines > budget.get(name, 0)}
     assert not over, (
-        f"more code lines than tests/code_budget.toml allows: {over}. Remove something first. If the growth is worth it, "
+        f"more code lines than tests/code_budget.toml allows: {over}. Remove something first. For good reasons "
         "`python -m tests.code_size --write` raises the table and prints the line for docs/CHANGELOG.md."
     )
 
