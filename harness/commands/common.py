@@ -23,7 +23,7 @@ DEFAULT_STATION_COUNT = 4
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
 STATION_CHARACTERS = "123456789ABC"
-"""Characters of the stations that a device may have (docs/is900.md 1)."""
+"""Characters of the stations that a device may have (docs/is900.md 5)."""
 DEVICE_STATIONS_HELP = (
     "number of the scenario's stations, or their names, in the order of the device's active stations; or names with "
     "stations of the device: head=3,torso=1 (default: the first 4)"
