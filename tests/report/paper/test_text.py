@@ -171,7 +171,7 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
     assert main(["report", str(folder), "--readme", str(readme)]) == 0
     assert "kim2012-cmu" in readme.read_text()
     assert (folder / "report.html").is_file()
-    assert main(["report", str(folder), "--movie"]) == 2
+    assert main(["report", str(folder), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
     assert "the study of a paper; expected a run." in capsys.readouterr().err
     assert main(["report", str(tmp_path), "--readme", str(readme)]) == 2
     assert "no results of the harness; expected" in capsys.readouterr().err

@@ -38,7 +38,8 @@ def test_every_file_that_is_named_is_there() -> None:
 
 def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     """The experiment in the text runs; without results its claim is "not run"."""
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    page = (ROOT / "docs" / "notes" / "paper_experiments.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     imports = (
         "from harness.results.findings import PaperExperiment\nfrom harness.compare.claims import claim_lower_error\n"
         "from harness.study.papers.paper_study import PaperStudy\n"
