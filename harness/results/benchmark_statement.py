@@ -79,7 +79,8 @@ class BenchmarkStatement:
     def as_dict(self) -> dict[str, Any]:
         """The entries of the JSON output of a benchmark."""
         content = asdict(self)
-        return content | content.pop("more")
+        more: dict[str, Any] = content.pop("more")
+        return {**content, **more}
 
 
 def state_verdict(
