@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import harness
-from harness.report.paper.verdicts import MARKS
+from harness.report.kit.statement_lines import MARKS
 from harness.results.findings import PaperExperiment
 from harness.study.papers.paper import PAPERS, load_paper
 from harness.study.papers.paper_study import PaperStudy
