@@ -37,8 +37,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
     from harness.report.lab.validation_page import validation_page
-    from harness.study.trust.reconstruction_scores import score_registered
-    from harness.study.trust.validation import load_truth, session_unit, validate_capture
+    from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
 
     if args.out is not None:
         require_writable(args.out, UNIT_FILE, force=args.force)
@@ -52,9 +51,10 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         )
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
-        scores = score_registered(args.capture, found, methods, progress) if methods else []
+        scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
     report = found.report(args.capture)
-    page = validation_page(report, scores, this_command())
+    errors = {one.method: {metric: one.metrics[metric] for metric in one.scored} for one in scores}
+    page = validation_page(report, errors, this_command())
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
@@ -70,7 +70,11 @@ def run_validate(args: argparse.Namespace) -> Outcome:
             }
             for check in found.named
         ],
-        "scores": [{"method": one.method, "metric": one.metric, "value": one.value} for one in scores],
+        "scores": [
+            {"method": method, "metric": metric, "value": value}
+            for method, values in errors.items()
+            for metric, value in values.items()
+        ],
         "damage": list(found.reader.damage),
     }
     lines = [page_text(page)]

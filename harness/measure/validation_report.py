@@ -102,7 +102,7 @@ def estimated_poses(registration: Registration) -> tuple[EstimatedPose, ...]:
 
 
 def _half_width_rad(covariance: Floats) -> float:
-    """Of the rotation, which the first three rows of a covariance (6, 6) are of [rad]."""
+    """Half width of a rotation, whose covariance is the first three rows of (6, 6) [rad]."""
     return NORMAL_QUANTILE * float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
 
 

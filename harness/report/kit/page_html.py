@@ -1,6 +1,7 @@
 """The browser's rendering of a page, and its file."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,9 @@ def page_table(table: DataTable, label: str = "") -> Markup:
     """A table as HTML: numbers are aligned right, columns of words left; nothing without rows."""
     if not table.rows:
         return Markup()
+    used = [n for n in range(len(table.head)) if n == 0 or any(str(row[n]) for row in table.rows if len(row) > 1)]
+    rows = [[row[n] for n in used] if len(row) > 1 else row for row in table.rows]
+    table = replace(table, head=[table.head[n] for n in used], rows=rows)
     label = table.label or table.title or label.lower()
     title = tag("b", table.title) if table.title else None
     more = f"{table.omitted:,} more are left out." if table.omitted else ""
@@ -126,11 +130,10 @@ def page_table(table: DataTable, label: str = "") -> Markup:
     caption = join(*(part for n, text in enumerate(filter(None, texts)) for part in (" " if n else "", text)))
     if table.cards:
         return join(tag("p", caption, class_="caption"), _cards(table, label))
-    every = zip(table.head, *table.rows, strict=True)
-    columns = (column for n, column in enumerate(every) if n == 0 or any(map(str, column[1:])))
+    columns = zip(table.head, *table.rows, strict=True)
     cells = [[_cell(cell) for cell in next(columns)], *map(_column, columns)]
-    head, *rows = map(list, zip(*cells, strict=True))
-    return html_table(Table(head, rows), caption, label=label)
+    head, *body = map(list, zip(*cells, strict=True))
+    return html_table(Table(head, body), caption, label=label)
 
 
 def _cards(table: DataTable, label: str) -> Markup:

@@ -1,7 +1,7 @@
 """The page of a validated capture: how far it is from its reference, then the registration, then each station."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from harness.core.interval import Interval
@@ -13,7 +13,6 @@ from harness.report.lab.departures import departure_texts, departures_sentence, 
 from harness.report.lab.quantities import quantity
 from harness.report.lab.unit_page import capture_text, stretches_table
 from harness.report.lab.validation_charts import offsets_chart, residuals_chart
-from harness.results.reconstruction_score import ReconstructionScore
 from harness.score.metrics import DEFINITIONS
 
 _REGISTRATION = (
@@ -27,8 +26,8 @@ _POSES = (
 _DEGREES = math.degrees(1.0)
 
 
-def validation_page(report: ValidationReport, scores: Sequence[ReconstructionScore], command: str) -> Page:
-    """The page of a capture that `command` validated, with the scores of methods on it."""
+def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, float | None]], command: str) -> Page:
+    """The page of a capture that `command` validated; `scores` are errors of methods on it, by method and metric."""
     return Page(
         verb="validate",
         name=report.name,
@@ -169,12 +168,11 @@ def _accuracy_reasons(report: ValidationReport) -> list[str]:
     return [f"{', '.join(names)}: {reason}" for reason, names in stations.items()]
 
 
-def _scores_table(scores: Sequence[ReconstructionScore]) -> DataTable:
+def _scores_table(scores: Mapping[str, Mapping[str, float | None]]) -> DataTable:
     """A row for each method, a column for each metric."""
-    metrics = list(dict.fromkeys(one.metric for one in scores))
-    values = {(one.method, one.metric): one.value for one in scores}
+    metrics = list(dict.fromkeys(metric for values in scores.values() for metric in values))
     rows = [
-        [method, *(format_number(values.get((method, metric)), DEFINITIONS[metric].unit) for metric in metrics)]
-        for method in dict.fromkeys(one.method for one in scores)
+        [method, *(format_number(values.get(metric), DEFINITIONS[metric].unit) for metric in metrics)]
+        for method, values in scores.items()
     ]
     return DataTable(["method", *map(metric_label, metrics)], rows, caption="Errors of methods on this capture.")

@@ -5,12 +5,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any, get_args
+from typing import Any
 from urllib.parse import quote
 
 from harness.core.files import to_json_types
-from harness.core.interval import Interval
-from harness.core.number_format import count_noun, format_number, format_p_value
+from harness.core.number_format import count_noun
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.page import (
@@ -30,37 +29,24 @@ from harness.report.kit.page import (
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text, table_lines
+from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, statement_row
 from harness.report.kit.text import describe_motion_source, to_file_name
 from harness.report.paper.charts import figure_charts
 from harness.report.paper.figure_table import figure_table, is_measured
+from harness.results.benchmark_statement import BenchmarkStatement, Reading, Verdict
 from harness.results.findings import (
     BarChart,
-    Claim,
-    ClaimVerdict,
     FindingsTable,
     LineChart,
     PaperExperiment,
     PaperFindings,
-    Reading,
     read_findings,
 )
 from harness.results.folder_kind import FINDINGS
 
-WIDTH = 160
-"""Most characters of a line in a terminal: claims are long."""
 READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
 """Reading -> start of its sentence."""
-KINDS: tuple[ClaimVerdict, ...] = get_args(ClaimVerdict)
-"""All verdicts, in the order of the tables."""
-MARKS: Mapping[ClaimVerdict, str] = {
-    "reproduced": "✓",
-    "same": "=",
-    "not reproduced": "✗",
-    "cannot tell": "?",
-    "not comparable": "≠",
-    "not run": "–",
-}
-MEANINGS: Mapping[ClaimVerdict, str] = {
+MEANINGS: Mapping[Verdict, str] = {
     "reproduced": "the 95 % interval of the paired difference lies on the published side, and its p after Holm is at "
     "most 0.05; or a printed value is met (an error within 25 %)",
     "same": "the whole interval lies within the margin of a comparison: the difference is too small to matter",
@@ -70,6 +56,8 @@ MEANINGS: Mapping[ClaimVerdict, str] = {
     "not comparable": "the printed value is for other motion or conditions",
     "not run": "not measured here",
 }
+KINDS: tuple[Verdict, ...] = tuple(MEANINGS)
+"""All verdicts on claims, in the order of the tables."""
 _CLAIMS = (
     "Difference: mean of the paired differences over clips and its 95 % interval; positive values agree with the "
     "paper. p: by sign flips (by Welch's test where clips do not pair), after Holm's correction for all printed "
@@ -109,7 +97,7 @@ def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
     groups: list[list[object]] = []
     for experiment in findings.experiments:
         if experiment.claims:
-            groups += [[_link(experiment)], *map(_claim_row, experiment.claims)]
+            groups += [[_link(experiment)], *map(statement_row, experiment.claims)]
     return Page(
         verb="paper",
         name=f"{findings.paper} · {findings.motion}",
@@ -131,18 +119,18 @@ def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
     )
 
 
-def all_claims(findings: PaperFindings) -> list[Claim]:
+def all_claims(findings: PaperFindings) -> list[BenchmarkStatement]:
     """The claims of all experiments, in their order."""
     return [claim for experiment in findings.experiments for claim in experiment.claims]
 
 
-def count_verdicts(claims: Sequence[Claim]) -> dict[ClaimVerdict, int]:
+def count_verdicts(claims: Sequence[BenchmarkStatement]) -> dict[Verdict, int]:
     """Verdict -> number of claims; "not run" is left out if there are none."""
     counts = Counter(claim.verdict for claim in claims)
     return {kind: counts[kind] for kind in KINDS if counts[kind] or kind != "not run"}
 
 
-def printed_claims(claims: Iterable[Claim], reading: Reading) -> list[Claim]:
+def printed_claims(claims: Iterable[BenchmarkStatement], reading: Reading) -> list[BenchmarkStatement]:
     """The claims of statements that the paper prints, with the methods of one reading; those of no method are of both.
 
     A reading without any claim of its own has none.
@@ -151,7 +139,7 @@ def printed_claims(claims: Iterable[Claim], reading: Reading) -> list[Claim]:
     return found if any(claim.reading == reading for claim in found) else []
 
 
-def sentence(claims: Sequence[Claim]) -> str:
+def sentence(claims: Sequence[BenchmarkStatement]) -> str:
     """The number of printed statements of each verdict: with the methods as printed, and with ours."""
     readings = {reading: printed_claims(claims, reading) for reading in READINGS}
     found = {READINGS[reading]: some for reading, some in readings.items() if some}
@@ -162,48 +150,29 @@ def sentence(claims: Sequence[Claim]) -> str:
     return " ".join(f"{_counts(some, start)}." for start, some in found.items())
 
 
-def _counts(claims: Sequence[Claim], start: str) -> str:
+def _counts(claims: Sequence[BenchmarkStatement], start: str) -> str:
     first, *others = count_verdicts(claims).items()
     counted = f"{start}{first[1]} of {count_noun(len(claims), 'printed statement')} {first[0]}"
     return ", ".join([counted, *(f"{count} {kind}" for kind, count in others if count)])
 
 
-def claims_table(claims: Sequence[Claim]) -> DataTable:
+def claims_table(claims: Sequence[BenchmarkStatement]) -> DataTable:
     """Each published statement next to the measured result, with the reason for its verdict."""
-    return _claims_table([_claim_row(claim) for claim in claims])
+    return _claims_table([statement_row(claim) for claim in claims])
 
 
 def _claims_table(rows: Sequence[Sequence[object]]) -> DataTable:
-    head = ["claim", "kind", "published", "measured", "difference", "clips", "verdict"]
+    head = statement_head("claim", "published")
     return DataTable(head, rows, caption=_CLAIMS, label="claims", cards=True)
-
-
-def _claim_row(claim: Claim) -> list[object]:
-    kind = ", ".join(filter(None, (claim.kind, claim.reading)))
-    badge = Badge(claim.verdict, MARKS[claim.verdict])
-    return [
-        Stack(claim.text, claim.why), kind, claim.published, claim.ours, _difference(claim), claim.clips or "", badge
-    ]  # fmt: skip
-
-
-def _difference(claim: Claim) -> object:
-    """The mean difference with its interval and p; "" where there is none or `ours` already shows the same number."""
-    if claim.difference is None:
-        return ""
-    number = Interval.of(claim.difference, claim.low, claim.high, claim.unit)
-    text = f"{format_number(claim.difference, claim.unit)} {claim.unit}".rstrip()
-    if claim.low is None and f" {text}" in f" {claim.ours}":
-        return ""
-    return number if claim.p_holm is None else Stack(number, f"p {format_p_value(claim.p_holm)}")
 
 
 def statements_table(findings: PaperFindings) -> DataTable:
     """Printed statements, each once, with two results: of the methods as printed, and of ours."""
-    found: dict[tuple[str, str], dict[Reading, Claim]] = {}
+    found: dict[tuple[str, str], dict[Reading, BenchmarkStatement]] = {}
     for claim in all_claims(findings):
         if claim.kind == "printed":
             readings: tuple[Reading, ...] = (claim.reading,) if claim.reading else tuple(READINGS)
-            row = found.setdefault((_VARIANT.sub("", claim.text), claim.published), {})
+            row = found.setdefault((_VARIANT.sub("", claim.text), claim.target), {})
             row |= dict.fromkeys(readings, claim)
     rows = [
         [*statement, *(_result(claims.get(reading)) for reading in READINGS)] for statement, claims in found.items()
@@ -212,8 +181,8 @@ def statements_table(findings: PaperFindings) -> DataTable:
     return DataTable(head, rows, caption=_STATEMENTS, label="printed statements", cards=True)
 
 
-def _result(claim: Claim | None) -> object:
-    return Stack(Badge(claim.verdict, MARKS[claim.verdict]), claim.ours) if claim else ""
+def _result(claim: BenchmarkStatement | None) -> object:
+    return Stack(Badge(claim.verdict, MARKS[claim.verdict]), claim.measured) if claim else ""
 
 
 def statements_text(findings: PaperFindings) -> str:

@@ -24,9 +24,10 @@ from harness.report.kit.page import (
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
+from harness.report.kit.statement_lines import WIDTH
 from harness.report.kit.style import Chart
 from harness.report.kit.text import describe_motion_source, last_line
-from harness.report.paper.page import WIDTH, claims_table
+from harness.report.paper.page import claims_table
 from harness.report.placement.body_map import draw_body_map, select_body_maps
 from harness.report.placement.charts import pareto_chart, ranking_chart, search_chart, stability_chart, worth_chart
 from harness.report.placement.wording import (

@@ -236,7 +236,7 @@ def _failure(group: FailureGroup, command: str) -> Block:
     cells = [*group.cells[:_MOST_CELLS], *([f"and {more:,} more"] if more > 0 else [])]
     alone = [Code(f"{command} --cell {shlex.quote(group.cells[0])}")] if command else []
     first = Prose("Message of the first cell, and the command that runs it alone:")
-    blocks = [Bullets(cells), first, Code(group.traceback), *alone]
+    blocks: list[Block] = [Bullets(cells), first, Code(group.traceback), *alone]
     return BrowserOnly(blocks, f"{count_noun(len(group.cells), 'cell')}: {group.message}")
 
 

@@ -35,7 +35,7 @@ ANSWER = (
 
 
 def written(folder: Path, report: ValidationReport) -> Path:
-    scores = SCORES if report.accuracy else ()
+    scores = SCORES if report.accuracy else {}
     return write_page(validation_page(report, scores, "harness validate walk.rec"), folder / "new" / "walk.html")
 
 

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,9 +11,11 @@ import harness
 from harness.cli import main
 from harness.core.interval import Interval
 from harness.errors import BadFile
-from harness.report.paper.page import WIDTH, claims_table, paper_text, statements_table, statements_text
+from harness.report.kit.statement_lines import WIDTH
+from harness.report.paper.page import claims_table, paper_text, statements_table, statements_text
 from harness.report.paper.readme import update_readme
-from harness.results.findings import Claim, PaperExperiment
+from harness.results.benchmark_statement import BenchmarkStatement, Verdict
+from harness.results.findings import PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
 RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")
@@ -25,8 +28,8 @@ def letters(text: str) -> str:
 def test_every_claim_is_told_whole() -> None:
     told = letters(paper_text(liu()))
     for claim in (claim for experiment in liu().experiments for claim in experiment.claims):
-        number = Interval.of(claim.difference, claim.low, claim.high)
-        for text in (claim.published, claim.ours, claim.why, claim.verdict, number.ends):
+        number = Interval.of(claim.value, claim.low, claim.high)
+        for text in (claim.target, claim.measured, claim.why, claim.verdict, number.ends):
             assert letters(text) in told
     for text in ("8 of 16 printed statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
         assert letters(text) in told
@@ -35,7 +38,7 @@ def test_every_claim_is_told_whole() -> None:
 @pytest.mark.parametrize("repeats", [1, 20])
 def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
     long = " ".join(["some words"] * repeats) + "and_one_without_any_end" * repeats
-    claim = Claim(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
+    claim = BenchmarkStatement(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
     findings = replace(
         liu(), experiments=(PaperExperiment("a", long, long, (long,), (claim, claim)), *kim().experiments)
     )
@@ -47,24 +50,30 @@ def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
 
 
 def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
-    claim = Claim("one\ntwo\t three", "a\nb", "c", "reproduced")
+    claim = BenchmarkStatement("one\ntwo\t three", "a\nb", "c", "reproduced")
     told = paper_text(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
     assert "one two three  printed  a b        c         ✓ reproduced" in told
+
+
+def stated(measured: str = "", verdict: Verdict = "cannot tell", **figures: Any) -> BenchmarkStatement:
+    return BenchmarkStatement("", "order", measured, verdict, **figures)
 
 
 @pytest.mark.parametrize(
     ("claim", "told"),
     [
-        (Claim("", "order", "", "cannot tell", "", 7, 0.5, 0.254, 0.746, "deg"), "0.50 deg (0.25 to 0.75)"),
-        (Claim("", "order", "", "cannot tell", "", 7, 0.004, -0.001, 0.01, "deg", p_holm=0.0312),
-         "0.004 deg (−0.001 to 0.010) (p 0.031)"),
-        (Claim("", "order", "", "reproduced", "", 7, 1.0, 0.5, 1.5, p_holm=0.0004), "1.0 (0.5 to 1.5) (p < 0.001)"),
-        (Claim("", "1.25 deg", "1.21 deg", "reproduced", difference=1.21, unit="deg"), ""),
-        (Claim("", "order", "1.21 against 2", "cannot tell", difference=0.79, unit="deg"), "0.79 deg"),
-        (Claim("", "order", "", "not run"), ""),
+        (stated(value=0.5, low=0.254, high=0.746, unit="deg"), "0.50 deg (0.25 to 0.75)"),
+        (
+            stated(value=0.004, low=-0.001, high=0.01, unit="deg", p_holm=0.0312),
+            "0.004 deg (−0.001 to 0.010) (p 0.031)",
+        ),
+        (stated(value=1.0, low=0.5, high=1.5, p_holm=0.0004), "1.0 (0.5 to 1.5) (p < 0.001)"),
+        (stated("1.21 deg", value=1.21, unit="deg"), ""),
+        (stated("1.21 against 2", value=0.79, unit="deg"), "0.79 deg"),
+        (stated(verdict="not run"), ""),
     ],
-)  # fmt: skip
-def test_a_difference_has_its_interval_and_p_and_is_told_once(claim: Claim, told: str) -> None:
+)
+def test_a_difference_has_its_interval_and_p_and_is_told_once(claim: BenchmarkStatement, told: str) -> None:
     (row,) = claims_table([claim]).rows
     assert str(row[4]) == told
 
@@ -135,7 +144,7 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
     assert main(["report", str(folder), "--readme", str(readme)]) == 0
     assert "kim2012-cmu" in readme.read_text()
     assert (folder / "report.html").is_file()
-    assert main(["report", str(folder), "--movie"]) == 2
+    assert main(["report", str(folder), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
     assert "the study of a paper; expected a run." in capsys.readouterr().err
     assert main(["report", str(tmp_path), "--readme", str(readme)]) == 2
     assert "no results of the harness; expected" in capsys.readouterr().err
@@ -152,10 +161,14 @@ def test_the_results_page_has_its_markers() -> None:
 def test_a_printed_statement_has_one_row_with_both_readings() -> None:
     """Names of methods as printed are those of the paper; other kinds of claims are counted below the table."""
     claims = (
-        Claim("a: dynamic_map:literal errs less", "order", "1 against 2 deg", "reproduced", reading="as printed"),
-        Claim("a: dynamic_map errs less", "order", "3 against 2 deg", "not reproduced", reading="ours"),
-        Claim("five modes", "99 %", "95 %", "not comparable"),
-        Claim("b: dynamic_map errs less", "order", "7 against 8 deg", "reproduced", kind="derived", reading="ours"),
+        BenchmarkStatement(
+            "a: dynamic_map:literal errs less", "order", "1 against 2 deg", "reproduced", reading="as printed"
+        ),
+        BenchmarkStatement("a: dynamic_map errs less", "order", "3 against 2 deg", "not reproduced", reading="ours"),
+        BenchmarkStatement("five modes", "99 %", "95 %", "not comparable"),
+        BenchmarkStatement(
+            "b: dynamic_map errs less", "order", "7 against 8 deg", "reproduced", kind="derived", reading="ours"
+        ),
     )
     findings = replace(liu(), experiments=(PaperExperiment("a", "b", "", (), claims),))
     first, second = ([str(cell) for cell in row] for row in statements_table(findings).rows)
