@@ -9,7 +9,7 @@ from harness.errors import BadInput
 
 NORMAL_QUANTILE = 1.959963984540054
 """Half width of a normal 95 % interval, in standard deviations."""
-_MOST_DECIMALS = 6
+_MOST_DECIMALS, _MOST_DIGITS = 6, 7
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,9 @@ class Interval:
         return format_fixed(value, self._decimals(), signed=self.signed, grouped=True)
 
     def _decimals(self) -> int:
-        """Decimals that show two digits of half the width, without zeros that end all three numbers.
+        """Decimals that show two digits of half the width, and at most seven digits of the value.
+
+        Zeros that end all three numbers are left out.
 
         Without a finite width, those of three significant digits; of four where the number is exact.
         """
@@ -131,7 +133,8 @@ class Interval:
         if not (self.has_interval and math.isfinite(half)):
             text = f"{self.value:.{4 if self.low == self.high else 3}g}"
             return len(text.partition(".")[2]) if "e" not in text else 0
-        decimals = decimals_for(half, digits=2, most=_MOST_DECIMALS)
+        most = decimals_for(self.value or half, digits=_MOST_DIGITS, most=_MOST_DECIMALS)
+        decimals = min(decimals_for(half, digits=2, most=_MOST_DECIMALS), most)
         texts = [f"{number:.{decimals}f}" for number in (self.value, self.low, self.high)]
         zeros = min(len(text) - len(text.rstrip("0")) for text in texts) if decimals else 0
         return max(decimals - zeros, 0)

@@ -18,7 +18,7 @@ from harness.errors import BadInput
         (Interval(150.3, 100.0, 200.6), "150 (100 to 201)"),
         (Interval(0.3, -0.0001, 0.6, signed=True, unit="deg"), "+0.3 deg (0.0 to +0.6)"),
         (Interval(0.0, 0.0, 5e-3, unit="%"), "0 % (0.000 to 0.005)"),
-        (Interval(39.9992, 39.999199, 39.999201), "39.999200 (39.999199 to 39.999201)"),
+        (Interval(39.9992, 39.999199, 39.999201), "39.9992 (39.9992 to 39.9992)"),
         (Interval(-1.0, -2.0, math.inf), "−1 (−2 to ∞)"),
         (Interval(2.0, 2.0, 2.0, unit="mm"), "2 mm"),
         (Interval(1.23456), "1.23"),
