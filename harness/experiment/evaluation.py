@@ -20,7 +20,7 @@ from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_process import MethodFailure
-from harness.experiment.method_run import MethodAnswers, describe_failure, stack_estimates
+from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_failure
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.reconstruct.contract import Method
@@ -141,7 +141,7 @@ def evaluate_each(
             raise
         except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
             failure = describe_failure(error)
-            found.append(Evaluation(name, take, stack_estimates([], []), scored=tuple(metrics), failure=failure))
+            found.append(Evaluation(name, take, NO_ANSWERS, scored=tuple(metrics), failure=failure))
     return found
 
 
