@@ -77,11 +77,11 @@ def run_method(reconstructor: Reconstructor, calibration: Calibration, frames: S
         reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
     times_ms = np.array([step_ms, cpu_ms, reference_ms])
     times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
-    return stack_estimates(estimates, *times_ms)
+    return stack_estimates(estimates, times_ms)
 
 
-def stack_estimates(estimates: Sequence[Estimate], *times_ms: Floats) -> MethodAnswers:
-    """The answers of a session from its F estimates and the three times (F,) of its steps, in the order of the fields.
+def stack_estimates(estimates: Sequence[Estimate], times_ms: Floats) -> MethodAnswers:
+    """The answers of a session from its F estimates and the times (3, F) of its steps, in the order of the fields.
 
     ValueError for a lag that changes after the first frames, and for standard deviations in some frames only.
     """
@@ -90,17 +90,20 @@ def stack_estimates(estimates: Sequence[Estimate], *times_ms: Floats) -> MethodA
         raise ValueError(f"the method gave standard deviations in {len(sigma_rad)} of {len(estimates)} frames")
     lags = [estimate.lag for estimate in estimates]
     session_lag(lags)
+    step_ms, step_cpu_ms, reference_cpu_ms = map(immutable, times_ms)
     return MethodAnswers(
         immutable(np.array([estimate.qpos for estimate in estimates]).reshape(-1, QPOS_SIZE)),
         immutable([estimate.status for estimate in estimates], np.int64),
         immutable([estimate.origin for estimate in estimates], np.int64),
-        *map(immutable, times_ms),
+        step_ms,
+        step_cpu_ms,
+        reference_cpu_ms,
         lag=immutable(lags, np.int64),
         angle_sigma_rad=immutable(sigma_rad) if sigma_rad else None,
     )
 
 
-NO_ANSWERS = stack_estimates([], *np.zeros((3, 0)))
+NO_ANSWERS = stack_estimates([], np.zeros((3, 0)))
 """The answers of a method that failed."""
 
 
