@@ -71,7 +71,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "scores": [
             {"method": one.method, "metric": metric, "value": one.metrics[metric]}
             for one in scores
-            for metric in one.scored
+            for metric in one.names
         ],
         "damage": list(found.reader.damage),
     }

@@ -54,7 +54,7 @@ def validation_report(found: Validation, path: Path, command: str, scores: Seque
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         residuals=tuple(_residuals(found, station) for station in registration.errors),
         scores=tuple(
-            ReconstructionScore(one.method, metric, one.metrics[metric]) for one in scores for metric in one.scored
+            ReconstructionScore(one.method, metric, one.metrics[metric]) for one in scores for metric in one.names
         ),
         exchanged=tuple(
             f"{station} is on {body}, not on {found.truth.body_of[station]}: stations are exchanged."
