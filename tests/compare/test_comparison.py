@@ -141,7 +141,7 @@ def test_a_line_names_the_behaviour_that_decides_it() -> None:
     assert (len(line.units), line.verdict) == (16, "better")
     assert describe_parts(comparison, line) == "better for boxing (8 performers), the same elsewhere"
     assert f"✓ ik {ANGLE}: better for boxing (8 performers), the same elsewhere" in text(comparison)
-    page = comparison_page(comparison, ComparisonCharts(), ())
+    page = comparison_page(comparison, ComparisonCharts())
     assert f"{ANGLE}: better for boxing (8 performers), the same elsewhere." in page
     again = found(sides[0], sides[0])
     assert describe_parts(again, again.differences[0]) == "the same for walking (8 performers), boxing (8 performers)"

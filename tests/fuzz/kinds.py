@@ -247,7 +247,8 @@ def _make_paper(folder: Path) -> None:
 
 def _read_paper(folder: Path) -> object:
     findings = read_findings(folder / "findings.json")
-    return text_tables(findings), paper_page(PaperContent(findings, {}, {}, ()))
+    charts = {experiment.name: [None] * len(experiment.figures) for experiment in findings.experiments}
+    return text_tables(findings), paper_page(PaperContent(findings, charts, {}))
 
 
 def _make_placement(folder: Path) -> None:

@@ -33,7 +33,7 @@ _MOST_OPEN, _MOST_NAMED = 24, 4
 
 @dataclass(frozen=True)
 class ComparisonCharts:
-    """The charts of the page; empty without matplotlib."""
+    """The charts of the page."""
 
     slopes: Sequence[Chart] = ()
     """Slope chart of each gated line, in the order of `sort_by_verdict`."""
@@ -43,7 +43,7 @@ class ComparisonCharts:
     """Interval chart of each metric, for lines that are not gated."""
 
 
-def comparison_page(comparison: Comparison, pictures: ComparisonCharts, missing: Sequence[str]) -> str:
+def comparison_page(comparison: Comparison, pictures: ComparisonCharts) -> str:
     """The HTML of the page."""
     lines = sort_by_verdict([line for line in comparison.differences if line.gated])
     rest = sort_by_verdict([line for line in comparison.differences if not (line.gated or line.part)])
@@ -60,7 +60,6 @@ def comparison_page(comparison: Comparison, pictures: ComparisonCharts, missing:
         kicker=f"harness compare · {comparison.b} against {comparison.a}",
         heading=join(word, sentence(comparison)),
         facts=_facts(comparison),
-        missing=missing,
         sections=sections,
         lead=tally_list(count_verdicts(lines), MARKS, MEANINGS) if lines else None,
     )

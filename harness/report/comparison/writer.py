@@ -1,6 +1,5 @@
 """Writes the page of a comparison; re-exports its text for the terminal."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from harness.compare.comparison import Comparison
@@ -15,13 +14,10 @@ __all__ = ["text", "write_comparison_page"]
 
 
 def write_comparison_page(comparison: Comparison, path: Path) -> Path:
-    """Write the page to `path` and return it; its folder is created. Without matplotlib it has only tables."""
-    pictures, missing = ComparisonCharts(), ["Charts: matplotlib is not installed; their numbers are in the tables"]
-    if find_spec("matplotlib") is not None:
-        lines = sort_by_verdict([line for line in comparison.differences if line.gated])
-        slopes = [slope_chart(line, number) for number, line in enumerate(lines, start=1) if line.clips]
-        intervals = interval_charts(comparison, True), interval_charts(comparison, False)
-        pictures, missing = ComparisonCharts(slopes, *intervals), []
+    """Write the page to `path` and return it; its folder is created."""
+    lines = sort_by_verdict([line for line in comparison.differences if line.gated])
+    slopes = [slope_chart(line, number) for number, line in enumerate(lines, start=1) if line.clips]
+    intervals = interval_charts(comparison, True), interval_charts(comparison, False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, comparison_page(comparison, pictures, missing))
+    write_text(path, comparison_page(comparison, ComparisonCharts(slopes, *intervals)))
     return path

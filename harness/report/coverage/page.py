@@ -1,7 +1,5 @@
 """The page of a constellation: emitters heard and dilution of precision, by place and by station."""
 
-from importlib.util import find_spec
-
 from harness.core.number_format import format_fixed
 from harness.report.coverage.content import CoverageContent, format_dilution, place_table, station_table
 from harness.report.kit.document import Section, chart_figure, document
@@ -15,9 +13,7 @@ _DILUTION_NOTE = (
 
 
 def coverage_page(content: CoverageContent) -> str:
-    """The HTML of the page; without matplotlib it has only tables."""
-    can_draw = find_spec("matplotlib") is not None
-    missing = [] if can_draw else ["Charts: matplotlib is not installed; tables show the numbers"]
+    """The HTML of the page."""
     facts = {
         "Emitters": content.emitters,
         "Reach": content.reach,
@@ -26,15 +22,14 @@ def coverage_page(content: CoverageContent) -> str:
         "Made by": content.command,
     }
     sections: list[Section] = [
-        ("By place", "place", _by_place(content, can_draw)),
-        ("By station", "station", _by_station(content, can_draw)),
+        ("By place", "place", _by_place(content)),
+        ("By station", "station", _by_station(content)),
     ]
     return document(
         title=f"{content.name}: harness inspect",
         kicker=f"harness inspect · {content.name}",
         heading=heading(content),
         facts={title: text for title, text in facts.items() if text},
-        missing=missing,
         sections=sections,
     )
 
@@ -52,16 +47,16 @@ def heading(content: CoverageContent) -> str:
     return text
 
 
-def _by_place(content: CoverageContent, can_draw: bool) -> Markup:
+def _by_place(content: CoverageContent) -> Markup:
     from harness.report.coverage.charts import dilution_chart, heard_chart
 
-    charts = [chart_figure(chart(content), 3) for chart in (heard_chart, dilution_chart)] if can_draw else []
+    charts = [chart_figure(chart(content), 3) for chart in (heard_chart, dilution_chart)]
     caption = f"A cube of {2 * content.half_m:g} m on the floor below the middle of the emitters, and squares in it."
     table = html_table(place_table(content.rows), caption, label="Coverage by height")
     return join(tag("p", _DILUTION_NOTE), *charts, table)
 
 
-def _by_station(content: CoverageContent, can_draw: bool) -> Markup:
+def _by_station(content: CoverageContent) -> Markup:
     from harness.report.coverage.charts import station_chart
 
     if not content.stations:
@@ -70,5 +65,7 @@ def _by_station(content: CoverageContent, can_draw: bool) -> Markup:
         f"Shares of the time of {content.clip}, below the middle of its path: direct sound only, past the body, loud "
         "enough for the direction in which the station faces."
     )
-    chart = chart_figure(station_chart(content), 3) if can_draw else None
-    return join(chart, html_table(station_table(content.stations), caption, label="Coverage by station"))
+    return join(
+        chart_figure(station_chart(content), 3),
+        html_table(station_table(content.stations), caption, label="Coverage by station"),
+    )

@@ -1,7 +1,6 @@
 """The page of a trust study: the verdict, the pairs of methods, then what the simulation gets right and wrong."""
 
-from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
+from collections.abc import Mapping
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -51,15 +50,13 @@ _EQUIVALENCE = (
 
 
 def write_trust_page(path: Path, report: TrustReport) -> Path:
-    """Write the page to `path` and return it; its folder is created. Without matplotlib it has only tables."""
-    drawable = find_spec("matplotlib") is not None
-    missing = [] if drawable else ["Charts: matplotlib is not installed (extra viz); tables show their numbers"]
+    """Write the page to `path` and return it; its folder is created."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, trust_page(report, charts(report.findings) if drawable else {}, missing))
+    write_text(path, trust_page(report, charts(report.findings)))
     return path
 
 
-def trust_page(report: TrustReport, drawn: Mapping[str, Chart], missing: Sequence[str]) -> str:
+def trust_page(report: TrustReport, drawn: Mapping[str, Chart]) -> str:
     """The HTML of the page with the charts of `trust_charts.charts`; without its chart a section has its table open."""
     found = report.findings
     word = tag("span", OUTCOME_TITLES[found.outcome], class_=f"big {to_file_name(found.outcome.word)}")
@@ -77,7 +74,6 @@ def trust_page(report: TrustReport, drawn: Mapping[str, Chart], missing: Sequenc
         kicker=f"harness trust · {found.title}",
         heading=join(word, verdict_sentence(found)),
         facts=_facts(found),
-        missing=missing,
         sections=sections,
         lead=_lead(found),
     )

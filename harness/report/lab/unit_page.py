@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -41,15 +40,13 @@ _DEPARTURES = (
 
 
 def write_unit_page(path: Path, report: UnitReport) -> Path:
-    """Write the page to `path` and return it; its folder is created. Without matplotlib it has only tables."""
-    drawable = find_spec("matplotlib") is not None
-    missing = [] if drawable else ["Charts: matplotlib is not installed (extra viz); tables show their numbers"]
+    """Write the page to `path` and return it; its folder is created."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, unit_page(report, charts(report) if drawable else {}, missing))
+    write_text(path, unit_page(report, charts(report)))
     return path
 
 
-def unit_page(report: UnitReport, drawn: Mapping[str, Chart], missing: Sequence[str]) -> str:
+def unit_page(report: UnitReport, drawn: Mapping[str, Chart]) -> str:
     """The HTML of the page, with the charts of `unit_charts.charts`; a section without its chart has its table open."""
     facts = {
         "Capture": capture_text(report.capture),
@@ -76,7 +73,6 @@ def unit_page(report: UnitReport, drawn: Mapping[str, Chart], missing: Sequence[
         kicker="harness characterize",
         heading=answer(report),
         facts={title: text for title, text in facts.items() if text},
-        missing=missing,
         sections=sections,
         lead=_lead(report),
     )

@@ -1,7 +1,6 @@
 """The page of a validated capture: how far it is from its reference, then the registration, then each station."""
 
-from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
+from collections.abc import Mapping
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -41,15 +40,13 @@ _ACCURACY = "Errors of each station after the registration. Below the numbers: 9
 
 
 def write_validation_page(path: Path, report: ValidationReport) -> Path:
-    """Write the page to `path` and return it; its folder is created. Without matplotlib it has only tables."""
-    drawable = find_spec("matplotlib") is not None
-    missing = [] if drawable else ["Charts: matplotlib is not installed (extra viz); tables show their numbers"]
+    """Write the page to `path` and return it; its folder is created."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, validation_page(report, charts(report) if drawable else {}, missing))
+    write_text(path, validation_page(report, charts(report)))
     return path
 
 
-def validation_page(report: ValidationReport, drawn: Mapping[str, Chart], missing: Sequence[str]) -> str:
+def validation_page(report: ValidationReport, drawn: Mapping[str, Chart]) -> str:
     """The HTML of the page, with the charts of `validation_charts.charts`."""
     facts = {
         "Capture": capture_text(report.capture),
@@ -72,7 +69,6 @@ def validation_page(report: ValidationReport, drawn: Mapping[str, Chart], missin
         kicker="harness validate",
         heading=validation_answer(report),
         facts={title: text for title, text in facts.items() if text},
-        missing=missing,
         sections=sections,
         lead=_lead(report),
     )

@@ -28,11 +28,9 @@ class PaperContent:
 
     findings: PaperFindings
     charts: Mapping[str, Sequence[Chart | None]]
-    """Experiment -> its charts, None for a figure without values; empty where matplotlib is missing."""
+    """Experiment -> its charts, None for a figure without values."""
     pages: Mapping[str, str]
     """Folder of a run -> its page or folder, relative to the study's folder; only those that exist."""
-    missing: Sequence[str]
-    """Parts that are not on the page, and why."""
 
 
 def paper_page(content: PaperContent) -> str:
@@ -59,7 +57,6 @@ def paper_page(content: PaperContent) -> str:
         kicker=f"harness paper · {findings.paper} · {findings.motion}",
         heading=sentence(claims),
         facts=facts,
-        missing=content.missing,
         sections=sections,
         lead=tally_list(count_verdicts([c for c in claims if c.kind == "printed"]), MARKS, MEANINGS)
         if claims
@@ -73,7 +70,7 @@ def _experiment(content: PaperContent, experiment: PaperExperiment) -> Markup:
     verdicts = (
         tag("p", tag("a", "Claims of this experiment", href="#claims"), ": ", tag("b", counts), ".") if counts else None
     )
-    charts = content.charts.get(experiment.name) or [None] * len(experiment.figures)
+    charts = content.charts[experiment.name]
     figures = [_figure(figure, chart) for figure, chart in zip(experiment.figures, charts, strict=True)]
     shared = shared_differences(content.findings)
     differences: list[Any] = [inline_code(text) for text in experiment.differences if text not in shared]

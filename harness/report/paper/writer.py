@@ -1,6 +1,5 @@
 """Writes the page of a reproduced paper from its findings."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -14,18 +13,15 @@ from harness.results.folder_kind import FINDINGS
 def write_paper_page(folder: Path) -> Path:
     """Write FOLDER/plots and FOLDER/report.html of the study in `folder`; returns the path of the page.
 
-    Without matplotlib the page has tables instead of figures and says why. BadFile if there are no findings.
+    BadFile if there are no findings.
     """
     findings = read_findings(folder / FINDINGS)
     plots = clear_plots(folder)
-    drawable = find_spec("matplotlib") is not None
-    pictures = charts(findings) if drawable else {}
+    pictures = charts(findings)
     for chart in (chart for figures in pictures.values() for chart in figures if chart):
         chart.write(plots)
     runs = (name for experiment in findings.experiments for name in experiment.runs)
     pages = {name: target for name in runs if (target := run_link(folder, name))}
-    any_figure = any(experiment.figures for experiment in findings.experiments)
-    missing = [] if drawable or not any_figure else ["Figures: matplotlib is not installed; tables show their numbers"]
     path = folder / "report.html"
-    write_text(path, paper_page(PaperContent(findings, pictures, pages, missing)))
+    write_text(path, paper_page(PaperContent(findings, pictures, pages)))
     return path

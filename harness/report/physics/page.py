@@ -1,6 +1,6 @@
 """The page of the tracker's physics: the truth table first, then the error models side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from harness.report.kit.document import Section, chart_figure, document
 from harness.report.kit.markup import Markup, details, join, tag
@@ -16,7 +16,7 @@ from harness.report.physics.tables import (
 from harness.report.physics.truth_table import result_sentence, truth_table
 
 
-def physics_page(comparison: ErrorModelComparison, charts: Mapping[str, Chart], missing: Sequence[str]) -> str:
+def physics_page(comparison: ErrorModelComparison, charts: Mapping[str, Chart]) -> str:
     """The HTML of the page, with the charts of `physics.charts`; a section without its chart has its table open."""
     models = comparison.models
     tables = {
@@ -35,7 +35,6 @@ def physics_page(comparison: ErrorModelComparison, charts: Mapping[str, Chart], 
         kicker="harness bench physics",
         heading=result_sentence(models[0].label, comparison.rows),
         facts={model.label: model.source for model in models},
-        missing=missing,
         sections=sections,
         lead=truth_table(comparison.rows),
     )

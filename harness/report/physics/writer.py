@@ -1,6 +1,5 @@
 """Writes the page of the tracker's physics."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -11,14 +10,9 @@ from harness.report.physics.page import physics_page
 
 
 def write_physics_page(path: Path, comparison: ErrorModelComparison) -> Path:
-    """Write the page to `path` and return it; its folder is created. Without matplotlib it has only tables.
-
-    BadInput without any error model.
-    """
+    """Write the page to `path` and return it; its folder is created. BadInput without any error model."""
     if not comparison.models:
         raise BadInput("There is no error model to show.", "Give at least one.")
-    drawable = find_spec("matplotlib") is not None
-    missing = [] if drawable else ["Charts: matplotlib is not installed (extra viz); tables show their numbers"]
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, physics_page(comparison, charts(comparison) if drawable else {}, missing))
+    write_text(path, physics_page(comparison, charts(comparison)))
     return path

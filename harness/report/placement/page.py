@@ -52,7 +52,7 @@ class PlacementContent:
 
     findings: PlacementFindings
     charts: Mapping[str, Sequence[Chart]]
-    """Section -> its charts (see `placement.charts.charts`, and "body"); empty without matplotlib."""
+    """Section -> its charts (see `placement.charts.charts`, and "body")."""
     missing: Sequence[str]
     """Parts that are not on the page, and why."""
 

@@ -1,6 +1,5 @@
 """Writes the page of a placement study from its findings."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import write_text
@@ -16,7 +15,7 @@ from harness.results.placement_findings import PlacementFindings, read_placement
 def write_placement_page(folder: Path) -> Path:
     """Write FOLDER/plots and FOLDER/report.html of the study in `folder`; returns the path of the page.
 
-    Where charts cannot be drawn the page has tables instead and says why. BadFile if there are no findings.
+    Without a body map the page says why. BadFile if there are no findings.
     """
     findings = read_placement(folder / FINDINGS)
     plots = clear_plots(folder)
@@ -30,8 +29,6 @@ def write_placement_page(folder: Path) -> Path:
 
 def _draw_charts(findings: PlacementFindings) -> tuple[dict[str, list[Chart]], list[str]]:
     """Section -> charts; and the charts that are missing, with the reason."""
-    if find_spec("matplotlib") is None:
-        return {}, ["Figures: matplotlib is not installed (extra viz); tables show their numbers"]
     pictures = [
         draw_body_map(findings.candidates, shown, unit=findings.unit, number=number)
         for number, shown in enumerate(select_body_maps(findings.worth), start=1)

@@ -1,7 +1,6 @@
 """The page of a sweep, written from its index: best method, effect of varied keys, failures, data files."""
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +29,7 @@ _EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario,
 
 
 def write_sweep_page(out: Path) -> Path:
-    """Write OUT/report.html of the sweep in `out` and return its path; BadFile if `out` holds no sweep.
-
-    Without matplotlib the page has only tables.
-    """
+    """Write OUT/report.html of the sweep in `out` and return its path; BadFile if `out` holds no sweep."""
     path = out / "report.html"
     write_text(path, sweep_page(read_sweep(out)))
     return path
@@ -41,19 +37,13 @@ def write_sweep_page(out: Path) -> Path:
 
 def sweep_page(sweep: SweepData) -> str:
     """The HTML of the page."""
-    can_draw, missing = find_spec("matplotlib") is not None, []
     intervals = min(len(sweep.series), MAX_SERIES) * sum(
         len(key.labels) * len(scenarios_varying(sweep, key)[:MAX_SCENARIOS]) for key in sweep.keys
     )
     with_intervals = intervals <= MAX_INTERVALS
-    if sweep.keys and not can_draw:
-        missing.append("Charts: matplotlib is not installed; tables show their numbers")
-    if not with_intervals:
-        missing.append(
-            f"Intervals: {intervals:,} take too long to compute; use fewer values, scenarios or methods to see them"
-        )
+    slow = f"Intervals: {intervals:,} take too long to compute; use fewer values, scenarios or methods to see them"
     sections: list[Section] = [
-        ("Varied keys", "varied", _varied(sweep, with_intervals=with_intervals, can_draw=can_draw)),
+        ("Varied keys", "varied", _varied(sweep, with_intervals=with_intervals)),
         ("Methods by scenario", "scenarios", _scenarios(sweep)),
         ("Failures", "failures", failures(sweep)),
         ("Data files", "table", _files(sweep)),
@@ -63,7 +53,7 @@ def sweep_page(sweep: SweepData) -> str:
         kicker=f"harness sweep · {sweep.name}",
         heading=sentence(sweep),
         facts=_facts(sweep),
-        missing=missing,
+        missing=[] if with_intervals else [slow],
         sections=sections,
     )
 
@@ -79,7 +69,7 @@ def _facts(sweep: SweepData) -> Mapping[str, str]:
     return {title: text for title, text in facts.items() if text}
 
 
-def _varied(sweep: SweepData, *, with_intervals: bool, can_draw: bool) -> Markup:
+def _varied(sweep: SweepData, *, with_intervals: bool) -> Markup:
     """For each key a chart for each scenario that varies it, and the numbers folded."""
     if not sweep.keys:
         return Markup()
@@ -92,12 +82,11 @@ def _varied(sweep: SweepData, *, with_intervals: bool, can_draw: bool) -> Markup
     for key in sweep.keys:
         scenarios = scenarios_varying(sweep, key)
         by_scenario = {n: curves(sweep, key, n, with_intervals=with_intervals) for n in scenarios[:MAX_SCENARIOS]}
-        if can_draw:
-            charts += [chart_panel(sweep_chart(sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
+        charts += [chart_panel(sweep_chart(sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
         if (more := len(scenarios) - len(by_scenario)) > 0:
             text += f" For {key.name}, {more:,} more scenarios are only in summary.csv."
         numbers = [_tables(sweep, key, n, lines) for n, lines in by_scenario.items()]
-        tables.append(details(f"Numbers: {key.name}", *numbers) if can_draw else join(tag("h3", key.name), *numbers))
+        tables.append(details(f"Numbers: {key.name}", *numbers))
     return join(tag("p", text), tag("div", *charts, class_="panels broad") if charts else None, *tables)
 
 

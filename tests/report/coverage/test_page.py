@@ -12,7 +12,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.report.coverage import charts
-from harness.report.coverage import page as coverage_page_module
 from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
 from harness.report.coverage.content import CoverageContent, place_table, station_table
 from harness.report.coverage.page import coverage_page, heading
@@ -63,14 +62,6 @@ def test_a_page_without_a_clip_has_no_stations(tmp_path: Path) -> None:
     text = text_of(written(tmp_path, coverage_page(fabricate_coverage(stations=False))))
     assert "By station" not in text
     assert "Clip" not in text
-
-
-def test_without_matplotlib_the_tables_remain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coverage_page_module, "find_spec", lambda name: None)
-    page = written(tmp_path, coverage_page(fabricate_coverage()))
-    assert "matplotlib is not installed" in text_of(page)
-    assert "no fix" in text_of(page)
-    assert not [tag for tag, _ in read(page).found if tag == "img"]
 
 
 def figure_of(monkeypatch: pytest.MonkeyPatch, chart: Callable[[CoverageContent], Chart]) -> Any:

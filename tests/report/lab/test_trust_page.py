@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from harness.errors import Outcome
-from harness.report.lab import trust_page
 from harness.report.lab.trust_page import write_trust_page
 from harness.report.lab.trust_text import format_trust
 from harness.report.lab.trust_wording import OUTCOME_TITLES, verdict_sentence
@@ -80,16 +79,6 @@ def test_an_empty_study_makes_a_page(tmp_path: Path) -> None:
     page = write_trust_page(tmp_path / "page.html", empty_trust())
     assert section_ids(page) == ["command"]
     assert "nothing was compared" in text_of(page)
-
-
-def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trust_page, "find_spec", lambda name: None)
-    page = write_trust_page(tmp_path / "page.html", made_up_trust())
-    text = text_of(page)
-    assert "matplotlib is not installed" in text
-    assert "Numbers of this chart" not in text
-    assert "−1.70 to −1.10" in text
-    assert not any(name in ("img", "svg") for name, _ in read(page).found)
 
 
 def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path) -> None:

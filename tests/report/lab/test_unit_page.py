@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, ShapeError
-from harness.report.lab import unit_page
 from harness.report.lab.unit_content import DeviationCurve, EpisodeMark, ParameterRow, StationFigures
 from harness.report.lab.unit_page import write_unit_page
 from harness.report.lab.unit_text import format_unit
@@ -81,16 +80,6 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path) -> None:
     page = write_unit_page(tmp_path / "unit.html", without_content())
     assert section_ids(page) == ["parameters", "command"]
     assert "not held to any expected number" in text_of(page)
-
-
-def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unit_page, "find_spec", lambda name: None)
-    page = write_unit_page(tmp_path / "unit.html", made_up_unit())
-    text = text_of(page)
-    assert "matplotlib is not installed" in text
-    assert "Numbers of this chart" not in text
-    assert section_ids(page) == list(SECTIONS)
-    assert not any(name in ("img", "svg") for name, _ in read(page).found)
 
 
 def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path) -> None:

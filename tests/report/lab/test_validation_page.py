@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from harness.errors import ShapeError
 from harness.measure.measured import Measured
 from harness.report.kit.style import to_svg
-from harness.report.lab import validation_page
 from harness.report.lab.validation_charts import charts, largest_of_stretches
 from harness.report.lab.validation_content import ResidualSeries
 from harness.report.lab.validation_page import write_validation_page
@@ -110,13 +109,6 @@ def test_reasons_stand_below_the_accuracy(tmp_path: Path) -> None:
 def test_without_checks_the_answer_has_the_errors_alone() -> None:
     answer = validation_answer(replace(made_up_validation(), checks=()))
     assert answer == ANSWER.partition(" It departs")[0]
-
-
-def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(validation_page, "find_spec", lambda name: None)
-    page = write_validation_page(tmp_path / "page.html", made_up_validation())
-    assert "matplotlib is not installed" in text_of(page)
-    assert not any(name in ("img", "svg") for name, _ in read(page).found)
 
 
 def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path) -> None:

@@ -10,13 +10,12 @@ import pytest
 from harness.cli import main
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import MARKS
-from harness.report.paper import writer
 from harness.report.paper.page import run_link
 from harness.report.paper.verdicts import KINDS, count_verdicts, sentence
 from harness.report.paper.writer import write_paper_page
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings
-from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
+from tests.report.fabricate_paper import curves, liu, sets, write_study
 from tests.report.reading import read, text_of
 from tests.results.rewrite import read_json, write_json
 
@@ -204,22 +203,6 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
     claim = BenchmarkStatement(long, long, long, "cannot tell", long, 3)
     page = alone(tmp_path, replace(EMPTY, title=long, claims=(claim,), figures=(bars, lines)))
     assert text_of(page).count(long) >= 8
-
-
-def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writer, "find_spec", lambda name: None)
-    said = text_of(write_paper_page(write_study(tmp_path, kim())))
-    assert "Missing Figures: matplotlib is not installed; tables show their numbers" in said
-    assert "RH+LH+RA+LA+PEL" in said
-    assert "walking_p1_01: mean joint-angle error [deg]" in said
-    assert not list((tmp_path / "plots").iterdir())
-
-
-def test_a_study_without_figures_misses_nothing_without_matplotlib(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer, "find_spec", lambda name: None)
-    assert "Missing here" not in text_of(alone(tmp_path, EMPTY))
 
 
 def test_old_plots_go(tmp_path: Path) -> None:

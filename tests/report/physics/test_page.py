@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, ShapeError
-from harness.report.physics import writer
 from harness.report.physics.truth_table import result_sentence
 from harness.report.physics.writer import write_physics_page
 from tests.report.fabricate_physics import ROWS, made_up, statistics, without_episodes
@@ -81,16 +80,6 @@ def test_models_without_episodes_have_charts_and_dashes(tmp_path: Path) -> None:
 
 def test_the_same_comparison_gives_the_same_bytes(page: Path, tmp_path: Path) -> None:
     assert write_physics_page(tmp_path / "again.html", made_up()).read_bytes() == page.read_bytes()
-
-
-def test_without_matplotlib_the_tables_are_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writer, "find_spec", lambda name: None)
-    path = write_physics_page(tmp_path / "page.html", made_up())
-    text = text_of(path)
-    assert "matplotlib is not installed" in text
-    assert "Numbers of this chart" not in text
-    assert "number 30 50 30 50" in text
-    assert not any(name in ("img", "svg") for name, _ in read(path).found)
 
 
 def test_records_that_do_not_fit_are_refused(tmp_path: Path) -> None:

@@ -174,18 +174,6 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
     assert {file.suffix for file in (tmp_path / "plots").iterdir()} == {".svg", ".png"}
 
 
-def test_without_matplotlib_there_are_tables(
-    tmp_path: Path, findings: PlacementFindings, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer, "find_spec", lambda name: None)
-    page = write_placement_page(write_made_up(tmp_path, findings))
-    said = text_of(page)
-    assert "matplotlib is not installed" in said
-    assert "<img" not in page.read_text(encoding="utf-8")
-    assert "exhaustive: 3 of 11 places" in said
-    assert "both ankles + right thigh" in said
-
-
 @pytest.mark.usefixtures("unseen")
 def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = write_made_up(tmp_path, replace(made_up(at_most=1), worth=()))
@@ -256,7 +244,7 @@ def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.Monkey
         None,
         "no candidate has a value",
     )
-    monkeypatch.setattr(body, "find_spec", lambda name: None if name == "pyvista" else True)
+    monkeypatch.setattr(body, "find_spec", lambda name: None)
     chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
     assert chart is None
     assert "viz" in missing

@@ -14,6 +14,7 @@ from harness.cli import main
 from harness.compare.paired_statistics import mean_interval
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
+from harness.report.kit.style import Chart
 from harness.report.sweep import page as sweep_page
 from harness.report.sweep.charts import (
     MAX_SERIES,
@@ -54,8 +55,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide matplotlib, for tests that need no charts."""
-    monkeypatch.setattr(sweep_page, "find_spec", lambda name: None)
+    """Draw nothing, for tests that need no charts."""
+    monkeypatch.setattr(sweep_page, "sweep_chart", lambda *args: Chart("undrawn", "", "", "", "<svg></svg>"))
 
 
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
