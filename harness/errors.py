@@ -114,14 +114,15 @@ class UnknownName(HarnessError):
 
 
 class RenamedKey(HarnessError):
-    """A key of a scenario or study that was renamed."""
+    """A key of a scenario, a study or an option that was renamed, or removed: `new` is then a sentence."""
 
     def __init__(self, where: str, old: str, new: str) -> None:
         super().__init__(where, old, new)
         self.where, self.old, self.new = self.args
 
     def __str__(self) -> str:
-        return f"{self.place}{shorten(self.where)}: the key {self.old!r} is now called {self.new!r}. Use the new name."
+        end = f"was removed. {self.new}" if " " in self.new else f"is now called {self.new!r}. Use the new name."
+        return f"{self.place}{shorten(self.where)}: the key {self.old!r} {end}"
 
 
 class ShapeError(HarnessError):

@@ -20,6 +20,7 @@ PACKAGE_OF = {
     "pymotion": "upc-pymotion",
     "pythonosc": "python-osc",
     "serial": "pyserial",
+    "tomli_w": "tomli-w",
 }
 """Packages of the modules whose names differ."""
 DEVELOPMENT = {"test", "dev", "docs"}

@@ -102,7 +102,7 @@ class BundleAdjustment:
             bone_m=skeleton.bone_m,
             weights_m=np.zeros(len(self.shared.space.modes)),
             mount_m=mount_m,
-            bone_from_station=mean_rotations(np.swapaxes(carried, -1, -2) @ self.turn),
+            bone_from_station=rotations.nearest_rotation((np.swapaxes(carried, -1, -2) @ self.turn).mean(axis=0)),
             root_m=self.place_m.mean(axis=1) - (root @ at.place_m.mean(axis=1)[..., None])[..., 0],
             world_from_root=root,
             angles_rad=self.nominal_rad,
@@ -187,17 +187,10 @@ class BundleAdjustment:
         return slope
 
 
-def mean_rotations(turns: Floats) -> Floats:
-    """(S, 3, 3) chordal mean of rotations (P, S, 3, 3) over the first axis."""
-    u, _, v = np.linalg.svd(turns.mean(axis=0))
-    u[..., -1] *= np.linalg.det(u @ v)[..., None]
-    return np.asarray(u @ v)
-
-
 def _tilt(at: CalibrationSolution) -> tuple[Floats, Floats]:
     """(P, 2) sine of the roots' lean on two axes, and its Jacobian (P, 2, 3) in small rotations."""
     up = at.world_from_root[:, 2]
-    turned = np.swapaxes(at.world_from_root, 1, 2) @ np.cross(np.eye(3), [0.0, 0.0, 1.0])
+    turned = np.swapaxes(at.world_from_root, 1, 2) @ rotations.cross_matrix(np.array([0.0, 0.0, 1.0]))
     return np.stack([up[:, 1], -up[:, 0]], axis=1), np.stack([turned[:, 1], -turned[:, 0]], axis=1)
 
 

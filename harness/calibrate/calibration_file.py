@@ -5,7 +5,7 @@ rows. The table `[diagnostics]` is information for people. The first line is a d
 (`core.toml_digest`).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,7 +18,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.output_file import write_output
 from harness.core.skeleton import Skeleton
 from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
-from harness.core.toml_text import format_toml_key, format_toml_value, toml_table_lines
+from harness.core.toml_text import format_toml
 from harness.errors import BadFile, BadInput, HarnessError
 
 EXPECTED = "a calibration"
@@ -99,7 +99,7 @@ class _FileContent:
 
 def write_calibration(path: Path, content: CalibrationFile, *, force: bool = False) -> None:
     """Write a calibration file atomically; BadFile as `require_writable`, BadInput for a skeleton of other joints."""
-    write_output(path, insert_toml_digest("\n".join(_lines(content)) + "\n"), EXPECTED, force=force)
+    write_output(path, insert_toml_digest(_text(content)), EXPECTED, force=force)
 
 
 def read_calibration(path: Path | str) -> CalibrationFile:
@@ -179,34 +179,33 @@ def _require_unit(key: str, quaternion: Sequence[float]) -> None:
         raise ValueError(f"{key} is not a unit quaternion: its length is {length:.6g}")
 
 
-def _lines(content: CalibrationFile) -> Iterator[str]:
+def _text(content: CalibrationFile) -> str:
     calibration = content.calibration
-    yield from (
-        _HEAD_COMMENT,
-        f"schema = {SCHEMA}",
-        f"kind = {format_toml_value(calibration.kind)}",
-        *([f"performer = {format_toml_value(content.performer)}"] if content.performer else []),
-        "",
-        _ROOM_COMMENT,
-        "[room]",
-    )
-    yield f"world_from_tracker = {format_toml_value(calibration.world_from_tracker.tolist())}"
-    yield f"tracker_origin_m = {format_toml_value(calibration.tracker_origin_m.tolist())}"
-    yield from ("", _STATION_COMMENT)
-    for row, name in enumerate(calibration.stations):
-        yield f"[station.{format_toml_key(name)}]"
-        yield f"bone = {format_toml_value(calibration.bones[row])}"
-        yield f"mount_m = {format_toml_value(calibration.mount_m[row].tolist())}"
-        yield f"bone_from_station = {format_toml_value(calibration.bone_from_station[row].tolist())}"
-        yield ""
+    room = {
+        "world_from_tracker": calibration.world_from_tracker.tolist(),
+        "tracker_origin_m": calibration.tracker_origin_m.tolist(),
+    }
+    stations = {
+        name: {
+            "bone": calibration.bones[row],
+            "mount_m": calibration.mount_m[row].tolist(),
+            "bone_from_station": calibration.bone_from_station[row].tolist(),
+        }
+        for row, name in enumerate(calibration.stations)
+    }
+    performer = {"performer": content.performer} if content.performer else {}
+    parts: list[tuple[str, dict[str, Any]]] = [
+        (_HEAD_COMMENT, {"schema": SCHEMA, "kind": calibration.kind, **performer}),
+        (_ROOM_COMMENT, {"room": room}),
+        (_STATION_COMMENT, {"station": stations}),
+    ]
     if content.skeleton is not None:
         standard = standard_skeleton()
         if content.skeleton.names != standard.names or not np.allclose(
             content.skeleton.axes, standard.axes, atol=_UNIT_TOLERANCE
         ):
             raise BadInput("The skeleton has other joints than the body.", "Calibrate on the standard body's joints.")
-        yield from (_BONES_COMMENT, "[bone_m]")
-        for bone, vector_m in zip(BONES, content.skeleton.bone_m.tolist(), strict=True):
-            yield f"{bone} = {format_toml_value(vector_m)}"
-        yield ""
-    yield from (_DIAGNOSTICS_COMMENT, *toml_table_lines("diagnostics", content.diagnostics))
+        bones = dict(zip(BONES, content.skeleton.bone_m.tolist(), strict=True))
+        parts.append((_BONES_COMMENT, {"bone_m": bones}))
+    parts.append((_DIAGNOSTICS_COMMENT, {"diagnostics": content.diagnostics}))
+    return "\n".join(f"{comment}\n{format_toml(tables)}" for comment, tables in parts)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.skeleton import Skeleton
 
@@ -47,7 +48,7 @@ class StationKinematics:
         """(S, B) whether a whole bone lies between the root and the station."""
         self.hinge_turns_station: Bools = (above | np.eye(count, dtype=bool))[self.bones][:, self._hinge_bone]
         """(S, D) whether a hinge rotates the station."""
-        self._cross: Floats = np.cross(np.eye(3), skeleton.axes[:, None])
+        self._cross: Floats = rotations.cross_matrix(skeleton.axes)
         """(D, 3, 3) cross-product matrix of each axis."""
         self._square: Floats = self._cross @ self._cross
 
@@ -96,7 +97,7 @@ class StationKinematics:
         place, turn = np.zeros((2, *at.place_m.shape, 6))
         place[..., :3] = turn[..., 3:] = np.eye(3)
         reach_m = at.place_m - at.root_m[:, None]
-        place[..., 3:] = np.swapaxes(np.cross(np.eye(3), reach_m[..., None, :]), -1, -2)
+        place[..., 3:] = -rotations.cross_matrix(reach_m)
         return place, turn
 
     def hinge_jacobian(self, at: StationPoses) -> tuple[Floats, Floats]:

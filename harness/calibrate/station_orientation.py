@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.body.mounts import Mount, locate_mount
-from harness.calibrate.bundle_adjustment import mean_rotations
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
@@ -53,8 +52,8 @@ def estimate_boresight_rad(world_from_bone: Floats, world_from_station: Floats) 
         room = np.tile(rotations.to_matrix(rotations.exp(start)), (len(turn), 1, 1))
         for _ in range(_ROUNDS):
             back = np.swapaxes(room, -1, -2)
-            mounted = mean_rotations(np.swapaxes(world_from_bone, -1, -2) @ back @ world_from_station)
-            room = mean_rotations(world_from_station @ np.swapaxes(world_from_bone @ mounted, -1, -2))
+            mounted = _mean(np.swapaxes(world_from_bone, -1, -2) @ back @ world_from_station)
+            room = _mean(world_from_station @ np.swapaxes(world_from_bone @ mounted, -1, -2))
         left = _squared_residual(room, world_from_bone, world_from_station)
         rotation_rad = rotations.log(rotations.from_matrix(room))
         turn = np.where((left < best)[:, None], rotation_rad, turn)
@@ -79,6 +78,11 @@ _INITIAL_ROTATIONS_RAD = 0.5 * np.pi * np.concatenate([np.eye(3), -np.eye(3), 2.
 def _squared_residual(room: Floats, world_from_bone: Floats, world_from_station: Floats) -> Floats:
     """(S,) squared residual angles for a rotation in the room, with the mounts that fit best [rad^2]."""
     turned = room @ world_from_bone
-    mounted = mean_rotations(np.swapaxes(turned, -1, -2) @ world_from_station)
+    mounted = _mean(np.swapaxes(turned, -1, -2) @ world_from_station)
     off = rotations.log(rotations.from_matrix(np.swapaxes(turned @ mounted, -1, -2) @ world_from_station))
     return np.asarray(np.sum(off**2, axis=(0, 2)))
+
+
+def _mean(turns: Floats) -> Floats:
+    """(S, 3, 3) mean of rotations (P, S, 3, 3) over poses."""
+    return rotations.nearest_rotation(turns.mean(axis=0))

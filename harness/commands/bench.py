@@ -59,7 +59,7 @@ def add_bench(verbs: Verbs) -> None:
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
     verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")
-    text = "accuracy: one seed, three clips, no verdict; ranking: two performers, three methods and sets"
+    text = "accuracy: one seed, three clips, no verdict (exit code 3); ranking: two performers, three methods and sets"
     verb.add_argument("--quick", action="store_true", default=None, help=text)
 
 

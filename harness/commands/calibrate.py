@@ -107,7 +107,7 @@ def _draw_sheet(args: argparse.Namespace) -> Outcome:
 
 
 def _measure_accuracy(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.calibration_accuracy import measure_calibration_accuracy
+    from harness.bench.calibration_accuracy import measure_calibration_accuracy
     from harness.simulate.noise import noise_preset
 
     given = {"noise": args.noise, "seed": args.seed}

@@ -15,7 +15,6 @@ REMOVED_FLAGS: Mapping[str, Mapping[str, str]] = {
         "--name": "A unit has the name of its recording: rename the recording",
         "--capture": "The recording lies beside --out with the suffix .rec: move it afterwards",
     },
-    "doctor": {"--clean": "`harness doctor` names the folder of the machine code: remove that folder"},
     "emulate": {
         "--overload": _SCENARIO.format("set tracker.overload = true in it"),
         "--no-faults": _SCENARIO.format("remove its tables [[fault]]"),

@@ -53,7 +53,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
         scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
     report = found.report(args.capture)
-    errors = {one.method: {metric: one.metrics[metric] for metric in one.scored} for one in scores}
+    errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
     page = validation_page(report, errors, this_command())
     content = {
         "truth": truth.title,

@@ -27,6 +27,16 @@ def cache_folder() -> Path | None:
     return next((folder for folder in _candidates() if _make_private(folder)), None)
 
 
+def remove_cache() -> int:
+    """Remove the folder wherever it may lie; the number of bytes that were removed."""
+    folders = [folder for folder in _candidates() if folder.is_dir() and _is_private(folder)]
+    size_bytes = sum(map(folder_bytes, folders))
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    cache_folder.cache_clear()
+    return size_bytes - sum(map(folder_bytes, folders))
+
+
 def folder_bytes(folder: Path) -> int:
     """Size of all files below a folder, 0 where there is none [bytes]."""
     sizes = []

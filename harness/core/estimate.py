@@ -11,6 +11,10 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
 
+LOST_AFTER_S = 0.5
+"""Time without enough readings after which an estimate is LOST, and without any after which a station is [s]."""
+LOST_AFTER_ADVICE = f"Leave it out: an estimate is LOST after {LOST_AFTER_S:g} s."
+"""For `RENAMED_KEYS` of methods, where it was an option."""
 QPOS_SIZE = 55
 """Size of a configuration of the body."""
 MAX_POSE_VALUE, MIN_QUATERNION = 1e6, 1e-6
@@ -29,7 +33,7 @@ class Status(IntEnum):
     HELD = 1
     """There were too few readings; the pose is extrapolated from earlier ones."""
     LOST = 2
-    """For more than 0.5 s fewer than half of the configured stations had readings."""
+    """For more than `LOST_AFTER_S` fewer than half of the configured stations had readings."""
 
 
 class Origin(IntEnum):

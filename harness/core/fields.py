@@ -66,7 +66,7 @@ def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite
 
 
 def _refuse_unknown_keys(kind: type, content: Mapping[str, Any], fields: Iterable[str], where: str) -> None:
-    """Raises RenamedKey for a key of `kind.RENAMED_KEYS` (old name -> new name), UnknownName for any other."""
+    """Raises RenamedKey for a key of `kind.RENAMED_KEYS` (old name -> new name or advice), UnknownName for others."""
     renamed: Mapping[str, str] = getattr(kind, "RENAMED_KEYS", {})
     for key in content:
         if key in renamed:

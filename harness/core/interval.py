@@ -9,6 +9,8 @@ from harness.errors import BadInput
 
 NORMAL_QUANTILE = 1.959963984540054
 """Half width of a normal 95 % interval, in standard deviations."""
+CHI_QUANTILE = 2.795483482915108
+"""95 % quantile of the length of a vector of three standard normal numbers."""
 _MOST_DECIMALS, _MOST_DIGITS = 6, 7
 
 

@@ -96,6 +96,31 @@ def from_matrix(matrix: Floats) -> Floats:
     return np.asarray(q, dtype=float).reshape(*m.shape[:-2], 4)
 
 
+def nearest_rotation(matrix: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) nearest to matrices (..., 3, 3) in the sum of squares (Kabsch 1976)."""
+    u, _, v = np.linalg.svd(matrix)
+    u[..., -1] *= np.linalg.det(u @ v)[..., None]  # no reflection
+    out: Floats = u @ v
+    return out
+
+
+def mean_rotation(quaternions: Floats) -> Floats:
+    """The mean (4,) of orientations (N, 4) in the sum of squares of matrices; rows of NaN are left out.
+
+    It is the one of Markley et al. 2007 (J. Guid. Control Dyn. 30).
+    """
+    return from_matrix(nearest_rotation(np.nanmean(to_matrix(quaternions), axis=0)))
+
+
+def cross_matrix(vector: Floats) -> Floats:
+    """Matrices (..., 3, 3) of the cross products with vectors (..., 3)."""
+    v = np.asarray(vector, dtype=float)
+    out = np.zeros((*v.shape, 3))
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = v[..., 0], v[..., 1], v[..., 2]
+    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -v[..., 0], -v[..., 1], -v[..., 2]
+    return out
+
+
 def continuous(quaternions: Floats) -> Floats:
     """Rotations (T, ..., 4) with signs chosen such that consecutive quaternions have no negative inner product."""
     q = np.array(quaternions, dtype=float)

@@ -44,6 +44,9 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
 
 VariedValues = Mapping[str, Any]
+_ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
+_READINGS = ("quality", "position_valid", "orientation_valid", "suspect")
+"""Fields of a method's answers and of frames that a cell has under the same names."""
 
 
 @dataclass(frozen=True)
@@ -194,8 +197,7 @@ def evaluate_cell(
     too_slow = excess_loss(health, allowed=scenario.tracker.overload) > 0.0
     if too_slow:
         health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
-    position_valid = np.array([f.position_valid for f in frames])
-    orientation_valid = np.array([f.orientation_valid for f in frames])
+    readings = {name: np.array([getattr(frame, name) for frame in frames]) for name in _READINGS}
     scores = score_estimate(
         evaluation.body.skeleton,
         scenario.tracker.rate_hz,
@@ -205,7 +207,7 @@ def evaluate_cell(
         answers.status,
         answers.step_ms,
         origin=answers.origin,
-        complete=(position_valid & orientation_valid).all(axis=1),
+        complete=(readings["position_valid"] & readings["orientation_valid"]).all(axis=1),
         cpu_ms=(answers.step_cpu_ms, answers.reference_cpu_ms),
         angle_sigma_rad=answers.angle_sigma_rad,
         estimate_skeleton=calibration.body.skeleton,
@@ -240,17 +242,9 @@ def evaluate_cell(
         time_s=simulation.truth_s[frame_index],
         truth_qpos=simulation.truth_qpos[frame_index],
         estimate_qpos=answers.qpos,
-        angle_sigma_rad=answers.angle_sigma_rad,
         frame_index=frame_index,
-        status=answers.status,
-        origin=answers.origin,
-        step_ms=answers.step_ms,
-        step_cpu_ms=answers.step_cpu_ms,
-        reference_cpu_ms=answers.reference_cpu_ms,
-        quality=np.array([f.quality for f in frames]),
-        position_valid=position_valid,
-        orientation_valid=orientation_valid,
-        suspect=np.array([f.suspect for f in frames]),
+        **{name: getattr(answers, name) for name in _ANSWERS},
+        **readings,
     )
 
 

@@ -20,7 +20,7 @@ from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_process import MethodFailure
-from harness.experiment.method_run import MethodAnswers, describe_failure, stack_estimates
+from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_failure
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.reconstruct.contract import Method
@@ -44,7 +44,7 @@ class Evaluation:
     """Number of later frames that the method uses for each estimate."""
     seconds: float = 0.0
     """Wall time of training and of all steps [s]."""
-    scored: tuple[str, ...] = tuple(FRAME_METRICS)
+    names: tuple[str, ...] = tuple(FRAME_METRICS)
     """The errors that are computed, of `FRAME_METRICS`."""
     failure: str = ""
     """Why the method has no answers, as for a failed cell; "" if it has them."""
@@ -59,7 +59,12 @@ class Evaluation:
         """The errors of each frame, over all loops of the take."""
         take, skeleton = self.take, self.take.clip.performer_calibration.body.skeleton
         return score_loops(
-            take.truth, take.rate_hz, self.answers.qpos, take.loops, metrics=self.scored, estimate_skeleton=skeleton
+            take.truth,
+            take.rate_hz,
+            self.answers.qpos,
+            take.loops,
+            metrics=self.names,
+            estimate_skeleton=skeleton,
         )
 
     @property
@@ -111,10 +116,8 @@ def evaluate(
     It sees the frames of these `stations`, by default of all, and learns from what the take's clip allows, or from
     `learnt_from`. Whatever the method raises is raised.
     """
-    frames, calibration = (
-        take.copy_frames(stations),
-        take.calibration.of_stations(stations or take.calibration.stations),
-    )
+    stations = stations or take.calibration.stations
+    frames, calibration = take.copy_frames(stations), take.calibration.of_stations(stations)
     start = time.perf_counter()
     fitted = (learnt_from or take.clip).fit_method(method, name)
     answers, lag = run_over_frames(fitted, calibration, frames).by_frame()
@@ -141,7 +144,7 @@ def evaluate_each(
             raise
         except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
             failure = describe_failure(error)
-            found.append(Evaluation(name, take, stack_estimates([], []), scored=tuple(metrics), failure=failure))
+            found.append(Evaluation(name, take, NO_ANSWERS, names=tuple(metrics), failure=failure))
     return found
 
 

@@ -83,9 +83,9 @@ class ObservedTake:
         """The fields of all frames (F, S, ...)."""
         return [np.array([getattr(frame, name) for frame in self.frames]) for name in TrackerFrame.__slots__]
 
-    def copy_frames(self, stations: Sequence[str] = ()) -> list[TrackerFrame]:
-        """New frames of these stations, by default of all, in memory that nobody else sees."""
-        rows = [self.calibration.stations.index(name) for name in stations or self.calibration.stations]
+    def copy_frames(self, stations: Sequence[str]) -> list[TrackerFrame]:
+        """New frames of these stations, in memory that nobody else sees."""
+        rows = [self.calibration.stations.index(name) for name in stations]
         received_s, *arrays = self._columns
         return split_frames(received_s.tolist(), *(array[:, rows] for array in arrays))
 

@@ -166,25 +166,33 @@ def registered_take(
     rows = np.flatnonzero(inside & (loop == most))
     if len(rows) < 2.0 * WARM_UP_S * rate_hz:
         raise BadInput(f"{len(rows)} frames lie inside the reference.", "Record the motion of the reference.")
-    period = (time_s[rows] - time_s[rows[0]]) * rate_hz
-    phase = time_s[rows[0]] * rate_hz + float(np.median(period - np.round(period)))
-    phase -= np.round(phase)  # of the frames in the grid of the rate, so that jitter moves none into another's place
-    number = np.round(time_s[rows] * rate_hz - phase).astype(np.int64)
+    number, begin_s = frame_numbers(time_s[rows], rate_hz)
     kept = _strictly_increasing_rows(np.arange(len(rows)), number)
     rows, index = rows[kept], number[kept]
     known_s = stamps_s[rows] - (most * loop_s if most else 0.0)
-    sample_s = np.repeat((np.arange(index[-1] + 1.0)[:, None] + phase) / rate_hz, len(mounts), axis=1)
+    sample_s = np.repeat(begin_s + np.arange(index[-1] + 1.0)[:, None] / rate_hz, len(mounts), axis=1)
     sample_s[index] = np.where(np.isfinite(known_s), known_s, sample_s[index])
-    sample_s = np.clip(sample_s, 0.0, motion.duration_s)
     return ObservedTake(
         playback.clip_evaluation,
         motion,
         tuple(frames[rows[0] : rows[-1] + 1]),
         calibration,
         (LoopFrames(rows - rows[0], index),),
-        sample_s,
+        np.clip(sample_s, 0.0, motion.duration_s),
         rate_hz,
     )
+
+
+def frame_numbers(time_s: Floats, rate_hz: float) -> tuple[Ints, float]:
+    """Number of each frame (N,) in the grid of a rate that fits their times best, and the time of number 0 [s].
+
+    Numbers count from the time zero. Jitter of less than half a period moves no frame into the place of another.
+    """
+    periods = time_s * rate_hz
+    since = periods - periods[0]
+    phase = periods[0] + float(np.median(since - np.round(since)))
+    phase -= np.round(phase)
+    return np.round(periods - phase).astype(np.int64), float(phase) / rate_hz
 
 
 def _row_means(values: Floats) -> Floats:

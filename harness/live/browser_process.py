@@ -11,9 +11,10 @@ import numpy as np
 
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats
+from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput
-from harness.live.line_history import LineHistory
+from harness.live.live_statistics import LiveStatistics
 from harness.live.pose_ring import PoseRing
 from harness.view.live_page import LiveContent
 from harness.view.server import ViewServer
@@ -69,7 +70,7 @@ def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
     skeleton = humanoid24.standard_skeleton().with_bones(config.bone_m)
     token, commands = secrets.token_urlsafe(24), RecordingCommands(pipe)
     content = LiveContent(config.title, skeleton, config.stations, token)
-    history, seen, status_s = LineHistory(len(config.stations), time.monotonic()), 0, 0.0
+    statistics, seen, status_s = LiveStatistics(config.stations, time.monotonic), 0, 0.0
     with ViewServer(content.find, {"record": commands.record}, token=token) as server:
         pipe.send(server.url)
         try:
@@ -79,14 +80,13 @@ def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
                 seen, records = ring.read(seen)
                 stations = ring.station_columns(records)
                 for head, columns in zip(records[:, :4], stations, strict=True):
-                    history.add(head[1], head[2], columns[:, 7], np.maximum(columns[:, 8], columns[:, 9]))
+                    statistics.add(PoseRing.frame(head, columns), Status(int(head[3])), float(head[2]))
                 if len(records):
                     server.publish("frame", _frame(config, skeleton, records[-1:], stations[-1]))
-                now_s = time.monotonic()
-                history.update(now_s)
-                if now_s - status_s >= _STATUS_PERIOD_S:
+                statistics.update()
+                if (now_s := time.monotonic()) - status_s >= _STATUS_PERIOD_S:
                     status_s = now_s
-                    server.publish("status", {**history.content(now_s), "recording": commands.path})
+                    server.publish("status", {**statistics.page_content(), "recording": commands.path})
         except (EOFError, ConnectionError):  # the session has closed the pipe, or was killed
             return
 

@@ -7,18 +7,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.estimate import Status
+from harness.core.estimate import LOST_AFTER_S, Status
 from harness.core.number_format import format_fixed
 from harness.stream.frame import TrackerFrame
+from harness.stream.station_counts import StationCounts
 
 SECONDS_KEPT = 60
 """Number of summaries that are kept."""
-NO_DATA_S = 0.5
-"""Time without a frame, or without a reading of a station, that is reported [s]; the driver's own limit."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,17 @@ class SecondSummary:
     """Mean quality of each station, 0 (lost) to 1; 0 without frames."""
     loss: tuple[float, ...]
     """Share of the frames without a valid reading of each station, 0 to 1; 1 without frames."""
+
+    def page_content(self) -> dict[str, Any]:
+        """The values of the live page's charts; loss is the mean over the stations."""
+        p50, p99 = (None if ms is None else round(ms, 3) for ms in (self.latency_p50_ms, self.latency_p99_ms))
+        return {
+            "rate_hz": round(self.rate_hz, 2),
+            "p50_ms": p50,
+            "p99_ms": p99,
+            "loss": round(sum(self.loss) / max(len(self.loss), 1), 4),
+            "quality": [round(one, 3) for one in self.quality],
+        }
 
 
 class LiveStatistics:
@@ -70,7 +81,7 @@ class LiveStatistics:
                 self._seen_s[:] = now_s
             self._frame_s = now_s
             self._seen_s[valid] = now_s
-            self._second.add(frame.quality, valid, status, latency_s)
+            self._second.add(frame, status, latency_s)
 
     def update(self, dropped: int = 0) -> list[str]:
         """Close a second that is over; `dropped` is the number of frames dropped so far.
@@ -84,7 +95,7 @@ class LiveStatistics:
             second, began_s = self._second, self._second_s
             if over := now_s - began_s >= 1.0:
                 self._second, self._second_s = _Second(len(self.stations)), now_s
-            missing = self._frame_s - self._seen_s > NO_DATA_S
+            missing = self._frame_s - self._seen_s > LOST_AFTER_S
             seen_s = self._seen_s.copy()
         if over:
             self._summaries.append(second.summary(now_s - self._began_s, now_s - began_s, dropped - self._dropped))
@@ -102,12 +113,27 @@ class LiveStatistics:
         """Time since the last frame [s]."""
         return self._clock() - self._frame_s
 
+    @property
+    def is_silent(self) -> bool:
+        """Whether no frame has come for `LOST_AFTER_S`."""
+        return self.silent_s() > LOST_AFTER_S
+
+    def page_content(self) -> dict[str, Any]:
+        """What the live page shows: the summaries, which stations are lost, and for how long no frame came [s]."""
+        silent = self.is_silent
+        return {
+            "seconds": [one.page_content() for one in self._summaries],
+            "lost": [silent or gone for gone in self._missing.tolist()],
+            "silent": silent,
+            "silent_s": round(self.silent_s(), 1),
+        }
+
     def status_line(self) -> str:
         """The last second in one line; "" before the first second is over."""
         if not self._summaries:
             return ""
         last = self._summaries[-1]
-        if self.silent_s() > NO_DATA_S:
+        if self.is_silent:
             return f"no data for {format_fixed(self.silent_s(), 1)} s"
         latency = "latency -"
         if last.latency_p50_ms is not None and last.latency_p99_ms is not None:
@@ -129,13 +155,11 @@ class _Second:
     def __init__(self, stations: int) -> None:
         self.held = self.lost = 0
         self.latency_s: list[float] = []
-        self.quality: Floats = np.zeros(stations)
-        self.valid: Floats = np.zeros(stations)
+        self.counts = StationCounts(stations)
 
-    def add(self, quality: Floats, valid: Bools, status: Status, latency_s: float) -> None:
+    def add(self, frame: TrackerFrame, status: Status, latency_s: float) -> None:
         self.latency_s.append(latency_s)
-        self.quality += np.where(valid, quality, 0.0)
-        self.valid += valid
+        self.counts.add(frame)
         self.held += status is Status.HELD
         self.lost += status is Status.LOST
 
@@ -150,6 +174,6 @@ class _Second:
             dropped=dropped,
             latency_p50_ms=None if p50 is None else float(p50),
             latency_p99_ms=None if p99 is None else float(p99),
-            quality=tuple((self.quality / max(frames, 1)).tolist()),
-            loss=tuple((1.0 - self.valid / max(frames, 1)).tolist()),
+            quality=tuple(self.counts.mean_quality.tolist()),
+            loss=tuple(self.counts.loss.tolist()),
         )

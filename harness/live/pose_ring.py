@@ -6,6 +6,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.live.pose import LivePose
+from harness.stream.frame import TrackerFrame
 
 _HEAD, _QPOS, _STATION = 4, 55, 10
 _CAPACITY = 1024
@@ -69,3 +70,13 @@ class PoseRing:
         """(N, S, 10) columns of the stations of records."""
         out: Floats = records[:, _HEAD + _QPOS :].reshape(len(records), self.stations, _STATION)
         return out
+
+    @staticmethod
+    def frame(head: Floats, columns: Floats) -> TrackerFrame:
+        """The readings of a record: its first numbers (4,), and the columns (S, 10) of its stations."""
+        times_s, nothing = np.full(len(columns), head[1]), np.zeros(len(columns), bool)
+        position_valid, orientation_valid = columns[:, 8] > 0.0, columns[:, 9] > 0.0
+        return TrackerFrame(
+            float(head[1]), times_s, columns[:, :3], columns[:, 3:7], position_valid, orientation_valid, columns[:, 7],
+            nothing,
+        )  # fmt: skip

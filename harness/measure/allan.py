@@ -39,10 +39,10 @@ class AllanDeviation:
     @property
     def interval(self) -> Floats:
         """(K, 2) ends of the 95 % interval of the deviation, by the chi-squared distribution; NaN without a pair."""
-        from scipy.stats import chi2
+        from scipy.special import chdtri
 
         freedom = np.where(self.pairs > 0, self.freedom, np.nan)
-        low, high = (np.sqrt(freedom / chi2.ppf(tail, freedom)) for tail in (0.975, 0.025))
+        low, high = (np.sqrt(freedom / chdtri(freedom, tail)) for tail in (0.025, 0.975))
         return np.stack([self.deviation * low, self.deviation * high], axis=1)
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.compiled import compiled
 from harness.measure.gauss_markov import series_log_likelihood
+from harness.measure.whitening import kalman_gains, whiten
 
 _LEAST, _MOST = np.log([1e-9, 1e-9, 0.05]), np.log([10.0, 10.0, 30.0])
 
@@ -28,7 +28,8 @@ class ErrorProcess:
     def whiten(self, values: Floats, valid: Bools, period_s: float) -> Floats:
         """Filter the columns (N, C) of one axis, sampled every `period_s` [s]; rows that are not valid become zero."""
         correlation = float(np.exp(-period_s / self.correlation_s))
-        return _whiten(np.ascontiguousarray(values), valid, correlation, self.drift**2, self.white**2)
+        gain, deviation = kalman_gains(valid, correlation, self.drift**2, self.white**2)
+        return whiten(np.ascontiguousarray(values), valid, gain, deviation, correlation)
 
 
 def fit_process(errors: Floats, valid: Bools, period_s: float) -> ErrorProcess:
@@ -53,26 +54,3 @@ def fit_process(errors: Floats, valid: Bools, period_s: float) -> ErrorProcess:
     found: Any = optimize.minimize(cost, start, method="Nelder-Mead", options=options)  # type: ignore[call-overload]  # its stubs know no simplex
     white, drift, correlation_s = np.exp(np.clip(found.x, _LEAST, _MOST)).tolist()
     return ErrorProcess(white, drift, correlation_s)
-
-
-@compiled
-def _whiten(values: Floats, valid: Bools, correlation: float, drift_variance: float, white_variance: float) -> Floats:
-    count, columns = values.shape
-    out = np.zeros((count, columns))
-    state = np.zeros(columns)
-    variance = drift_variance  # stationary before the first sample
-    for i in range(count):
-        variance = correlation**2 * variance + drift_variance * (1.0 - correlation**2)
-        for c in range(columns):
-            state[c] *= correlation
-        if not valid[i]:
-            continue
-        innovation_variance = variance + white_variance
-        gain = variance / innovation_variance
-        deviation = np.sqrt(innovation_variance)
-        for c in range(columns):
-            innovation = values[i, c] - state[c]
-            state[c] += gain * innovation
-            out[i, c] = innovation / deviation
-        variance *= 1.0 - gain
-    return out

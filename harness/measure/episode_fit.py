@@ -85,7 +85,7 @@ class EpisodeFit:
     found: tuple[SeriesEpisodes, ...]
 
 
-def find_episodes(
+def find_disturbances(
     series: Sequence[StaticSeries], noise: ExcursionNoise
 ) -> tuple[list[SeriesEpisodes], list[ExcursionSearch]]:
     """Find the episodes of each series among noise of this size, and what the search for excursions leaves."""
@@ -109,7 +109,7 @@ def find_episodes(
 
 def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> EpisodeFit:
     """Find the episodes of stations at rest and fit their parameters."""
-    found, searches = find_episodes(series, noise)
+    found, searches = find_disturbances(series, noise)
     parameters, means = _fit_echoes(found)
     gap_parameters, gap_means = _fit_gaps(found, noise)
     excursion_parameters, excursion_means = _fit_excursions(found, searches, noise)

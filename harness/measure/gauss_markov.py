@@ -1,4 +1,4 @@
-"""White noise and first-order Gauss-Markov drift of readings at rest: parameters, likelihood and whitening.
+"""White noise and first-order Gauss-Markov drift of readings at rest: parameters and likelihood.
 
 Each axis of a series is a constant, plus drift with the covariance s^2 exp(-t / tau), plus white noise. The likelihood
 is that of a Kalman filter over the records that are used, so it is exact with any gaps (Schweppe 1965, IEEE Trans.
@@ -52,18 +52,6 @@ class NoiseSample:
         return out
 
 
-def whiten(columns: Floats, used: Bools, rate_hz: float, white: float, drift: float, correlation_s: float) -> Floats:
-    """Innovations of columns (N, A) over their standard deviations, for noise with these parameters; NaN if not used.
-
-    Noise becomes independent normal values of unit variance. The map is linear, so it applies to a signal that is
-    added to the noise as well.
-    """
-    correlation = math.exp(-1.0 / (rate_hz * correlation_s))
-    return _whiten(
-        np.ascontiguousarray(columns, np.float64), np.ascontiguousarray(used), correlation, drift**2, white**2
-    )
-
-
 @compiled
 def series_log_likelihood(
     columns: Floats, used: Bools, correlation: float, drift_variance: float, white_variance: float
@@ -115,27 +103,4 @@ def series_log_likelihood(
         misfit += squares[axis] - crosses[axis] * crosses[axis] / ones
     constant = (count - 1) * math.log(2.0 * math.pi)
     out: float = -0.5 * (misfit + axes * (total + math.log(ones) + constant))
-    return out
-
-
-@compiled
-def _whiten(columns: Floats, used: Bools, correlation: float, drift_variance: float, white_variance: float) -> Floats:
-    """Innovations of columns (N, A) over their standard deviations; NaN where not used."""
-    rows, axes = columns.shape
-    out = np.full((rows, axes), np.nan)
-    predicted = np.zeros(axes)
-    variance, noise = drift_variance, drift_variance * (1.0 - correlation * correlation)
-    for row in range(rows):
-        innovation = variance + white_variance
-        gain = variance / innovation
-        scale = 1.0 / math.sqrt(innovation)
-        for axis in range(axes):
-            if used[row]:
-                error = columns[row, axis] - predicted[axis]
-                out[row, axis] = error * scale
-                predicted[axis] += gain * error
-            predicted[axis] *= correlation
-        if used[row]:
-            variance *= white_variance / innovation
-        variance = correlation * correlation * variance + noise
     return out

@@ -83,14 +83,9 @@ def second_spread_rad(quaternions: Floats) -> float:
     """RMS rotation about the second axis of orientations (N, 4) relative to their mean [rad]; 0 without any."""
     if not len(quaternions):
         return 0.0
-    mean = _mean_quaternion(quaternions)
+    mean = rotations.mean_rotation(quaternions)
     turns = rotations.log(rotations.multiply(rotations.inverse(mean), quaternions))
     return float(np.sqrt(max(np.linalg.eigvalsh(turns.T @ turns / len(turns))[1], 0.0)))
-
-
-def _mean_quaternion(quaternions: Floats) -> Floats:
-    out: Floats = np.linalg.eigh(quaternions.T @ quaternions)[1][:, -1]
-    return out
 
 
 def _solve_rotations(stations: Sequence[PosePairs]) -> tuple[Floats, Floats]:
@@ -106,16 +101,13 @@ def _solve_rotations(stations: Sequence[PosePairs]) -> tuple[Floats, Floats]:
         sums.append(np.einsum("nij,nkl->iklj", reported, body).reshape(9, 9))
     left, _, _ = np.linalg.svd(np.concatenate(sums, axis=1))
     room = _nearest_rotation(left[:, 0].reshape(3, 3))
-    mounts = [_nearest_rotation((total.T @ room.reshape(9)).reshape(3, 3)) for total in sums]
-    return rotations.from_matrix(room), rotations.from_matrix(np.array(mounts))
+    mounts = _nearest_rotation(np.array([(total.T @ room.reshape(9)).reshape(3, 3) for total in sums]))
+    return rotations.from_matrix(room), rotations.from_matrix(mounts)
 
 
 def _nearest_rotation(matrix: Floats) -> Floats:
-    """The rotation nearest to a multiple, of either sign, of a matrix (3, 3)."""
-    matrix = matrix * np.sign(np.linalg.det(matrix))
-    u, _, v = np.linalg.svd(matrix)
-    out: Floats = u @ v
-    return out
+    """The rotations nearest to multiples, of either sign, of matrices (..., 3, 3)."""
+    return rotations.nearest_rotation(matrix * np.sign(np.linalg.det(matrix))[..., None, None])
 
 
 def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bool) -> tuple[Floats, float, Floats]:

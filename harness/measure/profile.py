@@ -17,7 +17,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
-from harness.measure.episode_fit import EpisodeFit, find_episodes, fit_episodes
+from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
 from harness.measure.excursions import ExcursionNoise
 from harness.measure.noise_fit import NoiseFit, fit_noise
 from harness.measure.noise_start import start_values
@@ -228,7 +228,7 @@ def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit
     """Noise and episodes, in turn: each is found better once the other is known."""
     nothing: list[Bools] = [np.zeros(len(one), bool) for one in rest]
     start = np.exp(start_values(rest, nothing))
-    found, _ = find_episodes(rest, ExcursionNoise(float(start[0]), float(start[1]), float(start[5])))
+    found, _ = find_disturbances(rest, ExcursionNoise(float(start[0]), float(start[1]), float(start[5])))
     progress("fitting the noise", 1, 3)
     noise = fit_noise(rest, [one.disturbed for one in found], by_station=False)
     progress("fitting the episodes", 2, 3)

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.conventions import (
@@ -161,7 +161,7 @@ class Registration:
     def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
         """World coordinates of a point (3,) given in the tracker's frame, without the scale error [m]."""
         at_m = rotations.rotate(self.world_from_tracker, point_m)
-        turn = rotations.to_matrix(self.world_from_tracker) @ _cross_matrix(point_m)
+        turn = rotations.to_matrix(self.world_from_tracker) @ rotations.cross_matrix(point_m)
         slope = np.concatenate([turn, np.eye(3)], axis=1)
         deviation = np.sqrt(np.diag(slope @ self.room_covariance @ slope.T))
         x, y, z = (
@@ -394,15 +394,4 @@ def _length(vector: Floats, covariance: Floats, blocks: int) -> Interval:
     largest = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     along = vector / length if length > 0.0 else np.zeros(3)
     deviation = float(np.sqrt(along @ covariance @ along)) if length > 3.0 * largest else largest
-    return Interval.normal(length, deviation * _CHI_QUANTILE / NORMAL_QUANTILE, blocks, least=0.0)
-
-
-_CHI_QUANTILE = 2.795483482915108
-"""95 % quantile of the length of a vector of three standard normal numbers."""
-
-
-def _cross_matrix(vector: Floats) -> Floats:
-    """Matrix (3, 3) that gives the change of R v by a small rotation of R^-1 on its left, v = vector."""
-    x, y, z = vector
-    out: Floats = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return out
+    return Interval.normal(length, deviation * CHI_QUANTILE / NORMAL_QUANTILE, blocks, least=0.0)

@@ -104,11 +104,11 @@ def linearise(
     ahead, behind = (_station_point(state, mount_m, time_s + step_s, truth)[1] for step_s in (_STEP_S, -_STEP_S))
     acceleration = (ahead - behind) / (2.0 * _STEP_S)
     at_m = at_m + state.ahead_s * velocity
-    arm = rotations.to_matrix(body) + state.ahead_s * rotations.to_matrix(body) @ _skew(omega)
+    arm = rotations.to_matrix(body) + state.ahead_s * rotations.to_matrix(body) @ rotations.cross_matrix(omega)
     in_room = rotations.rotate(room, at_m)
     by_time = factor * rotations.rotate(room, velocity + state.ahead_s * acceleration)
     residual[:, :3] = position_m - factor * in_room
-    slope[:, :3, ROOM_TURN] = -factor * _skew(in_room)
+    slope[:, :3, ROOM_TURN] = -factor * rotations.cross_matrix(in_room)
     slope[:, :3, ROOM_ORIGIN] = -factor * rotations.to_matrix(room)
     slope[:, :3, SCALE] = in_room
     slope[:, :3, OFFSET] = -rate * by_time
@@ -136,14 +136,6 @@ def _station_point(
     (body_m, body), (velocity, omega) = truth.poses(time_s), truth.rates(time_s)
     at_m = body_m + rotations.rotate(body, mount_m) - state.tracker_origin_m
     return at_m, velocity + rotations.rotate(body, rotations.cross(omega, mount_m))
-
-
-def _skew(vectors: Floats) -> Floats:
-    """Matrices (N, 3, 3) of the cross products with vectors (N, 3)."""
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -vectors[:, 2], vectors[:, 1], -vectors[:, 0]
-    result: Floats = out - out.swapaxes(1, 2)
-    return result
 
 
 def _unit(quaternion: Floats) -> Floats:

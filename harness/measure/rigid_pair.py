@@ -74,7 +74,7 @@ def measure_rigid_pair(
     vector_m = rotations.rotate(rotations.inverse(a_turn), b_m - a_m)  # in the frame of the first station
     lever_m = np.median(vector_m, axis=0)
     turned = rotations.multiply(rotations.inverse(a_turn), b_turn)
-    mean_turn = _mean_rotation(turned)
+    mean_turn = rotations.mean_rotation(turned)
     twist_rad = rotations.log(rotations.multiply(rotations.inverse(mean_turn), turned))
     relative_m_s = _derivative(now_s, rotations.rotate(a_turn, lever_m))
     speed_m_s = np.linalg.norm(_derivative(now_s, 0.5 * (a_m + b_m)), axis=1)
@@ -128,13 +128,6 @@ def _derivative(time_s: Floats, values: Floats) -> Floats:
     step_s = time_s[2:] - time_s[:-2]
     near = step_s < 2.0 * _MAX_STEP_S
     out[1:-1][near] = ((values[2:] - values[:-2])[near].T / step_s[near]).T
-    return out
-
-
-def _mean_rotation(quaternions: Floats) -> Floats:
-    """The mean orientation (4,) of (N, 4): the largest eigenvector of the sum of outer products (Markley 2007)."""
-    _, vectors = np.linalg.eigh(quaternions.T @ quaternions)
-    out: Floats = vectors[:, -1]
     return out
 
 

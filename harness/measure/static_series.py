@@ -73,7 +73,7 @@ def find_rest(readings: StationReadings, rate_hz: float) -> Ints:
     seen = (np.isfinite(place[..., 0]) & np.isfinite(turn[..., 0])).sum(axis=1) >= size // 4
     still, middle_m, middle_turn = np.zeros(count, bool), np.full((count, 3), np.nan), np.full((count, 4), np.nan)
     for i in np.flatnonzero(seen).tolist():
-        middle_m[i], middle_turn[i] = np.nanmedian(place[i], axis=0), _mean_orientation(turn[i])
+        middle_m[i], middle_turn[i] = np.nanmedian(place[i], axis=0), rotations.mean_rotation(turn[i])
         still[i] = np.nanmedian(np.linalg.norm(place[i] - middle_m[i], axis=1)) < _STILL_M
         still[i] &= np.nanmedian(rotations.angle_between_rad(turn[i], middle_turn[i])) < _STILL_RAD
     still |= ~seen
@@ -118,7 +118,7 @@ def static_series(readings: StationReadings, rest: tuple[int, int], rate_hz: flo
     position_m, rotation_rad = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
     position_m[place[sound]] = readings.position_m[rows[sound]]
     position_m -= np.nanmedian(position_m, axis=0)
-    from_middle = rotations.multiply(turn[sound], rotations.inverse(_mean_orientation(turn[sound])))
+    from_middle = rotations.multiply(turn[sound], rotations.inverse(rotations.mean_rotation(turn[sound])))
     rotation_rad[place[sound]] = rotations.log(from_middle)
     quality = np.full(count, np.nan)
     quality[place] = readings.quality[rows]
@@ -159,11 +159,3 @@ def _places(measured_s: Floats, suspect: Bools, rate_hz: float) -> Ints:
     place = np.rint((measured_s - phase_s) / period_s) - first
     known = (measured_s >= level_s) & (place >= 0.0) & (place <= last - first)
     return np.where(known, place, -1.0).astype(np.int64)
-
-
-def _mean_orientation(quaternions: Floats) -> Floats:
-    """The mean (4,) of orientations (N, 4), rows of NaN left out (Markley et al. 2007, J. Guid. Control Dyn. 30)."""
-    sound = quaternions[np.isfinite(quaternions[:, 0])]
-    _, vectors = np.linalg.eigh(sound.T @ sound)
-    out: Floats = vectors[:, -1]
-    return out

@@ -7,7 +7,7 @@ is a digest of all others (`core.toml_digest`).
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,7 +16,7 @@ from harness.core.fields import build
 from harness.core.interval import Interval
 from harness.core.output_file import write_output
 from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
-from harness.core.toml_text import format_toml_value, toml_table_lines
+from harness.core.toml_text import format_toml
 from harness.errors import BadFile, HarnessError
 from harness.measure.conventions import require_scale
 
@@ -71,7 +71,7 @@ class _UnitTables:
 
 def write_unit_file(path: Path, unit: UnitFile, *, force: bool = False) -> None:
     """Write a unit file atomically; BadFile when it exists without `force`, or cannot be written."""
-    write_output(path, insert_toml_digest("\n".join(_lines(unit)) + "\n"), UNIT_FILE, force=force)
+    write_output(path, insert_toml_digest(_text(unit)), UNIT_FILE, force=force)
 
 
 def read_unit_file(path: Path | str) -> UnitFile:
@@ -134,18 +134,22 @@ def _find_value(unit: UnitFile, key: str) -> Any:
     return value
 
 
-def _lines(unit: UnitFile) -> Iterator[str]:
-    yield from (_HEAD, f"schema = {SCHEMA}", 'kind = "unit"', f"name = {format_toml_value(unit.name)}", "")
-    for name, component in unit.components.items():
-        yield from (*toml_table_lines(f"components.{name}", component), "")
-    yield from (*toml_table_lines("tracker", unit.tracker), "")
-    yield from (*toml_table_lines("measured", _numbers(unit.measured)), "")
-    yield from (*toml_table_lines("not_measured", unit.not_measured), "")
+def _text(unit: UnitFile) -> str:
+    tables = {
+        "schema": SCHEMA,
+        "kind": "unit",
+        "name": unit.name,
+        "components": unit.components,
+        "tracker": unit.tracker,
+        "measured": _numbers(unit.measured),
+        "not_measured": unit.not_measured,
+    }
+    parts: list[tuple[str, dict[str, Any]]] = [(_HEAD, tables)]
     if unit.session:
-        yield "# What a reference showed of the session; scenarios do not take it over."
-        yield from (*toml_table_lines("session", _numbers(unit.session)), "")
-    yield "# Information for people; the harness does not read this table."
-    yield from toml_table_lines("capture", unit.capture)
+        session = {"session": _numbers(unit.session)}
+        parts.append(("# What a reference showed of the session; scenarios do not take it over.", session))
+    parts.append(("# Information for people; the harness does not read this table.", {"capture": unit.capture}))
+    return "\n".join(f"{comment}\n{format_toml(tables)}" for comment, tables in parts)
 
 
 def _numbers(table: Mapping[str, Interval]) -> dict[str, list[float | int]]:

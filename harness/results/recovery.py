@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.estimate import Status
+from harness.core.estimate import LOST_AFTER_S, Status
 from harness.core.files import to_json_types
 from harness.results.cell import Cell
 
@@ -30,8 +30,6 @@ MAX_RECOVERED_RATIO = 1.5
 """Largest ratio to the undisturbed error that counts as recovered."""
 SETTLING_S, WINDOW_S = 1.0, 1.0
 """Start of the evaluated window after the last bad frame, and its length [s]."""
-LOST_AFTER_S = 0.5
-"""Time with fewer than half of the stations after which the status must be LOST; before it, HELD [s]."""
 _SMOOTHING_S = 0.25
 _STATUS_TOLERANCE_S = 0.05
 

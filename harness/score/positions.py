@@ -5,6 +5,7 @@ Nothing is aligned unless the name says so.
 
 import numpy as np
 
+from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.score.pair import Pair, bones_named
 
@@ -34,9 +35,8 @@ def mpjpe_root_mm(pair: Pair) -> Floats:
 def mpjpe_pa_mm(pair: Pair) -> Floats:
     """(F,) mean joint distance after the best rotation and translation of each frame, without scale (Kabsch 1976)."""
     truth, estimate = (p.joints_m - p.joints_m.mean(axis=1, keepdims=True) for p in (pair.truth, pair.estimate))
-    u, _, vt = np.linalg.svd(np.swapaxes(estimate, 1, 2) @ truth)
-    vt[:, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[:, None]
-    out: Floats = _distance_mm(estimate @ (u @ vt), truth).mean(axis=1)
+    turn = rotations.nearest_rotation(np.swapaxes(estimate, 1, 2) @ truth)
+    out: Floats = _distance_mm(estimate @ turn, truth).mean(axis=1)
     return out
 
 

@@ -55,7 +55,7 @@
   function showStatus(status) {
     const seconds = status.seconds, last = seconds[seconds.length - 1];
     const gone = body.stations.filter((_, n) => status.lost[n]);
-    find("alarm").textContent = status.silent_s > 0.5 ? `no data for ${status.silent_s.toFixed(1)} s` : gone.length ? `lost: ${gone.join(", ")}` : "";
+    find("alarm").textContent = status.silent ? `no data for ${status.silent_s.toFixed(1)} s` : gone.length ? `lost: ${gone.join(", ")}` : "";
     find("stations").replaceChildren(...body.stations.map((name, n) => {
       const item = document.createElement("li"), dot = document.createElement("i");
       dot.style.background = status.lost[n] ? STATION[2] : LINES[n % LINES.length];

@@ -8,7 +8,6 @@ from harness.calibrate.bundle_adjustment import (
     BundleAdjustment,
     NormalEquations,
     ResidualScales,
-    mean_rotations,
 )
 from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.poses import POSES, pose_angles_rad
@@ -113,12 +112,7 @@ def test_variances_are_those_of_everything_at_once(rng: np.random.Generator) -> 
     np.testing.assert_allclose(own.ravel(), np.diag(everything)[count:], rtol=1e-6)
 
 
-def test_the_level_turn_and_the_mean_turn(rng: np.random.Generator) -> None:
+def test_the_heading_between_points(rng: np.random.Generator) -> None:
     points = rng.normal(size=(6, 3))
     there = rotations.rotate(rotations.about_z(2.5), points) + np.array([1.0, 2.0, 3.0])
     assert heading_between_rad(points, there) == pytest.approx(2.5)
-    middle = rotations.exp(rng.normal(size=(4, 3)))
-    near = rotations.multiply(middle, rotations.exp(1e-3 * rng.normal(size=(9, 4, 3))))
-    found = rotations.from_matrix(mean_rotations(rotations.to_matrix(near)))
-    assert rotations.angle_between_rad(found, middle).max() < 2e-3
-    assert np.linalg.det(mean_rotations(rng.normal(size=(3, 5, 3, 3)))) == pytest.approx(np.ones(5))

@@ -229,10 +229,10 @@ def test_a_file_of_an_earlier_version_has_to_be_whole(tmp_path: Path, rng: np.ra
     path.write_text(text, encoding="utf-8")
     assert "without a digest" in read_calibration(path).caveat
     without_head = text[: text.index("[station.head]")] + text[text.index('[station."left wrist"]') :]
-    without_bones = text[: text.index("[bone_m]")] + text[text.index("[diagnostics]") :]
+    without_bones = text[: text.index("[bone_m]")] + text[text.index("[diagnostics") :]
     for content, lost in (
         (text[: text.index("[bone_m]")], "[bone_m]"),
-        (text[: text.index("[diagnostics]")], "[diagnostics]"),
+        (text[: text.index("[diagnostics")], "[diagnostics]"),
         (without_head, "[station.head]"),
         (without_bones, "[bone_m]"),
     ):
@@ -255,7 +255,7 @@ def test_stations_are_found_by_name(rng: np.random.Generator) -> None:
 
 
 def test_what_toml_has_no_word_for_is_not_written(tmp_path: Path, rng: np.random.Generator) -> None:
-    with pytest.raises(TypeError, match="cannot be written"):
+    with pytest.raises(TypeError, match="not TOML serializable"):
         write_calibration(tmp_path / "a.toml", kept(rng, made=None))
     assert not list(tmp_path.iterdir())
     standard = standard_skeleton()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.core import cache_folder as module
-from harness.core.cache_folder import cache_folder, folder_bytes, keep_newest
+from harness.core.cache_folder import cache_folder, folder_bytes, keep_newest, remove_cache
 from harness.reconstruct import source_files
 
 needs_owners = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has no owners and modes of folders")
@@ -82,12 +82,16 @@ def test_relative_folders_of_the_user_are_ignored(home: Path, monkeypatch: pytes
     assert found.parent == home / "tmp"
 
 
-def test_the_size_of_a_folder_is_that_of_its_files(home: Path) -> None:
-    folder = cache_folder()
-    assert folder is not None
-    (folder / "machine-code").mkdir(parents=True)
-    (folder / "machine-code" / "a.nbc").write_bytes(b"x" * 1000)
+def test_removal_says_how_much(home: Path) -> None:
+    assert remove_cache() == 0
+    for folder in (cache_folder(), home / "tmp" / "tracker-harness-elsewhere"):
+        assert folder is not None
+        (folder / "machine-code").mkdir(parents=True)
+        (folder / "machine-code" / "a.nbc").write_bytes(b"x" * 1000)
     assert folder_bytes(home / ".cache") == 1000
+    assert remove_cache() == 1000
+    assert not (home / ".cache" / "tracker-harness").exists()
+    assert (home / "tmp" / "tracker-harness-elsewhere").exists()
 
 
 def test_it_is_no_folder_of_a_method(home: Path) -> None:

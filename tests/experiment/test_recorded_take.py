@@ -12,7 +12,7 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.evaluation import Evaluation, check_methods, evaluate_each, format_score_table
 from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.recorded_take import find_playback, recorded_take
+from harness.experiment.recorded_take import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenario import find_scenario
 from harness.stream.codec import commands
 from harness.stream.codec.reader import WireFormat
@@ -184,3 +184,12 @@ def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, 
     record_capture(bare, played.simulation.wire_format, played.simulation.wire, {})
     with pytest.raises(BadInput, match=r"Nothing says what .*a\.rec was played from"):
         find_playback(RecordingStream(bare))
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3, 0.5, 0.7])
+def test_frames_of_a_capture_are_numbered_whatever_their_phase(shift: float, rng: np.random.Generator) -> None:
+    """One frame is lost, and each stamp is off by up to a fifth of the period."""
+    expected = np.delete(np.arange(400), 7)
+    number, begin_s = frame_numbers((expected + shift + rng.uniform(-0.2, 0.2, 399)) / 40.0, 40.0)
+    np.testing.assert_array_equal(number - number[0], expected)
+    assert begin_s + number[0] / 40.0 == pytest.approx(shift / 40.0, abs=0.1 / 40.0)

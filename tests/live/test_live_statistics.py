@@ -16,11 +16,11 @@ class Clock:
         return self.now_s
 
 
-def frame(valid: list[bool]) -> TrackerFrame:
-    seen = np.array(valid)
-    where, turn = np.where(seen[:, None], np.zeros((2, 3)), np.nan), np.tile([1.0, 0, 0, 0], (2, 1))
-    quality = np.where(seen, 0.8, 0.0)
-    return TrackerFrame(0.0, np.zeros(2), where, turn, seen, seen, quality, np.zeros(2, dtype=bool))
+def add(statistics: LiveStatistics, valid: list[bool], status: Status = Status.SOLVED, latency_s: float = 1e-3) -> None:
+    seen, turn = np.array(valid), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    where, quality = np.where(seen[:, None], np.zeros((2, 3)), np.nan), np.where(seen, 0.8, 0.3)
+    frame = TrackerFrame(0.0, np.zeros(2), where, turn, seen, seen, quality, np.zeros(2, dtype=bool))
+    statistics.add(frame, status, latency_s)
 
 
 def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
@@ -29,7 +29,7 @@ def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
     for k in range(50):
         clock.now_s += 0.02
         status = Status.LOST if k < 3 else Status.HELD if k < 5 else Status.SOLVED
-        statistics.add(frame([True, k % 2 == 0]), status, 1e-3 * (k + 1))
+        add(statistics, [True, k % 2 == 0], status, 1e-3 * (k + 1))
         assert statistics.update(dropped=7) == []
     clock.now_s += 0.021
     statistics.update(dropped=7)
@@ -41,6 +41,10 @@ def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
     np.testing.assert_allclose(second.quality, [0.8, 0.4], atol=0.01)
     np.testing.assert_allclose(second.loss, [0.0, 0.5], atol=0.02)
     assert "held 2, lost 3, dropped 7, head 80% hand 40%" in statistics.status_line()
+    shown = statistics.page_content()
+    assert (shown["silent"], shown["silent_s"], shown["lost"]) == (False, 0.0, [False, False])
+    (chart,) = shown["seconds"]
+    assert chart == {"rate_hz": 49.95, "p50_ms": 25.5, "p99_ms": 49.51, "loss": 0.25, "quality": [0.8, 0.4]}
 
 
 def test_a_lost_station_is_reported_once_and_so_is_its_return() -> None:
@@ -49,8 +53,9 @@ def test_a_lost_station_is_reported_once_and_so_is_its_return() -> None:
     said: list[str] = []
     for k in range(300):
         clock.now_s += 1 / 64
-        statistics.add(frame([True, not 64 <= k < 192]), Status.SOLVED, 1e-3)
+        add(statistics, [True, not 64 <= k < 192])
         said += [f"{k}: {text}" for text in statistics.update()]
+    assert statistics.page_content()["lost"] == [False, False]
     assert said == ["96: station hand lost at 1.0 s", "192: station hand back at 3.0 s"]
 
 
@@ -62,17 +67,19 @@ def test_silence_shows_and_is_not_the_fault_of_a_station() -> None:
     assert statistics.status_line() == ""  # frames may serve a calibration first
     for _ in range(100):
         clock.now_s += 0.01
-        statistics.add(frame([True, True]), Status.SOLVED, 1e-3)
+        add(statistics, [True, True])
         statistics.update()
     clock.now_s += 0.7
     assert statistics.update() == []
     assert statistics.status_line() == "no data for 0.7 s"
+    shown = statistics.page_content()
+    assert (shown["silent"], shown["silent_s"], shown["lost"]) == (True, 0.7, [True, True])
 
 
 def test_a_minute_is_kept() -> None:
     clock = Clock()
     statistics = LiveStatistics(("head", "hand"), clock)
-    statistics.add(frame([True, True]), Status.SOLVED, 1e-3)
+    add(statistics, [True, True])
     for _ in range(SECONDS_KEPT + 5):
         clock.now_s += 1.0
         statistics.update()
@@ -80,3 +87,5 @@ def test_a_minute_is_kept() -> None:
     assert (len(kept), kept[0].end_s, kept[-1].end_s) == (SECONDS_KEPT, 6.0, SECONDS_KEPT + 5.0)
     assert kept[0].latency_p50_ms is None
     assert kept[0].loss == (1.0, 1.0)
+    silent = {"rate_hz": 0.0, "p50_ms": None, "p99_ms": None, "loss": 1.0, "quality": [0.0, 0.0]}
+    assert statistics.page_content()["seconds"][-1] == silent

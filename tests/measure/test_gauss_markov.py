@@ -1,4 +1,4 @@
-"""Likelihood and whitening of white noise and drift, against dense matrices."""
+"""Likelihood of white noise and drift, against dense matrices."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
-from harness.measure.gauss_markov import series_log_likelihood, whiten
+from harness.measure.gauss_markov import series_log_likelihood
 
 
 def dense_covariance(used: Bools, rate_hz: float, white: float, drift: float, correlation_s: float) -> Floats:
@@ -66,12 +66,3 @@ def test_long_series_keep_the_likelihood_when_the_variance_is_steady() -> None:
 @pytest.mark.parametrize("seen", [0, 1])
 def test_a_constant_takes_the_only_reading(seen: int) -> None:
     assert series_log_likelihood(np.ones((5, 1)), np.arange(5) < seen, 0.5, 1.0, 1.0) == 0.0
-
-
-def test_whitening_is_the_inverse_of_the_cholesky_factor() -> None:
-    rng = generator(4, "whiten")
-    values, used = rng.normal(size=(80, 2)), rng.uniform(size=80) > 0.3
-    found = whiten(np.where(used[:, None], values, np.nan), used, 10.0, 0.7, 1.5, 0.8)
-    factor = np.linalg.cholesky(dense_covariance(used, 10.0, 0.7, 1.5, 0.8))
-    np.testing.assert_allclose(found[used], np.linalg.solve(factor, values[used]), atol=1e-10)
-    assert np.isnan(found[~used]).all()

@@ -9,9 +9,6 @@ from harness.measure.excursions import (
     ExcursionDetector,
     ExcursionEvent,
     ExcursionNoise,
-    kalman_gains,
-    transpose_whiten,
-    whiten,
 )
 from harness.measure.static_series import StaticSeries
 from tests.measure.resting_stations import QUIET, at_rest, planted_series
@@ -101,15 +98,6 @@ def test_innovations_are_white_also_across_gaps() -> None:
     assert values.var(axis=0) == pytest.approx(np.ones(3), abs=0.03)
     for lag in (1, 2, 5, 40):
         assert np.abs(np.mean(values[lag:] * values[:-lag], axis=0)).max() < 0.02
-
-
-def test_the_transpose_has_the_same_products() -> None:
-    rng = generator(9, "transpose")
-    valid = rng.uniform(size=200) > 0.2
-    gain, deviation = kalman_gains(valid, 0.97, 2.25, 0.56)
-    one, other = rng.normal(size=(2, 200, 3))
-    forward, backward = whiten(one, valid, gain, deviation, 0.97), transpose_whiten(other, valid, gain, deviation, 0.97)
-    assert np.sum(forward * other) == pytest.approx(np.sum(one * backward), rel=1e-12)
 
 
 def test_innovations_of_a_displacement_add_to_those_of_the_series() -> None:

@@ -102,12 +102,12 @@ def test_every_option_of_dynamic_map_is_documented_or_shared() -> None:
 
 
 @pytest.mark.parametrize("name", ["ik", "local_pca", "dynamic_map", "dynamic_map:window", "dynamic_map:literal"])
-def test_loss_and_patience_are_shared(name: str) -> None:
+def test_loss_and_stopping_are_shared(name: str) -> None:
     """Options of the table of common parts hold for every method whose own table or text has no other."""
     method, own = registry.resolve(name), {option for key, option in documented() if key == name}
     for (key, option), value in documented().items():
         exempt = option in own or (name == "dynamic_map:literal" and option.startswith("loss."))
-        if key == "ik" and option.partition(".")[0] in ("loss", "stopping", "lost_after_s") and not exempt:
+        if key == "ik" and option.partition(".")[0] in ("loss", "stopping") and not exempt:
             assert attrgetter(option)(method) == pytest.approx(value), option
 
 
@@ -130,7 +130,7 @@ PRESETS: dict[str, dict[str, float | bool | str]] = {
     "kernel_cca:literal": {
         **{"neighbours": 8, "index": "kd_tree", "outputs": "quaternions", "alpha": 0.3, "beta": 0.4},
         **{"weights.position": 0.6, "weights.velocity": 0.2, "weights.orientation": 0.2},
-        **{"bases": 6, "kappa": 0.01, "regularise_projection": False, "width": 1.0, "longest_gap_s": 0.2},
+        **{"bases": 6, "kappa": 0.01, "regularise_projection": False, "width": 1.0},
     },
     "weighted_blend:literal": {
         **{"neighbours": 8, "index": "kd_tree", "outputs": "quaternions", "alpha": 0.3, "beta": 0.4, "power": 1.0},
@@ -145,9 +145,6 @@ PRESETS: dict[str, dict[str, float | bool | str]] = {
     "ik:previous": {"towards_mean": 0.0, "spread": False, "prior_sigma_rad": math.radians(30.0)},
     "ik:mean": {"towards_mean": 1.0, "spread": False, "prior_sigma_rad": math.radians(30.0)},
     "ik:gaussian": {"loss.robust": False, "towards_mean": 0.1, "spread": True},
-    "best_match": {
-        **{"position_weight": 0.6, "velocity_weight": 0.2, "orientation_weight": 0.2, "longest_gap_s": 0.2},
-    },
     "dynamic_map:literal": {"loss.robust": True, "loss.quality": False, "loss.suspect_weight": 1.0},
     "dynamic_map": {
         **{"regression.window_weight": 0.3, "regression.lever_m": 0.3, "regression.directions": 40},

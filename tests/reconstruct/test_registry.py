@@ -63,6 +63,21 @@ def test_an_old_option_is_refused_with_its_new_name(name: str, new: str) -> None
         registry.resolve(name)
 
 
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        *((f"{name}[lost_after_s=1.0]", "LOST after 0.5 s") for name in ("ik", "local_pca", "dynamic_map:literal")),
+        ("weighted_blend[root_sigma_m=0.2]", "the widths of the prior are fixed"),
+        ("kernel_cca:literal[most_steps=8]", "at most 4 steps"),
+        ("kernel_cca[longest_gap_s=1.0]", "over at most 0.2 s"),
+        ("best_match[velocity_weight=0.0]", "the weights of eq. 2 are fixed"),
+    ],
+)
+def test_a_removed_option_is_refused_with_what_to_write_instead(name: str, advice: str) -> None:
+    with pytest.raises(RenamedKey, match=f"was removed. Leave it out: .*{advice}"):
+        registry.resolve(name)
+
+
 def test_a_near_miss_gets_a_suggestion() -> None:
     with pytest.raises(UnknownName, match="Did you mean 'ik:gaussian'"):
         registry.resolve("ik:gausian")

@@ -30,7 +30,8 @@ def frame(number: int) -> dict[str, Any]:
 
 def status(silent_s: float, recording: str = "") -> dict[str, Any]:
     second = {"rate_hz": 40.0, "p50_ms": 1.5, "p99_ms": 4.0, "loss": 0.25, "quality": [0.9, 0.0]}
-    return {"seconds": [second] * 3, "lost": [False, True], "silent_s": silent_s, "recording": recording}
+    line = {"lost": [False, True], "silent": silent_s > 0.0, "silent_s": silent_s}
+    return {"seconds": [second] * 3, **line, "recording": recording}
 
 
 def test_the_page_follows_the_session(browser: Any) -> None:

@@ -92,23 +92,23 @@ def evaluate_target(target: Target, stored: ErrorsByCondition, today: ErrorsByCo
     clips = tuple(sorted(now))
     for clip in clips:
         _check_seeds(target, clip, before[clip], now[clip])
-    stored, today = (
+    stored_deg, today_deg = (
         float(np.mean([require_mean(side[clip], target.metric, clip) for clip in clips])) for side in (before, now)
     )
-    ratio = today / stored
+    ratio = today_deg / stored_deg
     return state_verdict(
         target.title,
         f"<= {target.least:.2f} (goal {target.goal:.2f})",
         format_fixed(ratio, 3) + _goal_note(ratio <= target.goal),
         ratio <= target.least,
-        f"{format_fixed(today, 2)} deg today, {format_fixed(stored, 2)} stored",
+        f"{format_fixed(today_deg, 2)} deg today, {format_fixed(stored_deg, 2)} stored",
         clips=len(clips),
         value=ratio,
         more={
             "condition": target.condition,
             "clip_names": list(clips),
-            "stored_deg": stored,
-            "today_deg": today,
+            "stored_deg": stored_deg,
+            "today_deg": today_deg,
             "at_least": target.least,
             "goal": target.goal,
         },

@@ -28,7 +28,7 @@ PART_S = 300.0
 """Length of the parts in which long captures are simulated [s]."""
 MAX_CHARACTERIZE_UNITS, MAX_VALIDATE_UNITS = 400.0, 140.0
 """Most CPU time of the verbs (see `cpu_time`)."""
-MAX_MEMORY_RATIO, MAX_TRUST_RATIO = 2.5, 1.3
+MAX_MEMORY_RATIO, MAX_TRUST_RATIO = 2.0, 1.3
 TRUST_CLIPS = ("walking_p1_01", "boxing_p1_01", "jumping_p1_01", "golf_p1_01")
 TRUST_PLAN = """\
 kind = "trust plan"

@@ -148,7 +148,8 @@ def local_gaussian(table: MomentTable, query: Floats, neighbours: int, width: fl
 def condition(local: LocalGaussian, query: Floats, noise: Floats, ridge: float) -> tuple[Floats, Floats]:
     """Mean (Y,) and covariance (Y, Y) of the targets, given features (F,) with errors of covariance `noise` (F, F).
 
-    `ridge` is a further variance of each feature's error, as a share of the trace of their covariance.
+    `ridge` is a further variance of each feature's error, as a share of the trace of their covariance. With
+    `np.linalg.solve` the same takes twice as long for 36 features.
     """
     features = len(query)
     targets = len(local.mean) - features

@@ -20,6 +20,11 @@ from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.stream.frame import TrackerFrame
 
+LONGEST_GAP_S = 0.2
+"""Longest time between two readings or examples from which a velocity is computed [s]."""
+LONGEST_GAP_ADVICE = f"Leave it out: velocities are computed over at most {LONGEST_GAP_S:g} s."
+"""For `RENAMED_KEYS` of methods, where it was an option."""
+
 
 class QueryFeatures:
     """Computes the features of each frame of a session."""
@@ -29,12 +34,11 @@ class QueryFeatures:
         residuals: Residuals,
         calibration: Calibration,
         examples: ExampleFeatures,
-        longest_gap_s: float,
         clock: DeviceTime | None = None,
     ) -> None:
         """`clock` is that of the session; without one the features have their own."""
         count = len(calibration.stations)
-        self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
+        self._residuals, self._examples = residuals, examples
         self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
@@ -53,7 +57,7 @@ class QueryFeatures:
         complete, all_moving = _estimate_velocities(
             *(residuals.target_m, frame.measured_s, residuals.measured),
             *(self._before_m, self._before_s, self._before_valid),
-            *(self._longest_gap_s, velocity_m_s, moving),
+            *(velocity_m_s, moving),
         )
         position_m, turned = residuals.target_m, residuals.world_from_target
         facing = turned[examples.anchor]
@@ -61,7 +65,7 @@ class QueryFeatures:
             position_m, turned, facing = self._completed_readings(last_qpos)
         now_s = self._time.frame_time_s(frame)
         gap_s = now_s - self._shown_s
-        filled = 0.0 < gap_s <= self._longest_gap_s
+        filled = 0.0 < gap_s <= LONGEST_GAP_S
         if not all_moving:
             if filled:
                 velocity_m_s[~moving] = (position_m[~moving] - self._shown_m[~moving]) / gap_s
@@ -95,7 +99,6 @@ def _estimate_velocities(
     before_m: Floats,
     before_s: Floats,
     before_valid: Bools,
-    longest_gap_s: float,
     velocity_m_s: Floats,
     has_velocity: Bools,
 ) -> tuple[bool, bool]:
@@ -106,7 +109,7 @@ def _estimate_velocities(
     """
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
-        has_velocity[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= longest_gap_s
+        has_velocity[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= LONGEST_GAP_S
         for i in range(3):
             velocity_m_s[s, i] = (target_m[s, i] - before_m[s, i]) / gap_s if has_velocity[s] else 0.0
             before_m[s, i] = target_m[s, i]

@@ -1,7 +1,4 @@
-"""Clustering of vectors by k-means: Lloyd's algorithm (1982), with the arithmetic and the first draw of faiss.
-
-So results agree with those of earlier versions, which called faiss. Its package is a tenth of an installation.
-"""
+"""Clustering of vectors by k-means: Lloyd's algorithm (1982)."""
 
 import numpy as np
 
@@ -16,7 +13,7 @@ _ROUNDS, _BLOCK = 6, 256
 def cluster_vectors(vectors: Singles, cells: int, rng: np.random.Generator) -> Ints:
     """(N,) cell of each of N vectors (N, D), for `cells` centroids of k-means; a cell may stay empty."""
     vectors = np.ascontiguousarray(vectors, np.float32)
-    return nearest_centroids(vectors, find_centroids(vectors[draw_sample(len(vectors), cells, rng)], cells))
+    return nearest_centroids(vectors, find_centroids(vectors[draw_sample(len(vectors), cells, rng)], cells, rng))
 
 
 def draw_sample(count: int, cells: int, rng: np.random.Generator) -> Ints:
@@ -24,18 +21,18 @@ def draw_sample(count: int, cells: int, rng: np.random.Generator) -> Ints:
     return np.sort(rng.choice(count, min(count, VECTORS_PER_CELL * cells), replace=False))
 
 
-def find_centroids(vectors: Singles, cells: int) -> Singles:
+def find_centroids(vectors: Singles, cells: int, rng: np.random.Generator) -> Singles:
     """(C, D) centroids of N >= C vectors (N, D); equal vectors give equal centroids.
 
-    They start at C of the vectors. A centroid to which no vector is nearest stays in its place.
+    They start at C of the vectors, drawn at random. A centroid to which no vector is nearest stays in its place.
     """
-    centroids = vectors[_draw_start(len(vectors), cells)]
+    centroids = vectors[rng.choice(len(vectors), cells, replace=False)]
     for _ in range(_ROUNDS):
         cell = nearest_centroids(vectors, centroids)
         ends = np.cumsum(np.bincount(cell, minlength=cells))
         for centroid, members in zip(centroids, np.split(vectors[np.argsort(cell, kind="stable")], ends), strict=False):
             if len(members):
-                centroid[:] = members.sum(axis=0) * (np.float32(1.0) / np.float32(len(members)))
+                centroid[:] = members.mean(axis=0)
     return centroids
 
 
@@ -50,13 +47,3 @@ def nearest_centroids(vectors: Singles, centroids: Singles) -> Ints:
         part += squared  # the squared distance without the square of the vector, which is the same for all centroids
         part.argmin(axis=1, out=out[start : start + _BLOCK])
     return out
-
-
-def _draw_start(count: int, cells: int) -> Ints:
-    """(C,) different rows of `count` vectors: the first steps of a shuffle with the Mersenne Twister of seed 2."""
-    draws = np.random.RandomState(2).randint(0, 2**32, cells, np.uint32)  # numbers that never change
-    rows = np.arange(count)
-    for place, draw in enumerate(draws):
-        other = place + int(draw) % (count - place)
-        rows[[place, other]] = rows[[other, place]]
-    return rows[:cells]

@@ -55,7 +55,7 @@ class InvertedFile(StatelessIndex):
         projected = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
             projected[rows] = self._principal.project(vectors.gather(sample[rows]))
-        centroids = find_centroids(projected, cells)
+        centroids = find_centroids(projected, cells, rng)
         cell_of = np.empty(count, np.int32)
         farthest = 0.0
         for start in range(0, count, CHUNK):

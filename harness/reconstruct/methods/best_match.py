@@ -8,13 +8,12 @@ Source: the nearest example of Slyper and Hodgins 2008; the distance is eq. 2 of
 velocities and orientations of the stations. Ours: the exact minimum over shift and rotation, weights by each station's
 quality, and leaving out lost stations.
 
-Options (fields of `BestMatch`): the three weights of eq. 2 (0.6, 0.2, 0.2 for m, m/s and unit quaternions) and
-`longest_gap_s` 0.2 s.
+It has no options.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,9 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
-from harness.core.ranges import Range
 from harness.errors import BadInput
+from harness.reconstruct.features.example_features import FeatureWeights
+from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.outlier_gate import OutlierGate
@@ -38,38 +38,36 @@ Complexes = NDArray[np.complex128]
 """Horizontal vectors as complex numbers, x + i y."""
 _JUMP_M = 0.3
 """Outlier gate [m]: wider than for `ik`, since an example is farther from the readings than a fitted pose."""
+_WEIGHTS = FeatureWeights()
+_FIXED_WEIGHTS = "Leave it out: the weights of eq. 2 are fixed."
 
 
 @dataclass(frozen=True)
 class BestMatch:
-    """Options of the best match, a `Method`."""
+    """The best match, a `Method`."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("position_weight", "velocity_weight", "orientation_weight"), _FIXED_WEIGHTS),
+        "longest_gap_s": LONGEST_GAP_ADVICE,
+    }
 
     name: str = "best_match"
     summary: str = "the nearest example frame, placed at the trackers: a baseline"
     needs_examples: bool = True
     training_data = "examples"
-    position_weight: Annotated[float, Range(0.0, 1e6)] = 0.6
-    """Weight of positions in eq. 2 [1/m^2]."""
-    velocity_weight: Annotated[float, Range(0.0, 1e6)] = 0.2
-    """Weight of velocities in eq. 2 [s^2/m^2]."""
-    orientation_weight: Annotated[float, Range(0.0, 1e6)] = 0.2
-    """Weight of unit quaternions in eq. 2."""
-    longest_gap_s: Annotated[float, Range(0.0, 1e4)] = 0.2
-    """Longest time between two readings from which a velocity is computed [s]."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedBestMatch":
         """Keep the examples; BadInput without one of at least two frames."""
         takes = tuple(take for take in examples if len(take) > 1)
         if not takes:
             raise BadInput("The best match needs examples, and there are none.", "Name some in the scenario.")
-        return FittedBestMatch(self, body, takes)
+        return FittedBestMatch(body, takes)
 
 
 @dataclass(frozen=True, eq=False)
 class FittedBestMatch:
     """The examples; sessions compute their readings for a calibration."""
 
-    options: BestMatch
     body: Body
     takes: tuple[BodyMotion, ...]
 
@@ -81,7 +79,6 @@ class BestMatchSession:
     """Search among N example frames, with station poses for the mounts of a calibration."""
 
     def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
-        self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         clock = DeviceTime()
         self._monitor = StatusMonitor(clock=clock)
@@ -113,7 +110,7 @@ class BestMatchSession:
         if before is None:
             return np.zeros_like(now[0]), np.zeros_like(now[2])
         gap_s = now[1] - before[1]
-        has_velocity = now[2] & before[2] & (gap_s > 0.0) & (gap_s <= self._options.longest_gap_s)
+        has_velocity = now[2] & before[2] & (gap_s > 0.0) & (gap_s <= LONGEST_GAP_S)
         return np.where(has_velocity[:, None], now[0] - before[0], 0.0) / np.where(has_velocity, gap_s, 1.0)[
             :, None
         ], has_velocity
@@ -123,7 +120,7 @@ class BestMatchSession:
 
         Rotating an example by y lowers its squared distance by Re(e^-iy pull), so the best y is the angle of `pull`.
         """
-        options, count = self._options, len(self._residuals.bones)
+        count = len(self._residuals.bones)
         position_confidence, orientation_confidence = (
             self._residuals.confidence[:count],
             self._residuals.confidence[count:],
@@ -133,13 +130,13 @@ class BestMatchSession:
         if total := float(position_confidence.sum()):
             middle_m[:2] = position_confidence @ target_m[:, :2] / total
         squared, pull = self._position.compare(target_m - middle_m, position_confidence, centred=True)
-        distance, pull = options.position_weight * squared, options.position_weight * pull
+        distance, pull = _WEIGHTS.position * squared, _WEIGHTS.position * pull
         squared, velocity_pull = self._velocity.compare(velocity_m_s, moving * position_confidence, centred=False)
-        distance += options.velocity_weight * squared
-        pull += options.velocity_weight * velocity_pull
+        distance += _WEIGHTS.velocity * squared
+        pull += _WEIGHTS.velocity * velocity_pull
         squared, orientation_pull = self._orientation(orientation_confidence)
-        distance += options.orientation_weight * squared
-        pull += options.orientation_weight * orientation_pull
+        distance += _WEIGHTS.orientation * squared
+        pull += _WEIGHTS.orientation * orientation_pull
         best = int(np.argmin(distance - np.abs(pull)))
         return self._placed_example(best, float(np.angle(pull[best])), middle_m, position_confidence)
 

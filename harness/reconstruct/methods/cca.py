@@ -113,10 +113,10 @@ def _canonical_bases(inputs: Floats, outputs: Floats, bases: int, kappa: float) 
     if ridge_x <= 0.0 or ridge_y <= 0.0:
         raise ArithmeticError("a Gram matrix is not positive definite: are all examples the same?")
     root_x, root_y = _inverse_root(inputs, ridge_x), _inverse_root(outputs, ridge_y)
-    upper = (root_y.T @ root_y) * -ridge_y
+    shrunk = (root_y.T @ root_y) * -ridge_y
     for i in range(count):
-        upper[i, i] += 1.0 + _EIGENVALUE_FLOOR
-    _cholesky(upper)
+        shrunk[i, i] += 1.0 + _EIGENVALUE_FLOOR
+    upper = np.linalg.cholesky(shrunk).T.astype(np.float64)
     left_out = root_x @ upper.T
     squared, vectors = symmetric_eigen(upper @ upper.T - ridge_x * (left_out.T @ left_out))
     best = np.argsort(squared)[max(count - bases, 0) :]
@@ -124,23 +124,10 @@ def _canonical_bases(inputs: Floats, outputs: Floats, bases: int, kappa: float) 
 
 
 @compiled
-def _cholesky(gram: Floats) -> None:
-    """Cholesky factorisation in place: a positive definite matrix (n, n) becomes the upper factor U of U^T U."""
-    for k in range(len(gram)):
-        share = 1.0 / np.sqrt(gram[k, k])
-        for j in range(len(gram)):
-            gram[k, j] = gram[k, j] * share if j >= k else 0.0
-        for i in range(k + 1, len(gram)):
-            _add_scaled(gram[i], -gram[k, i], gram[k])
-
-
-@compiled
 def _inverse_root(gram: Floats, ridge: float) -> Floats:
     """(n, n) root W of (G + ridge I)^-1 = W^T W."""
-    upper, out = gram.copy(), np.eye(len(gram))
-    for i in range(len(gram)):
-        upper[i, i] += ridge
-    _cholesky(upper)
+    upper = np.linalg.cholesky(gram + ridge * np.eye(len(gram))).T
+    out = np.eye(len(gram))
     for i in range(len(gram)):
         for k in range(i):
             _add_scaled(out[i], -upper[k, i], out[k])
@@ -152,8 +139,8 @@ def _inverse_root(gram: Floats, ridge: float) -> Floats:
 def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues (n,) and eigenvectors (n, n), in rows and in no order, of a symmetric matrix, which is overwritten.
 
-    Householder reflections to tridiagonal form, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). For a
-    dozen rows LAPACK takes twice as long.
+    Householder reflections to tridiagonal form, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). `eigh`
+    takes 1.9 times as long for 11 rows.
     """
     size = len(matrix)
     rows, off_diagonal = np.eye(size), np.zeros(size)

@@ -30,7 +30,7 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
-from harness.core.estimate import Origin
+from harness.core.estimate import LOST_AFTER_ADVICE, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
@@ -62,7 +62,6 @@ from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, mu
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.reconstruct.solver.subspace import SubspaceSolver, gaussian_space
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
@@ -80,6 +79,7 @@ class DynamicMap:
         "like": "search",
         "kept": "variance_kept",
         "novelty": "widening",
+        "lost_after_s": LOST_AFTER_ADVICE,
     }
 
     name: str = "dynamic_map"
@@ -134,8 +134,6 @@ class DynamicMap:
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     align: bool = False
     """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
-    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""
 
@@ -257,7 +255,6 @@ class DynamicMapSession(HistorySession):
             options.loss,
             True,
             options.jump_m,
-            lost_after_s=options.lost_after_s,
             stopping=options.stopping,
             align=options.align,
         )

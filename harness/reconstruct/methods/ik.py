@@ -18,14 +18,15 @@ Presets: `ik:previous` (prior about the last estimate, learns nothing), `ik:mean
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
+from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.core.training_data import EXAMPLES, NONE
@@ -35,7 +36,6 @@ from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, Solve
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 
 _MIN_SPREAD_RAD = math.radians(2.0)
 """Smallest spread of a hinge over the examples that scales the prior."""
@@ -44,6 +44,8 @@ _MIN_SPREAD_RAD = math.radians(2.0)
 @dataclass(frozen=True)
 class Ik:
     """Options of inverse kinematics, a `Method`."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"lost_after_s": LOST_AFTER_ADVICE}
 
     name: str = "ik"
     summary: str = "robust whole-body inverse kinematics with a weak prior about the examples' mean posture"
@@ -61,8 +63,6 @@ class Ik:
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     align: bool = False
     """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
-    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""
 
@@ -128,7 +128,6 @@ class FittedIk:
             options.loss,
             options.limits,
             options.jump_m,
-            lost_after_s=options.lost_after_s,
             stopping=options.stopping,
             align=options.align,
         )

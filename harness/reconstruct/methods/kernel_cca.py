@@ -25,7 +25,7 @@ from harness.reconstruct.methods.local_regression import LocalRegression
 class KernelCca(LocalRegression):
     """Options of kernel CCA, a `Method`; scenarios/tune_kernel_cca.toml chose the defaults."""
 
-    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"held": "regularise_projection"}
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {**LocalRegression.RENAMED_KEYS, "held": "regularise_projection"}
 
     name: str = "kernel_cca"
     summary: str = (

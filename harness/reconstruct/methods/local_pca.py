@@ -17,9 +17,9 @@ Options are the fields of `LocalPca`; scenarios/tune_local_pca.toml chose the de
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
+from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
@@ -47,7 +48,6 @@ from harness.reconstruct.solver.ik_session import (
 from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
 _MIN_WIDENING_RAD = math.radians(1.0)
@@ -60,6 +60,8 @@ _HISTORY = 2
 @dataclass(frozen=True)
 class LocalPca:
     """Options of local PCA, a `Method`; scenarios/tune_local_pca.toml chose the defaults on validation clips."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"lost_after_s": LOST_AFTER_ADVICE}
 
     name: str = "local_pca"
     summary: str = "best fit to the readings within the principal directions of similar examples"
@@ -94,8 +96,6 @@ class LocalPca:
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     align: bool = False
     """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    lost_after_s: Annotated[float, Range(0.0, 1e4)] = LOST_AFTER_S
-    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
     """Convergence criteria. They are looser than those of `ik`; on validation clips errors differ by 0.001 deg."""
 
@@ -175,7 +175,6 @@ class LocalPcaSession(HistorySession):
             True,
             options.jump_m,
             options.restart,
-            options.lost_after_s,
             options.stopping,
             options.align,
         )

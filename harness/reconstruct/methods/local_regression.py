@@ -17,9 +17,9 @@ The options are the fields of `LocalRegression`; each method adds its own.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from harness.reconstruct.features.example_features import ExampleFeatures, Featu
 from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
-from harness.reconstruct.features.query_features import QueryFeatures
+from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S, QueryFeatures
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -54,12 +54,26 @@ _MIN_SPREAD_RAD = math.radians(1.0)
 _JUMP_WITHOUT_IK_M = 0.3
 """Outlier gate without inverse kinematics [m], as for the best match: the pose is farther from the readings."""
 
+_ROOT_SIGMA_M, _ROOT_SIGMA_RAD = 0.1, math.radians(10.0)
+"""Standard deviations of the root about the regressed one [m, rad]."""
+_HINGE_SIGMA_RAD = math.radians(30.0)
+"""RMS of the hinges' standard deviations about the regressed pose [rad]."""
+_MOST_STEPS = 4
+"""Largest number of Levenberg-Marquardt steps."""
 _NO_ROWS: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
 class LocalRegression(ABC):
     """Options that both methods share. A method adds its own options and `weigh`."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(
+            ("root_sigma_m", "root_sigma_rad", "hinge_sigma_rad"), "Leave it out: the widths of the prior are fixed."
+        ),
+        "most_steps": "Leave it out: inverse kinematics takes at most 4 steps.",
+        "longest_gap_s": LONGEST_GAP_ADVICE,
+    }
 
     name: str
     summary: str
@@ -71,8 +85,6 @@ class LocalRegression(ABC):
     """Weights of positions, velocities and orientations in eq. 2."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
-    longest_gap_s: Annotated[float, Range(0.0, 1e4)] = 0.2
-    """Longest time between two readings or examples from which a velocity is computed [s]."""
     jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     align: bool = False
@@ -87,16 +99,8 @@ class LocalRegression(ABC):
     """Whether inverse kinematics follows; without it only the root is fitted to the trackers."""
     solve: Literal["body", "limbs"] = "body"
     """Inverse kinematics: "body" takes a few Levenberg-Marquardt steps, "limbs" solves limbs in closed form."""
-    root_sigma_m: Annotated[float, Range(1e-06, 100.0)] = 0.1
-    """Standard deviation of the root's position about the regressed one [m]."""
-    root_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(10.0)
-    """Standard deviation of the root's orientation about the regressed one [rad]."""
-    hinge_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
-    """RMS of the hinges' standard deviations about the regressed pose [rad]."""
     spread: bool = True
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
-    most_steps: Annotated[int, Range(1, 10_000)] = 4
-    """Largest number of Levenberg-Marquardt steps."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":
         """Build the database; BadInput without examples."""
@@ -106,7 +110,7 @@ class LocalRegression(ABC):
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalRegression":
         """Learn from a database, which may lie on disk."""
-        sigma_rad = np.full(48, self.hinge_sigma_rad)
+        sigma_rad = np.full(48, _HINGE_SIGMA_RAD)
         if self.spread:
             hinge_spread_rad = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
             sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
@@ -135,7 +139,7 @@ class FittedLocalRegression:
     def example_features(self, calibration: Calibration) -> ExampleFeatures:
         """Features of the examples for the mounts of a calibration; cached."""
         options, weights = self.options, self.options.weights
-        if self.database.rate_hz * options.longest_gap_s < 1.0:
+        if self.database.rate_hz * LONGEST_GAP_S < 1.0:
             weights = replace(weights, velocity=0.0)  # no example has a frame that shortly before it
         return self.cache.get(
             calibration,
@@ -156,14 +160,14 @@ class LocalRegressionSession:
         self._gate = OutlierGate(len(calibration.stations), jump_m, clock=clock)
         self._examples = fitted.example_features(calibration)
         self._lookup = self._examples.index.begin_search()
-        self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s, clock)
+        self._features = QueryFeatures(self._residuals, calibration, self._examples, clock)
         self._limits = HingeLimits(fitted.body)
         self._space: PoseSpace = HingeAngles()
         if options.outputs == "quaternions":
             self._space = JointQuaternions(fitted.body, self._limits)
-        self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
+        self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=_MOST_STEPS))
         self._limbs = LimbSolver(fitted.body, calibration.bones, self._residuals, self._limits)
-        self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
+        self._precision = np.repeat([_ROOT_SIGMA_M**-2, _ROOT_SIGMA_RAD**-2], 3)
         self._precision = np.concatenate([self._precision, fitted.hinge_sigma_rad**-2])
         self._estimate = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
         self._last_rows = _NO_ROWS

@@ -16,9 +16,9 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import as_tuple, quaternion_product, rotation_vector
 from harness.core.estimate import Estimate
 from harness.reconstruct.contract import Session
-from harness.reconstruct.solver.quaternion_algebra import quaternion_product, rotation_vector
 from harness.stream.frame import TrackerFrame
 
 DEFAULT_WEIGHTS = (0.15, 0.7, 0.15)
@@ -112,14 +112,13 @@ def _average(qpos: Floats, weights: Floats, out: Floats) -> None:
             continue
         for k in range(3):
             out[k] += weights[n] * (qpos[n, k] - qpos[middle, k])
-        w, i, j, k0 = quaternion_product((w0, -x0, -y0, -z0), qpos[n, 3], qpos[n, 4], qpos[n, 5], qpos[n, 6])
-        turn = rotation_vector(w, i, j, k0)
+        turn = rotation_vector(quaternion_product((w0, -x0, -y0, -z0), as_tuple(qpos[n, 3:7])))
         x, y, z = x + weights[n] * turn[0], y + weights[n] * turn[1], z + weights[n] * turn[2]
         for d in range(7, qpos.shape[1]):
             difference = qpos[n, d] - qpos[middle, d]
             out[d] += weights[n] * (difference - 2.0 * np.pi * np.round(difference / (2.0 * np.pi)))
     angle = np.sqrt(x * x + y * y + z * z)
     share = 0.5 * np.sinc(0.5 * angle / np.pi)
-    w, x, y, z = quaternion_product((w0, x0, y0, z0), np.cos(0.5 * angle), share * x, share * y, share * z)
+    w, x, y, z = quaternion_product((w0, x0, y0, z0), (np.cos(0.5 * angle), share * x, share * y, share * z))
     length = np.sqrt(w * w + x * x + y * y + z * z)
     out[3], out[4], out[5], out[6] = w / length, x / length, y / length, z / length

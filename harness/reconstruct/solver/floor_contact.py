@@ -14,10 +14,10 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled, specialise
+from harness.core.compiled_rotations import Vector, as_tuple, quaternion_product, rotate
 from harness.reconstruct.solver.ground_frame import HINGES, POSTURE_SIZE
 from harness.reconstruct.solver.kinematic_tree import KinematicTree, build_tree
 from harness.reconstruct.solver.normal_equations import StationTargets
-from harness.reconstruct.solver.quaternion_algebra import Vector, as_tuple, quaternion_product, rotate
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 
@@ -153,7 +153,7 @@ def _toe_m(
         axis, half = tree.axis[dof], 0.5 * hinges[dof - _ROOT_DOFS]
         slope[0, dof], slope[1, dof], slope[2, dof] = rotate(q, axis[0], axis[1], axis[2])
         sine = np.sin(half)
-        q = quaternion_product(q, np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2])
+        q = quaternion_product(q, (np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]))
     x, y, z = rotate(q, toe[0], toe[1], toe[2])
     for dof in range(first, end):
         a, b, c = slope[0, dof], slope[1, dof], slope[2, dof]

@@ -21,7 +21,7 @@ from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, St
 from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S, StatusMonitor
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
 from harness.stream.frame import TrackerFrame
 
@@ -77,8 +77,6 @@ class SolverOptions:
     """A position that jumps farther than this from its expected place is left out for a while; inf for never [m]."""
     restart: bool = True
     """Whether a cold start follows when readings contradict the pose for long; if not, only after a loss."""
-    lost_after_s: float = LOST_AFTER_S
-    """Time without enough stations after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
     align: bool = False
     """Move the readings of all stations to one instant (`temporal_alignment`)."""
@@ -103,7 +101,7 @@ class IKSession:
         self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
         self._time, self.now_s = DeviceTime(), 0.0
         """Time of this frame [s]."""
-        self._monitor = StatusMonitor(options.lost_after_s, self._time)
+        self._monitor = StatusMonitor(self._time)
         self._gate = OutlierGate(len(calibration.stations), options.jump_m, clock=self._time)
         self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
         self._contradiction = np.repeat([_CONTRADICTION_M, _CONTRADICTION_RAD], len(calibration.stations))

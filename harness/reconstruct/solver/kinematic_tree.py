@@ -13,7 +13,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_product, rotate
+from harness.core.compiled_rotations import as_tuple, quaternion_product, rotate
 
 
 class KinematicTree(NamedTuple):
@@ -133,7 +133,7 @@ def forward_kinematics(tree: KinematicTree, state: KinematicState, qpos: Floats)
             local, half = tree.axis[hinge], 0.5 * qpos[hinge + 1]
             axis[hinge, 0], axis[hinge, 1], axis[hinge, 2] = rotate(q, local[0], local[1], local[2])
             sine = np.sin(half)
-            q = quaternion_product(q, np.cos(half), sine * local[0], sine * local[1], sine * local[2])
+            q = quaternion_product(q, (np.cos(half), sine * local[0], sine * local[1], sine * local[2]))
         world_from_body[body, 0], world_from_body[body, 1], world_from_body[body, 2], world_from_body[body, 3] = q
     for s in range(len(tree.station_body)):
         body, mount = tree.station_body[s], tree.mount_m[s]

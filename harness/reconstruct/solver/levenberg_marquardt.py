@@ -10,10 +10,10 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import as_tuple, quaternion_from_vector, quaternion_product, rotation_vector
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
 from harness.reconstruct.solver.matrix_algebra import dot
 from harness.reconstruct.solver.normal_equations import StationTargets, add_curvature, evaluate, normal_rows
-from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_product, rotation_vector
 
 
 class QuadraticModel(NamedTuple):
@@ -176,8 +176,8 @@ def _prior_cost(problem: PriorAndLimits, qpos: Floats, to_mean: Floats) -> float
     """The prior's cost of a configuration; fills in the tangent step (V,) from there to the prior's mean."""
     mean, q, cost = problem.mean, qpos[3:7], 0.0
     to_mean[:3] = mean[:3] - qpos[:3]
-    w, x, y, z = mean[3], mean[4], mean[5], mean[6]
-    to_mean[3], to_mean[4], to_mean[5] = rotation_vector(*quaternion_product((q[0], -q[1], -q[2], -q[3]), w, x, y, z))
+    turn = quaternion_product((q[0], -q[1], -q[2], -q[3]), as_tuple(mean[3:7]))
+    to_mean[3], to_mean[4], to_mean[5] = rotation_vector(turn)
     to_mean[6:] = mean[7:] - qpos[7:]
     for i in range(len(to_mean)):
         cost += 0.5 * problem.precision[i] * to_mean[i] ** 2
@@ -188,11 +188,7 @@ def _prior_cost(problem: PriorAndLimits, qpos: Floats, to_mean: Floats) -> float
 def _integrate(qpos: Floats, step: Floats, next_qpos: Floats) -> None:
     """Fill in the configuration after a tangent step (V,); the root rotates about its own axes."""
     next_qpos[:3] = qpos[:3] + step[:3]
-    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    rotation = quaternion_product(
-        as_tuple(qpos[3:7]), np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5]
-    )
+    rotation = quaternion_product(as_tuple(qpos[3:7]), quaternion_from_vector(step[3], step[4], step[5]))
     next_qpos[3], next_qpos[4], next_qpos[5], next_qpos[6] = rotation
     next_qpos[3:7] /= np.sqrt(dot(next_qpos[3:7], next_qpos[3:7]))
     next_qpos[7:] = qpos[7:] + step[6:]

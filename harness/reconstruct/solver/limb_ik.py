@@ -14,6 +14,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import matrix_from_quaternion
 from harness.reconstruct.solver.matrix_algebra import (
     angle_about,
     axis_rotation,
@@ -25,7 +26,6 @@ from harness.reconstruct.solver.matrix_algebra import (
     shortest_rotation,
     transposed_multiply,
 )
-from harness.reconstruct.solver.quaternion_algebra import matrix_from_quaternion
 
 UPPER, LOWER, TWIST, END = 0, 1, 2, 3
 """Levels, the bones of a limb: upper arm or thigh; forearm or shin; the twisting part of the forearm; hand or foot."""

@@ -12,13 +12,13 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import Vector, as_tuple, quaternion_product, rotation_vector
 from harness.reconstruct.solver.kinematic_tree import (
     KinematicState,
     KinematicTree,
     forward_kinematics,
     station_jacobian,
 )
-from harness.reconstruct.solver.quaternion_algebra import Vector, as_tuple, quaternion_product, rotation_vector
 
 Wrench = tuple[float, float, float, float, float, float]
 """Force and torque: the weighted position error and orientation error of a station."""
@@ -106,9 +106,8 @@ def evaluate(tree: KinematicTree, targets: StationTargets, state: KinematicState
     for s in range(count):
         state.error[s] = targets.target_m[s] - state.station_m[s]
         q = state.world_from_body[tree.station_body[s]]
-        state.error[count + s] = rotation_vector(
-            *quaternion_product(as_tuple(targets.world_from_target[s]), q[0], -q[1], -q[2], -q[3])
-        )
+        off = quaternion_product(as_tuple(targets.world_from_target[s]), (q[0], -q[1], -q[2], -q[3]))
+        state.error[count + s] = rotation_vector(off)
     for row in range(2 * count):
         error, precision, scale = state.error[row], targets.precision[row], targets.twice_scale_squared[row]
         squared = error[0] ** 2 + error[1] ** 2 + error[2] ** 2

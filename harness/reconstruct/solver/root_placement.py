@@ -6,16 +6,17 @@ It gives the start of every solve that has no frame before it. The null methods 
 import numpy as np
 
 from harness.body.humanoid import Body, tpose
+from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.core.humanoid24 import pack, unpack
-from harness.core.skeleton import Skeleton
-from harness.reconstruct.solver.quaternion_algebra import (
+from harness.core.compiled_rotations import (
     as_tuple,
     matrix_from_quaternion,
     quaternion_from_matrix,
     quaternion_product,
 )
+from harness.core.humanoid24 import pack, unpack
+from harness.core.skeleton import Skeleton
 from harness.reconstruct.solver.residuals import Residuals
 
 _LEVER_M = 0.3
@@ -39,10 +40,8 @@ def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Fl
         *(residuals.confidence[:count], residuals.confidence[count:], qpos[:3]),
     )
     yaw_rad = np.arctan2(moment[1, 0] - moment[0, 1], moment[0, 0] + moment[1, 1])
-    left, _, right = np.linalg.svd(moment)
-    flip = np.array([1.0, 1.0, np.linalg.det(left @ right)])  # no reflection
     upright = np.array([np.cos(0.5 * yaw_rad), 0.0, 0.0, np.sin(0.5 * yaw_rad)])
-    tilted = quaternion_from_matrix((left * flip) @ right)
+    tilted = quaternion_from_matrix(rotations.nearest_rotation(moment))
     return _transform(qpos, upright, mean_m, target_mean_m), _transform(qpos, tilted, mean_m, target_mean_m)
 
 
@@ -94,9 +93,9 @@ def _cross_covariance(
             moment += np.outer(positions[s] * (target_m[s] - target_mean_m), station_m[s] - mean_m)
     for s in range(len(orientations)):
         if orientations[s] > 0.0:
-            target = quaternion_product(as_tuple(world_from_target[s]), *as_tuple(bone_from_station[s]))
+            target = quaternion_product(as_tuple(world_from_target[s]), as_tuple(bone_from_station[s]))
             w, x, y, z = as_tuple(world_from_station[s])
-            turn = np.array(quaternion_product(target, w, -x, -y, -z))
+            turn = np.array(quaternion_product(target, (w, -x, -y, -z)))
             moment += _LEVER_M**2 * orientations[s] * matrix_from_quaternion(turn)
     return mean_m, target_mean_m, moment
 
@@ -106,5 +105,5 @@ def _transform(qpos: Floats, turn: Floats, from_m: Floats, to_m: Floats) -> Floa
     """The configuration (55,) rotated by a quaternion (4,) about a point (3,) that is taken to another point (3,)."""
     out = qpos.copy()
     out[:3] = to_m + matrix_from_quaternion(turn) @ (qpos[:3] - from_m)
-    out[3], out[4], out[5], out[6] = quaternion_product(as_tuple(turn), *as_tuple(qpos[3:7]))
+    out[3], out[4], out[5], out[6] = quaternion_product(as_tuple(turn), as_tuple(qpos[3:7]))
     return out

@@ -2,26 +2,22 @@
 
 import math
 
-from harness.core.estimate import Status
+from harness.core.estimate import LOST_AFTER_S, Status
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.stream.frame import TrackerFrame
-
-LOST_AFTER_S = 0.5
-"""Time with too few stations after which the status is LOST [s]."""
 
 
 class StatusMonitor:
     """Monitor of one session's frames; a station reports when its position or its orientation is valid."""
 
-    def __init__(self, lost_after_s: float = LOST_AFTER_S, clock: DeviceTime | None = None) -> None:
+    def __init__(self, clock: DeviceTime | None = None) -> None:
         """`clock` is that of the session; without one the monitor has its own."""
-        self._lost_after_s = lost_after_s
         self._time, self._enough_at_s = clock or DeviceTime(), -math.inf
 
     def update(self, frame: TrackerFrame) -> tuple[Status, bool]:
         """The status of this frame, and whether any station reports at all.
 
-        SOLVED with at least half of the stations; otherwise HELD, and LOST after `lost_after_s`.
+        SOLVED with at least half of the stations; otherwise HELD, and LOST after `LOST_AFTER_S`.
         """
         now_s = self._time.frame_time_s(frame)
         count = (frame.position_valid | frame.orientation_valid).tobytes().count(True)
@@ -30,5 +26,5 @@ class StatusMonitor:
             return Status.SOLVED, True
         if self._enough_at_s == -math.inf:
             self._enough_at_s = now_s
-        lost = now_s - self._enough_at_s > self._lost_after_s
+        lost = now_s - self._enough_at_s > LOST_AFTER_S
         return Status.LOST if lost else Status.HELD, count > 0

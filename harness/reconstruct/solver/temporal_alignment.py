@@ -22,8 +22,8 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, immutable
 from harness.core.compiled import compiled, specialise
+from harness.core.compiled_rotations import as_tuple, quaternion_product, rotation_vector
 from harness.reconstruct.solver.outlier_gate import OutlierGate
-from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_product, rotation_vector
 from harness.reconstruct.solver.residuals import Residuals
 from harness.stream.frame import TrackerFrame
 
@@ -234,19 +234,19 @@ def _move_orientation(
     w, x, y, z = as_tuple(reading)
     later_s = following.measured_s[s] - now_s
     if shift_s > 0.0 and following.measured[count + s] and 0.0 < later_s <= MAX_STEP_S:
-        turn = quaternion_product(as_tuple(following.world_from_target[s]), w, -x, -y, -z)
+        turn = quaternion_product(as_tuple(following.world_from_target[s]), (w, -x, -y, -z))
         share = shift_s / later_s
     elif history.orientations[s] >= 1:
         last = history.last_turn[s]
-        turn = quaternion_product((w, x, y, z), last[0], -last[1], -last[2], -last[3])
+        turn = quaternion_product((w, x, y, z), (last[0], -last[1], -last[2], -last[3]))
         share = shift_s / (now_s - history.last_s[s])
     else:
         return
-    a, b, c = rotation_vector(turn[0], turn[1], turn[2], turn[3])
+    a, b, c = rotation_vector(turn)
     angle_rad = np.sqrt(a * a + b * b + c * c)
     if angle_rad > MAX_TURN_RAD or angle_rad == 0.0:
         return
     half = 0.5 * share * angle_rad
     sine = np.sin(half) / angle_rad
-    moved = quaternion_product((np.cos(half), sine * a, sine * b, sine * c), w, x, y, z)
+    moved = quaternion_product((np.cos(half), sine * a, sine * b, sine * c), (w, x, y, z))
     reading[0], reading[1], reading[2], reading[3] = moved

@@ -24,7 +24,7 @@ def document(
     kicker: str,
     heading: str,
     facts: Mapping[str, str],
-    missing: Sequence[str],
+    missing: Sequence[str] = (),
     sections: Sequence[Section],
     lead: Markup | None = None,
 ) -> str:

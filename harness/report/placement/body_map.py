@@ -60,15 +60,14 @@ def draw_body_map(
 ) -> tuple[Chart | None, str]:
     """The chart and "", or None and the reason in one line why there is none.
 
-    Places that have no value and are not worn are left out. The chart needs matplotlib, pyvista and OpenGL.
+    Places that have no value and are not worn are left out. The chart needs pyvista and OpenGL.
     """
     shown_places = [place for place in places if place.name in shown.base or shown.values.get(place.name) is not None]
     measured = [value for place in shown_places if (value := shown.values.get(place.name)) is not None]
     if not measured:
         return None, "no candidate has a value"
-    for package in ("matplotlib", "pyvista"):
-        if find_spec(package) is None:
-            return None, str(MissingExtra("A rendered picture", package, "viz"))
+    if find_spec("pyvista") is None:
+        return None, str(MissingExtra("A rendered picture", "pyvista", "viz"))
     low, high = min(0.0, *measured), max(0.0, *measured)
     ends = (low, high if high > low else low + 1.0)
     views, reason = render_body(shown_places, shown.values, ends)

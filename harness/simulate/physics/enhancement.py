@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.simulate.physics.strapdown import exponential, logarithm, product
+from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotation_vector
 
 MODES = 3
 """Mode 0 has no offset."""
@@ -27,8 +27,8 @@ def add_to_offset(offset: Floats, moved: Floats, x: float, y: float, z: float) -
     """
     for i in range(3):
         offset[i] -= moved[i]
-    q = product(exponential(offset[3], offset[4], offset[5]), exponential(-x, -y, -z))
-    offset[3], offset[4], offset[5] = logarithm(q)
+    q = quaternion_product(quaternion_from_vector(offset[3], offset[4], offset[5]), quaternion_from_vector(-x, -y, -z))
+    offset[3], offset[4], offset[5] = rotation_vector(q)
 
 
 @compiled

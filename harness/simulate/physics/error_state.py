@@ -10,7 +10,7 @@ import math
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.simulate.physics.strapdown import Quaternion, Vector, rotated
+from harness.core.compiled_rotations import Quaternion, Vector, rotate
 
 ERRORS = 15
 MOTION_ERRORS = 9
@@ -37,7 +37,7 @@ def add_tick(transition: Floats, q: Quaternion, velocity: Vector, duration_s: fl
             a, b, c = 0.0, 0.0, 0.0
         x, y, z = uy * c - uz * b, uz * a - ux * c, ux * b - uy * a
         if j >= 6:
-            x, y, z = rotated(q, duration_s * (j == 6), duration_s * (j == 7), duration_s * (j == 8))
+            x, y, z = rotate(q, duration_s * (j == 6), duration_s * (j == 7), duration_s * (j == 8))
         transition[0, j] += half * (2.0 * transition[3, j] - x)
         transition[1, j] += half * (2.0 * transition[4, j] - y)
         transition[2, j] += half * (2.0 * transition[5, j] - z)
@@ -45,7 +45,7 @@ def add_tick(transition: Floats, q: Quaternion, velocity: Vector, duration_s: fl
         transition[4, j] -= y
         transition[5, j] -= z
     for j in range(3):
-        x, y, z = rotated(q, duration_s * (j == 0), duration_s * (j == 1), duration_s * (j == 2))
+        x, y, z = rotate(q, duration_s * (j == 0), duration_s * (j == 1), duration_s * (j == 2))
         transition[6, 3 + j] -= x
         transition[7, 3 + j] -= y
         transition[8, 3 + j] -= z

@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotate
 from harness.simulate.physics.acquisition import (
     Search,
     add_force,
@@ -33,14 +34,7 @@ from harness.simulate.physics.filter_state import FilterModel, FilterState, Outp
 from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.status import CONFIRMING, LOST
-from harness.simulate.physics.strapdown import (
-    attitude,
-    exponential,
-    integrate,
-    product,
-    rotated,
-    set_attitude,
-)
+from harness.simulate.physics.strapdown import attitude, integrate, set_attitude
 from harness.simulate.physics.tracking_state import finish_slot
 from harness.simulate.readings import GRAVITY_M_S2
 
@@ -205,9 +199,11 @@ def arrival(
     c, d = u * (1.0 - u) ** 2 * model.tick_s, u * u * (u - 1.0) * model.tick_s
     for i in range(3):
         at[i] = a * before[i] + b * after[i] + c * before[3 + i] + d * after[3 + i]
-    q = product(attitude(before), exponential(u * angles[k, 0], u * angles[k, 1], u * angles[k, 2]))
-    at[3], at[4], at[5] = rotated(q, arm_m[0], arm_m[1], arm_m[2])
-    at[6], at[7], at[8] = rotated(q, 0.0, 0.0, 1.0)
+    q = quaternion_product(
+        attitude(before), quaternion_from_vector(u * angles[k, 0], u * angles[k, 1], u * angles[k, 2])
+    )
+    at[3], at[4], at[5] = rotate(q, arm_m[0], arm_m[1], arm_m[2])
+    at[6], at[7], at[8] = rotate(q, 0.0, 0.0, 1.0)
     return (TICKS_PER_SLOT - ticks) * model.tick_s
 
 
@@ -281,12 +277,12 @@ def inject(model: FilterModel, state: FilterState, s: int, error: Floats) -> Non
     """Move a station's estimate by an error (15,); the offsets of the enhancement modes keep the output in place."""
     now, lever = state.motion[s, TICKS_PER_SLOT], model.lever_m
     moved = np.empty(3)
-    x, y, z = rotated(attitude(now), lever[0], lever[1], lever[2])
+    x, y, z = rotate(attitude(now), lever[0], lever[1], lever[2])
     for i in range(6):
         now[i] += error[i]
         state.bias[s, i] += error[9 + i]
-    set_attitude(now, product(exponential(error[6], error[7], error[8]), attitude(now)))
-    u, v, w = rotated(attitude(now), lever[0], lever[1], lever[2])
+    set_attitude(now, quaternion_product(quaternion_from_vector(error[6], error[7], error[8]), attitude(now)))
+    u, v, w = rotate(attitude(now), lever[0], lever[1], lever[2])
     moved[0], moved[1], moved[2] = error[0] - u + x, error[1] - v + y, error[2] - w + z
     reset_attitude(state.covariance[s], error[6], error[7], error[8])
     for mode in range(MODES - 1):

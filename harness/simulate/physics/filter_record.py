@@ -1,15 +1,10 @@
 """Records of a station, written from the filter's state between two ticks."""
 
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate
 from harness.simulate.physics.enhancement import MODES
 from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
-from harness.simulate.physics.strapdown import (
-    Vector,
-    attitude,
-    exponential,
-    product,
-    rotated,
-)
+from harness.simulate.physics.strapdown import attitude
 
 
 @compiled
@@ -26,9 +21,9 @@ def write_record(
     """Write a record of station s, from the slot's tick k and the motion of the interval before it."""
     now, lever = state.motion[s, k], model.lever_m
     since = outputs.fraction[record, s] * model.tick_s
-    q = product(attitude(now), exponential(turn[0] * since, turn[1] * since, turn[2] * since))
-    arm = rotated(q, lever[0], lever[1], lever[2])
-    rate = rotated(q, turn[0], turn[1], turn[2])
+    q = quaternion_product(attitude(now), quaternion_from_vector(turn[0] * since, turn[1] * since, turn[2] * since))
+    arm = rotate(q, lever[0], lever[1], lever[2])
+    rate = rotate(q, turn[0], turn[1], turn[2])
     swing = (
         rate[1] * arm[2] - rate[2] * arm[1],
         rate[2] * arm[0] - rate[0] * arm[2],
@@ -46,7 +41,7 @@ def write_record(
         shown = q
         if mode > 0:
             offset = state.offset[s, mode - 1]
-            shown = product(exponential(offset[3], offset[4], offset[5]), q)
+            shown = quaternion_product(quaternion_from_vector(offset[3], offset[4], offset[5]), q)
         for i in range(4):
             outputs.tracker_from_station[record, s, mode, i] = shown[i]
     outputs.report[record, s] = state.report[s]

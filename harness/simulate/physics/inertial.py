@@ -9,10 +9,10 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import as_tuple, quaternion_product, rotate, rotation_vector
 from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.physics.strapdown import logarithm, product, quaternion, rotated
 from harness.simulate.readings import GRAVITY_M_S2
 
 Spread = Annotated[float, Range(0.0, 10.0)]
@@ -107,10 +107,10 @@ def _difference(time_s: Floats, turn: Floats, velocity_m_s: Floats, angle_rad: F
     for k in range(len(time_s) - 1):
         fall_m_s = GRAVITY_M_S2 * (time_s[k + 1] - time_s[k])
         for s in range(turn.shape[1]):
-            w, x, y, z = quaternion(turn[k, s])
+            w, x, y, z = as_tuple(turn[k, s])
             station_from_tracker = (w, -x, -y, -z)
-            change = logarithm(product(station_from_tracker, quaternion(turn[k + 1, s])))
-            gain = rotated(
+            change = rotation_vector(quaternion_product(station_from_tracker, as_tuple(turn[k + 1, s])))
+            gain = rotate(
                 station_from_tracker,
                 velocity_m_s[k + 1, s, 0] - velocity_m_s[k, s, 0],
                 velocity_m_s[k + 1, s, 1] - velocity_m_s[k, s, 1],

@@ -14,9 +14,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import as_tuple, quaternion_product, rotate
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.skeleton import Skeleton
-from harness.simulate.physics.strapdown import product, quaternion, rotated
 
 
 class StationChain(NamedTuple):
@@ -131,7 +131,7 @@ def _follow(chain: StationChain, pieces: Floats, knots_s: Floats, time_s: Floats
                 out.acceleration_m_s2[k, s],
             )
             out.turn_rad_s[k, s] = omega[b]
-            q = product(quaternion(turn[b]), quaternion(chain.bone_from_station[s]))
+            q = quaternion_product(as_tuple(turn[b]), as_tuple(chain.bone_from_station[s]))
             for i in range(4):
                 out.tracker_from_station[k, s, i] = q[i]
 
@@ -159,16 +159,16 @@ def _root_state(
         along += place[i] * rate[i]
     for i in range(4):
         change[i] -= 2.0 * along * rate[i]
-    to_tracker, root_from_world = quaternion(tracker_from_world), (place[0], -place[1], -place[2], -place[3])
-    turn[0], turn[1], turn[2], turn[3] = product(to_tracker, quaternion(place))
-    _, x, y, z = product(quaternion(rate), root_from_world)
-    omega[0], omega[1], omega[2] = rotated(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
-    _, x, y, z = product(quaternion(change), root_from_world)
-    alpha[0], alpha[1], alpha[2] = rotated(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
+    to_tracker, root_from_world = as_tuple(tracker_from_world), (place[0], -place[1], -place[2], -place[3])
+    turn[0], turn[1], turn[2], turn[3] = quaternion_product(to_tracker, as_tuple(place))
+    _, x, y, z = quaternion_product(as_tuple(rate), root_from_world)
+    omega[0], omega[1], omega[2] = rotate(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
+    _, x, y, z = quaternion_product(as_tuple(change), root_from_world)
+    alpha[0], alpha[1], alpha[2] = rotate(to_tracker, 2.0 * x, 2.0 * y, 2.0 * z)
     for i in range(3):
         root[0, i] -= origin_m[i]
     for i in range(3):
-        root[i, 0], root[i, 1], root[i, 2] = rotated(to_tracker, root[i, 0], root[i, 1], root[i, 2])
+        root[i, 0], root[i, 1], root[i, 2] = rotate(to_tracker, root[i, 0], root[i, 1], root[i, 2])
 
 
 @compiled
@@ -176,7 +176,7 @@ def _turn_hinge(
     axis: Floats, angle: float, rate: float, change: float, turn: Floats, omega: Floats, alpha: Floats
 ) -> None:
     """Add a hinge to the rotation, angular velocity and angular acceleration of what it carries."""
-    x, y, z = rotated(quaternion(turn), axis[0], axis[1], axis[2])
+    x, y, z = rotate(as_tuple(turn), axis[0], axis[1], axis[2])
     alpha[0] += change * x + rate * (omega[1] * z - omega[2] * y)
     alpha[1] += change * y + rate * (omega[2] * x - omega[0] * z)
     alpha[2] += change * z + rate * (omega[0] * y - omega[1] * x)
@@ -207,7 +207,7 @@ def _at_offset(
     out_force: Floats,
 ) -> None:
     """Position, velocity and acceleration of a point of a rigid body, `reach_m` (3,) from another in its axes."""
-    x, y, z = rotated(quaternion(turn), reach_m[0], reach_m[1], reach_m[2])
+    x, y, z = rotate(as_tuple(turn), reach_m[0], reach_m[1], reach_m[2])
     u, v, w = omega[1] * z - omega[2] * y, omega[2] * x - omega[0] * z, omega[0] * y - omega[1] * x
     out_place[0], out_place[1], out_place[2] = place[0] + x, place[1] + y, place[2] + z
     out_speed[0], out_speed[1], out_speed[2] = speed[0] + u, speed[1] + v, speed[2] + w

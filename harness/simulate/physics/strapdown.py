@@ -1,4 +1,4 @@
-"""Strapdown integration of increments of angle and velocity, and the rotations that it needs, for compiled loops.
+"""Strapdown integration of increments of angle and velocity, for compiled loops.
 
 An increment covers the time between two ticks. Its angle is the rotation vector from the earlier attitude to the later
 one. Its velocity is the integral of the specific force, in the station's axes at the earlier tick. Both are exact
@@ -10,64 +10,24 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.core.compiled_rotations import (
+    Quaternion,
+    Vector,
+    as_tuple,
+    quaternion_from_vector,
+    quaternion_product,
+    rotate,
+)
 from harness.simulate.readings import GRAVITY_M_S2
 
 STATE = 10
 """Numbers of a motion state: position [m] 0:3, velocity [m/s] 3:6, tracker_from_station 6:10."""
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-
-
-@compiled
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """The Hamilton product p q."""
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
-
-
-@compiled
-def rotated(q: Quaternion, x: float, y: float, z: float) -> Vector:
-    """The vector (x, y, z) rotated by a unit quaternion."""
-    u, v, w = q[2] * z - q[3] * y, q[3] * x - q[1] * z, q[1] * y - q[2] * x
-    return (
-        x + 2.0 * (q[0] * u + q[2] * w - q[3] * v),
-        y + 2.0 * (q[0] * v + q[3] * u - q[1] * w),
-        z + 2.0 * (q[0] * w + q[1] * v - q[2] * u),
-    )
-
-
-@compiled
-def exponential(x: float, y: float, z: float) -> Quaternion:
-    """The unit quaternion of a rotation vector [rad]."""
-    angle = np.sqrt(x * x + y * y + z * z)
-    half = 0.5 * angle
-    factor = np.sin(half) / angle if angle > 1e-8 else 0.5
-    return np.cos(half), factor * x, factor * y, factor * z
-
-
-@compiled
-def logarithm(q: Quaternion) -> Vector:
-    """The rotation vector of a unit quaternion [rad], of length pi at most."""
-    sine = np.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    factor = np.arctan2(sine, abs(q[0])) / sine if sine > 1e-12 else 1.0
-    factor = 2.0 * factor if q[0] >= 0.0 else -2.0 * factor
-    return factor * q[1], factor * q[2], factor * q[3]
-
-
-@compiled
-def quaternion(row: Floats) -> Quaternion:
-    """The quaternion in a row (4,)."""
-    return row[0], row[1], row[2], row[3]
 
 
 @compiled
 def attitude(state: Floats) -> Quaternion:
     """The quaternion in a motion state (10,)."""
-    return state[6], state[7], state[8], state[9]
+    return as_tuple(state[6:10])
 
 
 @compiled
@@ -86,11 +46,11 @@ def integrate(before: Floats, angle: Vector, velocity: Vector, duration_s: float
     (1998), without the corrections that exact increments do not need.
     """
     q = attitude(before)
-    x, y, z = rotated(q, velocity[0], velocity[1], velocity[2])
+    x, y, z = rotate(q, velocity[0], velocity[1], velocity[2])
     after[3] = before[3] + x
     after[4] = before[4] + y
     after[5] = before[5] + z + GRAVITY_M_S2 * duration_s
     for i in range(3):
         after[i] = before[i] + 0.5 * duration_s * (before[3 + i] + after[3 + i])
-    set_attitude(after, product(q, exponential(angle[0], angle[1], angle[2])))
+    set_attitude(after, quaternion_product(q, quaternion_from_vector(angle[0], angle[1], angle[2])))
     return x, y, z

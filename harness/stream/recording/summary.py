@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
 from harness.stream.frame import TrackerFrame
+from harness.stream.station_counts import StationCounts
 
 
 class StreamSummary:
@@ -16,26 +14,17 @@ class StreamSummary:
 
     def __init__(self, stations: Sequence[str]) -> None:
         self._stations = tuple(stations)
-        self._frames = 0
+        self._counts = StationCounts(len(stations))
         self._began_s = self._ended_s = self._longest_gap_s = 0.0
-        self._records = np.zeros(len(stations), dtype=np.int64)
-        self._positions, self._orientations = self._records.copy(), self._records.copy()
-        self._suspect = self._records.copy()
-        self._quality_sum: Floats = np.zeros(len(stations))
 
     def add(self, frame: TrackerFrame) -> None:
         """Add a frame to the statistics."""
-        if self._frames:
+        if self._counts.frames:
             self._longest_gap_s = max(self._longest_gap_s, frame.received_s - self._ended_s)
         else:
             self._began_s = frame.received_s
         self._ended_s = frame.received_s
-        self._frames += 1
-        self._records += ~np.isnan(frame.measured_s) | frame.position_valid | frame.orientation_valid
-        self._positions += frame.position_valid
-        self._orientations += frame.orientation_valid
-        self._suspect += frame.suspect
-        self._quality_sum += frame.quality
+        self._counts.add(frame)
 
     @property
     def duration_s(self) -> float:
@@ -47,31 +36,26 @@ class StreamSummary:
 
         The counts are frames with a record, with a position, with an orientation, and suspect ones.
         """
-        columns = (
-            self._records,
-            self._positions,
-            self._orientations,
-            self._suspect,
-            self._quality_sum / max(self._frames, 1),
-        )
+        counts = self._counts
+        columns = (counts.records, counts.positions, counts.orientations, counts.suspect, counts.mean_quality)
         names = ("records", "positions", "orientations", "suspect", "quality")
         by_station = zip(self._stations, zip(*(column.tolist() for column in columns), strict=True), strict=True)
         return {
-            "frames": self._frames,
+            "frames": counts.frames,
             "duration_s": self.duration_s,
-            "rate_hz": (self._frames - 1) / self.duration_s if self.duration_s > 0.0 else None,
+            "rate_hz": (counts.frames - 1) / self.duration_s if self.duration_s > 0.0 else None,
             "longest_gap_s": self._longest_gap_s,
             "stations": {station: dict(zip(names, row, strict=True)) for station, row in by_station},
         }
 
     def __str__(self) -> str:
-        rate = f", {(self._frames - 1) / self.duration_s:.2f} Hz" if self.duration_s > 0.0 else ""
-        head = f"{self._frames} frames in {self.duration_s:.2f} s{rate}, longest gap {1e3 * self._longest_gap_s:.0f} ms"
+        counts, frames = self._counts, self._counts.frames
+        rate = f", {(frames - 1) / self.duration_s:.2f} Hz" if self.duration_s > 0.0 else ""
+        head = f"{frames} frames in {self.duration_s:.2f} s{rate}, longest gap {1e3 * self._longest_gap_s:.0f} ms"
         rows = []
         for i, station in enumerate(self._stations):
-            counts = (self._records[i], self._positions[i], self._orientations[i])
-            records, positions, orientations = (format_share(count / max(self._frames, 1), 1) for count in counts)
-            quality = self._quality_sum[i] / max(self._frames, 1)
-            rows.append([station, records, positions, orientations, str(self._suspect[i]), format_fixed(quality, 2)])
+            seen = (counts.records[i], counts.positions[i], counts.orientations[i])
+            shares = [format_share(count / max(frames, 1), 1) for count in seen]
+            rows.append([station, *shares, str(counts.suspect[i]), format_fixed(float(counts.mean_quality[i]), 2)])
         table = Table(["station", "with a record", "position", "orientation", "suspect", "mean quality"], rows)
         return "\n".join([head, "", *table.lines()])

@@ -17,7 +17,7 @@ from harness.core.files import content_key, to_json_types
 from harness.core.line_loss import BAUD, describe_line_loss
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.experiment.engine import CellResults, run_cells
+from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
@@ -53,7 +53,7 @@ class SetRequest:
     link: bool = False
 
 
-RunCells = Callable[..., CellResults]
+RunCells = Callable[..., BatchResults]
 
 
 @dataclass
@@ -134,7 +134,7 @@ class CellCache:
             by_clip[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
         return by_clip
 
-    def _add(self, scenarios: Iterable[Scenario], cells: CellResults) -> None:
+    def _add(self, scenarios: Iterable[Scenario], cells: BatchResults) -> None:
         """Add results; rows are in planned order, without those of failed cells."""
         rows = iter(cells.rows)
         for scenario in scenarios:

@@ -85,7 +85,6 @@ class CaptureResult:
 
     clip: str
     sha256: str
-    note: Mapping[str, Any]
     frames: int
     damage: tuple[str, ...]
     notes: tuple[str, ...]
@@ -159,7 +158,6 @@ class _CaptureRun:
         return CaptureResult(
             clip=str(self.clip),
             sha256=self.sha256,
-            note=self.note,
             frames=len(self.device.frames),
             damage=self.stream.recording.damage,
             notes=self.device.notes,

@@ -15,6 +15,7 @@ from harness.core.runs import find_runs
 from harness.experiment.observed_take import ObservedTake
 from harness.results.trust_findings import StreamHealth
 from harness.simulate.trajectory import Trajectory
+from harness.stream.station_counts import StationCounts
 
 FEATURES = {"position error": "m", "orientation error": "rad"}
 """Error -> its unit; each is a vector in the tracker's axes."""
@@ -97,11 +98,11 @@ def count_health(take: ObservedTake) -> list[HealthCounts]:
         duration_s = received_s * count / (count - 1) if count > 1 else 1.0 / take.rate_hz
         valid = np.zeros((count, stations), dtype=bool)
         valid[loop.index - loop.expected.start] = [frame.position_valid for frame in read]
-        suspect = np.array([frame.suspect for frame in read]).sum(axis=0)
-        quality = np.array([np.where(frame.position_valid, frame.quality, 0.0) for frame in read]).sum(axis=0)
+        counts = StationCounts(stations)
+        for frame in read:
+            counts.add(frame)
+        quality = counts.quality.tolist()
         for k in range(stations):
-            gaps = len(find_runs(~valid[:, k]))
-            lost = int(count - valid[:, k].sum())
-            counts = HealthCounts(count, lost, int(suspect[k]), gaps, duration_s, float(quality[k]))
-            total[k] = total[k].add(counts)
+            gaps, lost = len(find_runs(~valid[:, k])), count - int(counts.positions[k])
+            total[k] = total[k].add(HealthCounts(count, lost, int(counts.suspect[k]), gaps, duration_s, quality[k]))
     return total

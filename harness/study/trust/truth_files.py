@@ -98,7 +98,7 @@ def fit_rigid_body(path: Path, station: str, position_m: Floats) -> tuple[Floats
         turned = []
         for frame in whole[:: max(len(whole) // 200, 1)]:
             centred = position_m[frame] - position_m[frame].mean(axis=0)
-            turned.append(centred @ _best_rotation(shape, centred))
+            turned.append(centred @ rotations.nearest_rotation(centred.T @ shape))
         shape = np.mean(turned, axis=0)
     place, turn = np.full((len(position_m), 3), np.nan), np.full((len(position_m), 4), np.nan)
     squared, count = 0.0, 0
@@ -107,7 +107,7 @@ def fit_rigid_body(path: Path, station: str, position_m: Floats) -> tuple[Floats
         if seen.sum() < FEWEST_MARKERS or np.linalg.svd(shape[seen] - shape[seen].mean(axis=0))[1][1] < _LEAST_SPREAD_M:
             continue
         middle, centre = points_m[seen].mean(axis=0), shape[seen].mean(axis=0)
-        matrix = _best_rotation(shape[seen] - centre, points_m[seen] - middle)
+        matrix = rotations.nearest_rotation((points_m[seen] - middle).T @ (shape[seen] - centre))
         place[frame], turn[frame] = middle - matrix @ centre, rotations.from_matrix(matrix)
         squared += float(np.sum((points_m[seen] - place[frame] - shape[seen] @ matrix.T) ** 2))
         count += int(seen.sum())
@@ -216,11 +216,3 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
 
 def _is_marker_of(label: str, station: str) -> bool:
     return _LABEL_END.sub("", label.strip()).lower() == station.lower()
-
-
-def _best_rotation(shape: Floats, points: Floats) -> Floats:
-    """The rotation matrix (3, 3) that turns a centred shape (M, 3) onto centred points (Kabsch 1976)."""
-    u, _, vt = np.linalg.svd(points.T @ shape)
-    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    out: Floats = u @ sign @ vt
-    return out

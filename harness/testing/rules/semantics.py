@@ -4,12 +4,11 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.estimate import Origin, Status, session_lag
+from harness.core.estimate import LOST_AFTER_S, Origin, Status, session_lag
 from harness.core.training_data import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
 from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE
 from harness.score.angles import wrap_difference
 from harness.score.loops import WARM_UP_S

@@ -23,7 +23,7 @@ def queries(frames: list[TrackerFrame]) -> tuple[ExampleFeatures, list[Query]]:
     database = MotionDatabase.build(shown.body, takes)
     examples = ExampleFeatures(shown.body, database, shown.calibration, FeatureWeights(), "kd_tree", COUNT)
     residuals = Residuals(shown.body, shown.calibration, Loss())
-    features, out = QueryFeatures(residuals, shown.calibration, examples, 0.2), []
+    features, out = QueryFeatures(residuals, shown.calibration, examples), []
     for frame in frames:
         residuals.read(frame)
         out.append(features.compute(frame, shown.take.qpos[round(40.0 * frame.received_s)]))

@@ -47,23 +47,9 @@ def test_as_many_cells_as_vectors_leave_each_alone(count: int) -> None:
     assert len(set(cluster_vectors(vectors, count, generator(1, "cells")))) == count
 
 
-@pytest.mark.parametrize(("count", "size", "cells"), [(600, 5, 3), (2000, 21, 40), (3100, 32, 62)])
-def test_centroids_are_those_of_faiss(count: int, size: int, cells: int) -> None:
-    """Earlier results were computed with faiss: the start, the iterations and the rounding are the same."""
-    faiss = pytest.importorskip("faiss", reason="faiss is not installed (extra `bench`)")
-    vectors, _ = blobs(count, size)
-    flat, clustering = faiss.IndexFlatL2(size), faiss.Clustering(size, cells)
-    clustering.seed, clustering.niter = 1, 6
-    clustering.min_points_per_centroid, clustering.max_points_per_centroid = 1, count
-    clustering.train(vectors, flat)
-    centroids = find_centroids(vectors, cells)
-    np.testing.assert_array_equal(centroids, flat.reconstruct_n(0, cells))
-    np.testing.assert_array_equal(nearest_centroids(vectors, centroids), flat.search(vectors, 1)[1][:, 0])
-
-
 def test_a_centroid_to_which_none_is_nearest_stays() -> None:
     vectors = np.full((30, 4), 3.0, np.float32)
-    centroids = find_centroids(vectors, 5)
+    centroids = find_centroids(vectors, 5, generator(1, "start"))
     np.testing.assert_array_equal(centroids[1:], vectors[1:5])
     np.testing.assert_allclose(centroids[0], vectors[0], rtol=1e-6)
 

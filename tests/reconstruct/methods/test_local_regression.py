@@ -116,7 +116,7 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     examples = ExampleFeatures(walk.body, database, walk.calibration, FeatureWeights(), "flat", 8)
     row = 20
     residuals = Residuals(walk.body, walk.calibration, Loss())
-    outlook = QueryFeatures(residuals, walk.calibration, examples, 0.2)
+    outlook = QueryFeatures(residuals, walk.calibration, examples)
     for frame in walk.frames[row - 1 : row + 1]:
         residuals.read(frame)
         query = outlook.compute(frame, walk.take.qpos[row])

@@ -1,28 +1,11 @@
-"""Strapdown integration and its rotations."""
+"""Strapdown integration."""
 
 import numpy as np
-import pytest
 
 from harness.core import rotations
-from harness.simulate.physics.strapdown import exponential, integrate, logarithm, product, rotated
+from harness.simulate.physics.strapdown import integrate
 from harness.simulate.readings import GRAVITY_M_S2
 from tests.simulate.physics.free_station import TICK_HZ, free_station
-
-
-@pytest.mark.parametrize("angle_rad", [0.0, 1e-12, 1e-7, 1e-3, 1.0, np.pi - 1e-6])
-def test_rotations_equal_those_of_core(angle_rad: float, rng: np.random.Generator) -> None:
-    axis, other = rng.standard_normal(3), rotations.exp(rng.standard_normal(3))
-    vector = angle_rad * axis / np.linalg.norm(axis)
-    turn = exponential(*vector)
-    np.testing.assert_allclose(turn, rotations.exp(vector), atol=1e-15)
-    np.testing.assert_allclose(logarithm(turn), vector, atol=1e-9)
-    np.testing.assert_allclose(product(turn, tuple(other)), rotations.multiply(np.array(turn), other), atol=1e-15)
-    np.testing.assert_allclose(rotated(tuple(other), *axis), rotations.rotate(other, axis), atol=1e-14)
-
-
-def test_the_logarithm_of_the_other_sign_is_the_same() -> None:
-    w, x, y, z = exponential(0.3, -0.2, 0.1)
-    np.testing.assert_allclose(logarithm((-w, -x, -y, -z)), (0.3, -0.2, 0.1), atol=1e-15)
 
 
 def test_free_fall_is_a_parabola() -> None:

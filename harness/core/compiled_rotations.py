@@ -1,4 +1,4 @@
-"""Quaternions for compiled loops: unit, (w, x, y, z), as tuples of four numbers, which cost no memory allocation.
+"""Rotations for compiled loops: unit quaternions (w, x, y, z) as tuples, which cost no memory allocation.
 
 `core.rotations` has the same operations on numpy arrays of any shape.
 """
@@ -19,13 +19,13 @@ def as_tuple(q: Floats) -> Quaternion:
 
 
 @compiled
-def quaternion_product(q: Quaternion, w: float, x: float, y: float, z: float) -> Quaternion:
-    """The Hamilton product of q and (w, x, y, z)."""
+def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
+    """The Hamilton product p q."""
     return (
-        q[0] * w - q[1] * x - q[2] * y - q[3] * z,
-        q[0] * x + q[1] * w + q[2] * z - q[3] * y,
-        q[0] * y - q[1] * z + q[2] * w + q[3] * x,
-        q[0] * z + q[1] * y - q[2] * x + q[3] * w,
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
     )
 
 
@@ -41,11 +41,20 @@ def rotate(q: Quaternion, x: float, y: float, z: float) -> Vector:
 
 
 @compiled
-def rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
+def quaternion_from_vector(x: float, y: float, z: float) -> Quaternion:
+    """The quaternion of a rotation vector [rad]: `rotations.exp`."""
+    angle = np.sqrt(x * x + y * y + z * z)
+    half = 0.5 * angle
+    factor = np.sin(half) / angle if angle > 1e-8 else 0.5
+    return np.cos(half), factor * x, factor * y, factor * z
+
+
+@compiled
+def rotation_vector(q: Quaternion) -> Vector:
     """The rotation vector [rad] of a quaternion, of length pi at most: `rotations.log`."""
-    sine = np.sqrt(x * x + y * y + z * z) + 1e-12
-    factor = np.arctan2(sine, abs(w)) / sine * (2.0 if w >= 0.0 else -2.0)
-    return factor * x, factor * y, factor * z
+    sine = np.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) + 1e-12
+    factor = np.arctan2(sine, abs(q[0])) / sine * (2.0 if q[0] >= 0.0 else -2.0)
+    return factor * q[1], factor * q[2], factor * q[3]
 
 
 @compiled
