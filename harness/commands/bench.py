@@ -114,7 +114,7 @@ def _bench_truth(args: argparse.Namespace) -> Outcome:
     from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
     from harness.bench.physics.truth import SEEDS, truth_rows
     from harness.report.physics.error_comparison import ErrorModelComparison
-    from harness.report.physics.writer import write_physics_page
+    from harness.report.physics.page import write_physics_page
 
     if args.what != ["physics"]:
         raise BadInput("--truth is for physics or lab alone.", "Run: harness bench physics --truth.")

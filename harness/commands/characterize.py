@@ -52,11 +52,11 @@ def add_characterize(verbs: Verbs) -> None:
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
-    from harness.commands.characterized_unit import unit_report
     from harness.core.output_file import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
-    from harness.report.lab.unit_page import write_unit_page
-    from harness.report.lab.unit_text import format_unit
+    from harness.report.kit.page_html import write_page
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.unit_page import unit_page
     from harness.study.trust.characterization import characterize_capture
 
     if args.out is not None:
@@ -67,19 +67,19 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     capture = _capture_of(args)
     with ProgressBar("parts") as progress:
         found = characterize_capture(capture, expected=expected, rigid=pair, progress=progress)
-    report = unit_report(found, capture, this_command(), args.out)
-    lines = [format_unit(report)]
+    page = unit_page(found.report, this_command(), args.out.name if args.out else "")
+    lines = [page_text(page)]
     content = {
         "unit": found.unit.name,
         "parameters": {key: number.as_dict() for key, number in found.profile.parameters.items()},
         "timing": {key: number.as_dict() for key, number in found.profile.timing.all_stations.items()},
         "departures": [
             {
-                "key": check.departure.key,
-                "station": check.departure.station,
-                "measured": check.departure.measured.as_dict(),
-                "expected": check.departure.expected.as_dict(),
-                "p": check.departure.p,
+                "key": check.key,
+                "station": check.station,
+                "measured": check.measured.as_dict(),
+                "expected": check.expected.as_dict(),
+                "p": check.p,
                 "p_holm": check.p_holm,
             }
             for check in found.named
@@ -89,9 +89,9 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     if args.out is not None:
         write_unit_file(args.out, found.unit, force=args.force)
         with show_steps("parts of the report"):
-            page = write_unit_page(args.out.with_suffix(".html"), report)
-        lines += [f"unit file: {args.out}", f"report: {page}"]
-        content |= {"unit_file": str(args.out), "page": str(page)}
+            report = write_page(page, args.out.with_suffix(".html"))
+        lines += [f"unit file: {args.out}", f"report: {report}"]
+        content |= {"unit_file": str(args.out), "page": str(report)}
     return print_result(args, content, *lines)
 
 

@@ -30,7 +30,7 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     from harness.compare.comparison import compare_runs
     from harness.core.files import to_json_types
     from harness.core.options import split_outside_brackets
-    from harness.report.comparison.writer import text, write_comparison_page
+    from harness.report.comparison.page import comparison_text, write_comparison_page
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
@@ -47,6 +47,6 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     with show_steps("parts of the report"):
         page = write_comparison_page(comparison, args.html) if args.html else None
     content = {**to_json_types(asdict(comparison)), "page": page and str(page)}
-    lines = [text(comparison), *([f"page: {page}"] if page else [])]
+    lines = [comparison_text(comparison), *([f"page: {page}"] if page else [])]
     following = () if page else (*this_words(), "--html", "comparison.html")
     return print_result(args, content, *lines, outcome=comparison.outcome, following=following)

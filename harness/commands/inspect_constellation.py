@@ -14,8 +14,6 @@ from harness.report.coverage.content import (
     CoverageRow,
     PlanView,
     StationRow,
-    place_table,
-    station_table,
 )
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
 from harness.simulate.physics.coverage import PlaceCoverage, grid_m, place_coverage, plan_axes_m
@@ -43,19 +41,16 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     if args.out is not None and args.out.exists() and not args.force:
         raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")
     constellation = _load(args.file)
-    from harness.core.files import write_text
     from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page
+    from harness.report.kit.page_html import write_page
+    from harness.report.kit.page_text import page_text
 
     with show_steps("parts"):
         report_step("coverage")
         content = _content(args, constellation)
-        html = coverage_page(content)
-    page.parent.mkdir(parents=True, exist_ok=True)
-    write_text(page, html)
-    lines = [f"{content.emitters}; {content.reach}; {content.turn}", *place_table(content.rows).lines()]
-    if content.stations:
-        lines += [f"stations of {content.clip}, in the shadow of the body:", *station_table(content.stations).lines()]
+        shown = coverage_page(content)
+        write_page(shown, page)
     said = {
         "emitters": len(constellation),
         "rows": [asdict(row) for row in content.rows],
@@ -64,7 +59,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
         "page": str(page),
     }
     following = [] if args.clip else ["inspect", args.file, "--clip", "walking_p1_01", *repeat_flags(args, "mocap")]
-    return print_result(args, said, *lines, f"page: {page}", following=following)
+    return print_result(args, said, page_text(shown), f"page: {page}", following=following)
 
 
 def _load(path: Path) -> Constellation:

@@ -38,8 +38,7 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
     from harness.core.files import to_json_types
-    from harness.report.paper.text import text_tables
-    from harness.report.paper.writer import write_paper_page
+    from harness.report.paper.page import paper_text, write_paper_page
     from harness.study.papers.paper import load_paper, reproduce
 
     paper = load_paper(args.paper)
@@ -65,5 +64,5 @@ def run_paper(args: argparse.Namespace) -> Outcome:
         page = write_paper_page(out)
     content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     following = [] if outcome is Outcome.PASS else [*this_words()]
-    lines = (text_tables(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
+    lines = (paper_text(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
     return print_result(args, content, *lines, outcome=outcome, following=following)

@@ -75,9 +75,8 @@ def run_placement(args: argparse.Namespace) -> Outcome:
 
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
-    from harness.report.placement.text import text
+    from harness.report.placement.page import placement_text, write_placement_page
     from harness.report.placement.wording import sentence
-    from harness.report.placement.writer import write_placement_page
     from harness.results.folder_kind import FINDINGS
     from harness.study.placement import placement_study
 
@@ -109,7 +108,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         page = write_placement_page(out)
     answer = sentence(findings)
     content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
-    lines = (text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
+    lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()
     return print_result(args, content, *lines, outcome=outcome, following=following)
 

@@ -54,7 +54,7 @@ def _report_sweep(args: argparse.Namespace) -> Outcome:
 
 
 def _report_placement(args: argparse.Namespace) -> Outcome:
-    from harness.report.placement.writer import write_placement_page
+    from harness.report.placement.page import write_placement_page
 
     with show_steps("parts of the report"):
         page = write_placement_page(args.run)
@@ -62,8 +62,8 @@ def _report_placement(args: argparse.Namespace) -> Outcome:
 
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
+    from harness.report.paper.page import write_paper_page
     from harness.report.paper.readme import update_readme
-    from harness.report.paper.writer import write_paper_page
     from harness.results.findings import read_findings
     from harness.results.folder_kind import FINDINGS
 

@@ -33,9 +33,8 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     from harness.experiment.engine import run_sweep as run
     from harness.experiment.executors import dask_executor, process_executor
     from harness.experiment.sweep_config import expand_sweep, load_sweep
-    from harness.report.sweep.page import write_sweep_page
+    from harness.report.sweep.page import sweep_text, write_sweep_page
     from harness.report.sweep.reader import read_sweep
-    from harness.report.sweep.text import text
     from harness.results.integrity import read_summary_json
 
     if args.dask and args.jobs and args.dask != "local":
@@ -70,7 +69,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     files = (*notes, f"table: {out / 'summary.csv'}", f"report: {page}")
     following = [] if outcome is Outcome.PASS else ["status", out]
     content = {**summary, "out": str(out), "report": str(page)}
-    return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome, following=following)
+    return print_result(args, content, sweep_text(read_sweep(out)), *files, outcome=outcome, following=following)
 
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:

@@ -29,9 +29,9 @@ def run_trust(args: argparse.Namespace) -> Outcome:
 
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
-    from harness.report.lab.trust_content import TrustReport
-    from harness.report.lab.trust_page import write_trust_page
-    from harness.report.lab.trust_text import format_trust
+    from harness.report.kit.page_html import write_page
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.trust_page import trust_page
     from harness.study.trust.trust_study import run_trust_study
 
     out = args.out or Path("results") / f"trust_{args.plan.stem}"
@@ -51,8 +51,8 @@ def run_trust(args: argparse.Namespace) -> Outcome:
             executor=executor,
             progress=bar,
         )
-    report = TrustReport(study.findings, this_command())
+    page = trust_page(study.findings, this_command())
     with show_steps("parts of the report"):
-        page = write_trust_page(out / "report.html", report)
-    content = {**to_json_types(asdict(study.findings)), "out": str(out), "report": str(page)}
-    return print_result(args, content, format_trust(report), "", f"report: {page}", outcome=study.findings.outcome)
+        report = write_page(page, out / "report.html")
+    content = {**to_json_types(asdict(study.findings)), "out": str(out), "report": str(report)}
+    return print_result(args, content, page_text(page), "", f"report: {report}", outcome=study.findings.outcome)

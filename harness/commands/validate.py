@@ -31,12 +31,12 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
-    from harness.commands.validated_capture import validation_report
     from harness.core.options import split_outside_brackets
     from harness.core.output_file import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
-    from harness.report.lab.validation_page import write_validation_page
-    from harness.report.lab.validation_text import format_validation
+    from harness.report.kit.page_html import write_page
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.validation_page import validation_page
     from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
 
     if args.out is not None:
@@ -52,7 +52,9 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
         scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
-    report = validation_report(found, args.capture, this_command(), scores)
+    report = found.report(args.capture)
+    errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
+    page = validation_page(report, errors, this_command())
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
@@ -60,28 +62,28 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "exchanged": dict(found.exchanged),
         "departures": [
             {
-                "key": check.departure.key,
-                "station": check.departure.station,
-                "measured": check.departure.measured.as_dict(),
-                "expected": check.departure.expected.as_dict(),
+                "key": check.key,
+                "station": check.station,
+                "measured": check.measured.as_dict(),
+                "expected": check.expected.as_dict(),
                 "p_holm": check.p_holm,
             }
             for check in found.named
         ],
         "scores": [
-            {"method": one.method, "metric": metric, "value": one.metrics[metric]}
-            for one in scores
-            for metric in one.names
+            {"method": method, "metric": metric, "value": value}
+            for method, values in errors.items()
+            for metric, value in values.items()
         ],
         "damage": list(found.reader.damage),
     }
-    lines = [format_validation(report)]
+    lines = [page_text(page)]
     if args.out is not None:
         write_unit_file(args.out, session_unit(found, expected, args.out.stem), force=args.force)
         with show_steps("parts of the report"):
-            page = write_validation_page(args.out.with_suffix(".html"), report)
-        lines += [f"unit file: {args.out}", f"report: {page}"]
-        content |= {"unit_file": str(args.out), "page": str(page)}
+            file = write_page(page, args.out.with_suffix(".html"))
+        lines += [f"unit file: {args.out}", f"report: {file}"]
+        content |= {"unit_file": str(args.out), "page": str(file)}
     failures = {one.method: one.failure for one in scores if one.failure}
     lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
     content |= {"failures": failures} if failures else {}

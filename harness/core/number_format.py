@@ -25,13 +25,6 @@ def format_number(value: float | None, unit: str, *, decimals: int = 0, signed: 
     return format_fixed(value, max(decimals, _DECIMALS.get(unit, 2)), signed=signed, grouped=True)
 
 
-def format_interval(low: float | None, high: float | None, decimals: int, *, signed: bool = False) -> str:
-    """ "1.78 to 2.02", with separated thousands; empty where the interval was not computed."""
-    if low is None or high is None:
-        return ""
-    return " to ".join(format_fixed(end, decimals, signed=signed, grouped=True) for end in (low, high))
-
-
 def format_mean_sd(mean: float | None, sd: float | None, decimals: int) -> str:
     """ "1.90 ± 0.12"; the mean alone where there is no standard deviation, `NOT_MEASURED` without a mean."""
     spread = "" if mean is None or sd is None else f" ± {format_fixed(sd, decimals)}"

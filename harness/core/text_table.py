@@ -15,8 +15,8 @@ class Table:
 
     head: Sequence[object]
     rows: Sequence[Sequence[object]]
-    text_columns: int = 1
-    """Columns from the left that are aligned left in text; the others hold numbers and are aligned right."""
+    text_columns: int | Sequence[int] = 1
+    """Columns that are aligned left in text, by number or as many from the left; the others hold numbers."""
 
     def lines(self) -> list[str]:
         """One line of text for the head and one for each row, columns two blanks apart."""
@@ -35,14 +35,15 @@ class Table:
         return [self._row_lines(row, widths) for row in cells]
 
     def _row_lines(self, row: Sequence[str], widths: Sequence[int]) -> list[str]:
-        columns = []
+        columns, left = [], self.text_columns
+        words = range(left) if isinstance(left, int) else left
         for n, (cell, width) in enumerate(zip(row, widths, strict=True)):
             indent = "" if n else _GAP
             fits = len(cell) <= width
             columns.append([cell] if fits else textwrap.wrap(cell, width, subsequent_indent=indent))
         count = max(map(len, columns))
         padded = [
-            [text.ljust(width) if n < self.text_columns else text.rjust(width) for text in column]
+            [text.ljust(width) if n in words else text.rjust(width) for text in column]
             + [" " * width] * (count - len(column))
             for n, (column, width) in enumerate(zip(columns, widths, strict=True))
         ]

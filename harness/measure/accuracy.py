@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.interval import Interval
 from harness.core.seeds import generator
-from harness.measure.measured import Measured
 
 _BLOCK_S = 5.0
 """Length of the blocks that the bootstrap draws [s]: five correlation times of the drift."""
@@ -18,9 +18,23 @@ _RESAMPLES = 400
 class ErrorQuantiles:
     """Root mean square, median and 95 % quantile of the size of an error."""
 
-    rms: Measured
-    median: Measured
-    quantile95: Measured
+    rms: Interval
+    median: Interval
+    quantile95: Interval
+
+
+@dataclass(frozen=True)
+class StationAccuracy:
+    """Errors of one station against the reference, after the registration."""
+
+    position: ErrorQuantiles
+    """Errors of the position [m]."""
+    orientation: ErrorQuantiles
+    """Errors of the orientation [rad]."""
+    readings: int
+    """Number of readings that were compared."""
+    lost_share: float
+    """Share of the readings without a position."""
 
 
 def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuantiles:
@@ -33,7 +47,7 @@ def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuanti
     blocks = [size[at : at + length][valid[at : at + length]] for at in range(0, len(size), length)]
     blocks = [block for block in blocks if len(block) >= length // 2]
     if len(blocks) < _FEWEST_BLOCKS:
-        missing = Measured.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of readings are needed.")
+        missing = Interval.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of readings are needed.")
         return ErrorQuantiles(missing, missing, missing)
     rng = generator(0, "error quantiles")
     draws = rng.integers(0, len(blocks), (_RESAMPLES, len(blocks)))
@@ -41,7 +55,7 @@ def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuanti
     values, count = _summary(np.concatenate(blocks)), sum(map(len, blocks))
     low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
     rms, median, large = (
-        Measured(value, min(float(a), value), max(float(b), value), count)
+        Interval(value, min(float(a), value), max(float(b), value), count)
         for value, a, b in zip(values, low, high, strict=True)
     )
     return ErrorQuantiles(rms, median, large)

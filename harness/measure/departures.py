@@ -3,7 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
+
+NAMED_LEVEL = 0.05
+"""Largest corrected p-value with which a departure is named."""
 
 
 @dataclass(frozen=True)
@@ -14,14 +17,21 @@ class Departure:
     """Name of the number: the dotted key of a scenario, or a name of the timing or of the registration."""
     station: str
     """Station that was measured; "" is all stations together."""
-    measured: Measured
-    expected: Measured
+    measured: Interval
+    expected: Interval
     """The expected number; its interval has no width where it is known exactly, as that of a preset."""
     p: float
     """Two-sided p-value of the difference, not corrected for the number of checks."""
+    p_holm: float = 1.0
+    """`p` corrected for the number of checks (Holm 1979); 1 before the correction."""
+
+    @property
+    def is_named(self) -> bool:
+        """Whether the measured number differs from the expected one at the 5 % level over all checks."""
+        return self.p_holm <= NAMED_LEVEL
 
 
-def compare_with_expected(key: str, station: str, measured: Measured, expected: Measured) -> Departure:
+def compare_with_expected(key: str, station: str, measured: Interval, expected: Interval) -> Departure:
     """Compare a measured number with the expected one by a normal test.
 
     The standard deviation of each is read off its interval, on the side of the other. Both must be measured.

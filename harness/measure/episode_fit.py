@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.interval import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
 from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
 from harness.measure.episode_share import episode_share
@@ -21,7 +22,6 @@ from harness.measure.excursions import (
     ExcursionSearch,
 )
 from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
-from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.measure.static_series import StaticSeries
 from harness.measure.uniform_size import fit_uniform
 from harness.measure.vector_length import fit_length
@@ -76,11 +76,11 @@ class SeriesEpisodes:
 class EpisodeFit:
     """Episodes of all series, and the parameters behind them."""
 
-    parameters: Mapping[str, Measured]
+    parameters: Mapping[str, Interval]
     """Dotted key -> number, by `EPISODE_KEYS`."""
-    means: Mapping[str, Measured]
+    means: Mapping[str, Interval]
     """Key without an index -> mean of a distribution of which the parameters are the ends."""
-    by_station: Mapping[str, Mapping[str, Measured]]
+    by_station: Mapping[str, Mapping[str, Interval]]
     """Station -> rate of excursions, share of echoes and share of losses, by the same keys."""
     found: tuple[SeriesEpisodes, ...]
 
@@ -136,7 +136,7 @@ def _longest(found: Sequence[SeriesEpisodes], name: str) -> float:
     return float(lengths.max(initial=1))
 
 
-def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], dict[str, Measured]]:
+def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Interval], dict[str, Interval]]:
     lengths = np.concatenate([(one.echoes.end - one.echoes.begin)[one.echoes.whole] for one in found])
     sizes_m = np.concatenate([one.echoes.size_m[one.echoes.whole] for one in found])
     low, high, mean_m = fit_uniform(sizes_m, _ECHO_ERROR_M, strays=_STRAYS)
@@ -151,28 +151,28 @@ def _fit_echoes(found: Sequence[SeriesEpisodes]) -> tuple[dict[str, Measured], d
     return parameters, {"components.echo.burst_records": mean_records, "components.echo.size_m": mean_m}
 
 
-def _integer_ends(values: Floats) -> tuple[Measured, Measured, Measured]:
+def _integer_ends(values: Floats) -> tuple[Interval, Interval, Interval]:
     """Ends and mean of a uniform distribution of whole numbers: the extremes, and what they leave possible."""
     count = len(values)
     if count < 10:
-        missing = Measured.missing(f"There are {count} whole bursts, of at least 10.")
+        missing = Interval.missing(f"There are {count} whole bursts, of at least 10.")
         return missing, missing, missing
     low, high = int(values.min()), int(values.max())
     slack = 0
     while ((high - low + 1) / (high - low + 2 + slack)) ** count > 0.05:
         slack += 1
-    mean = Measured.normal(float(values.mean()), float(values.std(ddof=1)) / np.sqrt(count), count)
-    return Measured(low, max(low - slack, 1), low, count), Measured(high, high, high + slack, count), mean
+    mean = Interval.normal(float(values.mean()), float(values.std(ddof=1)) / np.sqrt(count), count)
+    return Interval(low, max(low - slack, 1), low, count), Interval(high, high, high + slack, count), mean
 
 
-def _echo_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Measured:
+def _echo_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Interval:
     """Share of valid readings that are echoes; a burst may have the length `longest`."""
     lengths = np.concatenate([one.echoes.end - one.echoes.begin for one in found]).astype(float)
     valid = sum(int(one.series.valid.sum()) for one in found)
     return episode_share(lengths, valid, longest)
 
 
-def _lost_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Measured:
+def _lost_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Interval:
     """Share of samples that are lost; a gap may have the length `longest`."""
     lengths = np.concatenate([one.gaps.end - one.gaps.begin for one in found]).astype(float)
     return episode_share(lengths, sum(len(one.series) for one in found), longest)
@@ -180,7 +180,7 @@ def _lost_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Measur
 
 def _fit_gaps(
     found: Sequence[SeriesEpisodes], noise: ExcursionNoise
-) -> tuple[dict[str, Measured], dict[str, Measured]]:
+) -> tuple[dict[str, Interval], dict[str, Interval]]:
     durations_s = np.concatenate(
         [((one.gaps.end - one.gaps.begin) / one.series.rate_hz)[one.gaps.whole] for one in found]
     )
@@ -198,19 +198,19 @@ def _fit_gaps(
     return parameters, {"components.dropout.gap_s": mean_s}
 
 
-def _typical(values: Floats) -> Measured:
+def _typical(values: Floats) -> Interval:
     """Median of values that are equal but for rounding, with a margin for it."""
     if len(values) < 5:
-        return Measured.missing(f"There are {len(values)} losses with falling quality before, of at least 5.")
+        return Interval.missing(f"There are {len(values)} losses with falling quality before, of at least 5.")
     middle = float(np.median(values))
     spread = 1.2533 * float(np.median(np.abs(values - middle))) / 0.6745 / np.sqrt(len(values))
-    return Measured.normal(middle, spread + 1e-4 * middle, len(values))
+    return Interval.normal(middle, spread + 1e-4 * middle, len(values))
 
 
-def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Measured, noise: ExcursionNoise) -> Measured:
+def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Interval, noise: ExcursionNoise) -> Interval:
     """Tilt error while coasting: the size of the displacements, beyond that of noise."""
     if not coast_s.is_measured:
-        return Measured.missing(coast_s.reason)
+        return Interval.missing(coast_s.reason)
     tilts, deviation = [], 0.0
     for one in found:
         others = one.echoes.mask(len(one.series))
@@ -229,7 +229,7 @@ def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Measured, noise: Excursi
 
 def _fit_excursions(
     found: Sequence[SeriesEpisodes], searches: Sequence[ExcursionSearch], noise: ExcursionNoise
-) -> tuple[dict[str, Measured], dict[str, Measured]]:
+) -> tuple[dict[str, Interval], dict[str, Interval]]:
     alone = [event for one in found for event in _isolated(one.excursions)]
     sizes_m = np.array([event.size_m for event in alone])
     stays_s = np.array([event.stay_s for event in alone if event.is_timed])
@@ -270,17 +270,17 @@ def _fit_rate(
     noise: ExcursionNoise,
     ends_m: tuple[float, float],
     ends_s: tuple[float, float],
-) -> Measured:
+) -> Interval:
     """Onsets per minute of a station, corrected by injection and recovery."""
     minutes = sum(one.series.duration_s for one in found) / 60.0
     detected = sum(len(_counted(one.excursions)) for one in found)
     if not detected:
-        return Measured(0.0, 0.0, _NONE_SEEN / minutes, 0)
+        return Interval(0.0, 0.0, _NONE_SEEN / minutes, 0)
     recovery, relative, dispersion = _recover(found, searches, noise, detected / minutes, ends_m, ends_s)
     rate_per_min = detected / minutes / recovery
     spread = float(np.sqrt(dispersion / detected + relative**2))
     low, high = (rate_per_min * float(np.exp(sign * NORMAL_QUANTILE * spread)) for sign in (-1.0, 1.0))
-    return Measured(rate_per_min, low, high, detected)
+    return Interval(rate_per_min, low, high, detected)
 
 
 def _counted(events: Sequence[ExcursionEvent]) -> list[ExcursionEvent]:
@@ -347,7 +347,7 @@ def _draw_displacement(
     return out * (largest_m / np.maximum(size_m, largest_m)), sum(begin_s > 0.3 for begin_s in onsets_s)
 
 
-def _station_rate(own: Sequence[SeriesEpisodes], rate: Measured, found: Sequence[SeriesEpisodes]) -> Measured:
+def _station_rate(own: Sequence[SeriesEpisodes], rate: Interval, found: Sequence[SeriesEpisodes]) -> Interval:
     """Rate of one station: its count, with the correction of all stations and the interval of its count."""
     from scipy import special
 
@@ -359,4 +359,4 @@ def _station_rate(own: Sequence[SeriesEpisodes], rate: Measured, found: Sequence
     low = float(special.gammaincinv(detected, 0.025)) if detected else 0.0
     high = float(special.gammaincinv(detected + 1, 0.975))
     factor = correction / minutes
-    return Measured(factor * detected, factor * low, factor * high, detected)
+    return Interval(factor * detected, factor * low, factor * high, detected)

@@ -3,10 +3,10 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 
 
-def episode_share(lengths: Floats, total: int, longest: float) -> Measured:
+def episode_share(lengths: Floats, total: int, longest: float) -> Interval:
     """Share of `total` samples in episodes of these lengths, which come independently of each other.
 
     The number of episodes is a Poisson count that is weighted by their lengths; the interval is that of Fay and Feuer
@@ -16,7 +16,7 @@ def episode_share(lengths: Floats, total: int, longest: float) -> Measured:
     from scipy import special
 
     if not total:
-        return Measured.missing("There is no reading at rest.")
+        return Interval.missing("There is no reading at rest.")
     added = max(float(longest), float(lengths.max(initial=0.0)), 1.0)
     counted = float(lengths.sum())
     share = counted / total
@@ -30,4 +30,4 @@ def episode_share(lengths: Floats, total: int, longest: float) -> Measured:
     low = end(0.025, counted, variance)
     high = end(0.975, counted + added, variance + added**2)
     ends = [counted + apart * (limit - counted) for limit in (low, high)]
-    return Measured(share, max(min(ends[0] / total, share), 0.0), min(max(ends[1] / total, share), 1.0), len(lengths))
+    return Interval(share, max(min(ends[0] / total, share), 0.0), min(max(ends[1] / total, share), 1.0), len(lengths))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.interval import NORMAL_QUANTILE, Interval
 from harness.measure.gauss_markov import AXIS_GROUPS, CORRELATION, NOISE_KEYS, NoiseSample
-from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.measure.noise_start import FEWEST_READINGS, SMALLEST_SHARE, noise_samples, rough_logarithms
 from harness.measure.static_series import StaticSeries
 
@@ -35,8 +35,8 @@ _MOST_STEPS = 60
 class NoiseFit:
     """Parameters by `NOISE_KEYS`, of all stations together and of each."""
 
-    all_stations: Mapping[str, Measured]
-    by_station: Mapping[str, Mapping[str, Measured]]
+    all_stations: Mapping[str, Interval]
+    by_station: Mapping[str, Mapping[str, Interval]]
     samples: int
     """Number of readings that the likelihood used."""
 
@@ -51,11 +51,11 @@ def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools], *, by_s
     """
     samples = noise_samples(series, left_out)
     together = _Likelihood(samples).fit(rough_logarithms(samples))
-    stations: dict[str, Mapping[str, Measured]] = {}
+    stations: dict[str, Mapping[str, Interval]] = {}
     for name in dict.fromkeys(one.station for one in series) if by_station else ():
         own = [sample for one, sample in zip(series, samples, strict=True) if one.station == name]
         if sum(sample.readings for sample in own) < FEWEST_READINGS:
-            stations[name] = dict.fromkeys(NOISE_KEYS, Measured.missing("Too few undisturbed readings at rest."))
+            stations[name] = dict.fromkeys(NOISE_KEYS, Interval.missing("Too few undisturbed readings at rest."))
         else:
             stations[name] = _Likelihood(own).fit(rough_logarithms(own))
     return NoiseFit(together, stations, sum(sample.readings for sample in samples))
@@ -76,7 +76,7 @@ class _Likelihood:
             self._low = np.log([*least, least_s])
         self._high = math.log(sum(sample.duration_s for sample in samples))
 
-    def fit(self, start: Floats) -> dict[str, Measured]:
+    def fit(self, start: Floats) -> dict[str, Interval]:
         """Find the maximum near the logarithms `start` (6,), and the interval of each parameter."""
         free = np.isfinite(self._low)
         free[CORRELATION] = bool(self._groups)
@@ -90,23 +90,23 @@ class _Likelihood:
         out = {}
         for row, key in enumerate(NOISE_KEYS):
             if row == CORRELATION and absent[row]:
-                out[key] = Measured.missing("There is no drift whose time could be measured.")
+                out[key] = Interval.missing("There is no drift whose time could be measured.")
             elif not free[row]:
-                out[key] = Measured(0.0, 0.0, 0.0, sum(sample.readings for sample in self._samples))
+                out[key] = Interval(0.0, 0.0, 0.0, sum(sample.readings for sample in self._samples))
             elif absent[row] or deviations[row] > _FLAT:
                 out[key] = self._profile(values, free, row, best, bool(absent[row]))
             else:
                 value, half = float(values[row]), NORMAL_QUANTILE * float(deviations[row])
                 low, high = math.exp(value - half), math.exp(value + half)
-                out[key] = Measured(math.exp(value), low, high, _equivalent(float(deviations[row])))
+                out[key] = Interval(math.exp(value), low, high, _equivalent(float(deviations[row])))
         return out
 
-    def _profile(self, values: Floats, free: Bools, row: int, best: float, absent: bool) -> Measured:
+    def _profile(self, values: Floats, free: Bools, row: int, best: float, absent: bool) -> Interval:
         """A parameter with the interval in which its profile likelihood is high enough."""
         value = 0.0 if absent else math.exp(values[row])
         low = 0.0 if absent else math.exp(self._end(values, free, row, best, -1.0))
         high = math.exp(self._end(values, free, row, best, 1.0))
-        return Measured(value, min(low, value), max(high, value), 1)
+        return Interval(value, min(low, value), max(high, value), 1)
 
     def _climb(self, start: Floats, free: Bools, tolerance: float = _TOLERANCE) -> tuple[Floats, float, Floats]:
         """Maximum over the free parameters, its log-likelihood and the second derivatives there (6, 6).

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
 from harness.measure.excursions import ExcursionNoise
-from harness.measure.measured import Measured
 from harness.measure.noise_fit import NoiseFit, fit_noise
 from harness.measure.noise_start import start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
@@ -48,7 +48,7 @@ class StretchLength:
 
 
 @dataclass(frozen=True)
-class QualityError:
+class QualityClass:
     """Errors at rest of the readings in one class of quality."""
 
     above: float
@@ -77,7 +77,7 @@ class UnitProfile:
     timing: TimingMeasurement
     noise: NoiseFit
     episodes: EpisodeFit
-    quality: tuple[QualityError, ...]
+    quality: tuple[QualityClass, ...]
     rigid: RigidPair | None
     limits: tuple[str, ...]
     """What this capture cannot show, a sentence each."""
@@ -88,9 +88,9 @@ class UnitProfile:
         return tuple(one.series for one in self.episodes.found)
 
     @property
-    def parameters(self) -> dict[str, Measured]:
+    def parameters(self) -> dict[str, Interval]:
         """Dotted key of a scenario -> number."""
-        speed = self.rigid.ahead_s if self.rigid else Measured.missing("Two stations on a bar show it: --rigid A,B.")
+        speed = self.rigid.ahead_s if self.rigid else Interval.missing("Two stations on a bar show it: --rigid A,B.")
         return {
             **self.noise.all_stations,
             **self.episodes.parameters,
@@ -248,7 +248,7 @@ def _excursion_noise(noise: NoiseFit, start: Floats) -> ExcursionNoise:
     )
 
 
-def _quality_errors(series: list[StaticSeries]) -> tuple[QualityError, ...]:
+def _quality_errors(series: list[StaticSeries]) -> tuple[QualityClass, ...]:
     """Distance from the resting place, by classes of quality; the first class holds the lost readings."""
     quality = np.concatenate([one.quality for one in series])
     away_m = np.concatenate([np.linalg.norm(one.position_m, axis=1) for one in series])
@@ -261,5 +261,5 @@ def _quality_errors(series: list[StaticSeries]) -> tuple[QualityError, ...]:
     for above, to, inside in classes:
         known = away_m[inside & np.isfinite(away_m)]
         middle, high = np.quantile(known, [0.5, 0.95]).tolist() if len(known) else (np.nan, np.nan)
-        out.append(QualityError(above, to, float(inside.sum()) / total, middle, high))
+        out.append(QualityClass(above, to, float(inside.sum()) / total, middle, high))
     return tuple(out)

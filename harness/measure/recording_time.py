@@ -2,8 +2,8 @@
 
 import math
 
+from harness.core.interval import NORMAL_QUANTILE
 from harness.errors import BadInput
-from harness.measure.measured import NORMAL_QUANTILE
 
 
 def events_for_precision(precision: float) -> int:

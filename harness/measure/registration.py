@@ -7,6 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
+from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.conventions import (
@@ -19,7 +20,6 @@ from harness.measure.conventions import (
 )
 from harness.measure.correlated_errors import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
-from harness.measure.measured import CHI_QUANTILE, NORMAL_QUANTILE, Measured
 from harness.measure.offset import SpeedSeries, TimeOffset, angular_speed, time_offset
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
@@ -65,24 +65,24 @@ class MountFit:
     def __post_init__(self) -> None:
         freeze(self, position_m=(3,), body_from_station=(4,), covariance=(6, 6))
 
-    def position(self, axis: int) -> Measured:
+    def position(self, axis: int) -> Interval:
         """Position on one axis of the body [m]."""
-        return Measured.normal(
+        return Interval.normal(
             float(self.position_m[axis]), float(np.sqrt(self.covariance[3 + axis, 3 + axis])), self.blocks
         )
 
-    def turn_from(self, nominal: Floats) -> tuple[Measured, Measured, Measured]:
+    def turn_from(self, nominal: Floats) -> tuple[Interval, Interval, Interval]:
         """Rotation vector from a nominal orientation (4,) to the measured one, in the body's axes [rad]."""
         return _turns(self.body_from_station, nominal, self.covariance[:3, :3], self.blocks)
 
-    def angle_from(self, nominal: Floats) -> Measured:
+    def angle_from(self, nominal: Floats) -> Interval:
         """Angle between a nominal orientation (4,) and the measured one [rad].
 
         The interval is 95 % for a vector of three errors, so that it contains zero in 95 % of exact mounts.
         """
         return _length(_vector(self.body_from_station, nominal), self.covariance[:3, :3], self.blocks)
 
-    def distance_from(self, nominal_m: Floats) -> Measured:
+    def distance_from(self, nominal_m: Floats) -> Interval:
         """Distance of the measured position from a nominal one (3,) [m]; the interval as for `angle_from`."""
         return _length(self.position_m - nominal_m, self.covariance[3:, 3:], self.blocks)
 
@@ -115,7 +115,7 @@ class StationResiduals:
 class Registration:
     """Everything that relates a capture to its reference, with 95 % intervals."""
 
-    values: Mapping[str, Measured]
+    values: Mapping[str, Interval]
     """By key, all stations together:
 
     - `time_offset_orientation_s`, `time_offset_position_s`: device's clock minus reference's clock at `reference_s`, by
@@ -152,20 +152,20 @@ class Registration:
         """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
         return self.state.reference_s
 
-    def room_turn_from(self, world_from_tracker: Floats) -> tuple[Measured, Measured, Measured]:
+    def room_turn_from(self, world_from_tracker: Floats) -> tuple[Interval, Interval, Interval]:
         """Rotation vector from an expected `world_from_tracker` (4,) to the measured one, tracker's axes [rad]."""
         measured, expected = rotations.inverse(self.world_from_tracker), rotations.inverse(world_from_tracker)
         x, y, z = _turns(measured, expected, self.room_covariance[:3, :3], self.blocks)
         return x, y, z
 
-    def room_point(self, point_m: Floats) -> tuple[Measured, Measured, Measured]:
+    def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
         """World coordinates of a point (3,) given in the tracker's frame, without the scale error [m]."""
         at_m = rotations.rotate(self.world_from_tracker, point_m)
         turn = rotations.to_matrix(self.world_from_tracker) @ rotations.cross_matrix(point_m)
         slope = np.concatenate([turn, np.eye(3)], axis=1)
         deviation = np.sqrt(np.diag(slope @ self.room_covariance @ slope.T))
         x, y, z = (
-            Measured.normal(float(value), float(one), self.blocks)
+            Interval.normal(float(value), float(one), self.blocks)
             for value, one in zip(self.tracker_origin_m + at_m, deviation, strict=True)
         )
         return x, y, z
@@ -342,14 +342,14 @@ def _result(
     state, covariance, blocks = fit.state, fit.covariance, fit.blocks
     deviation = np.sqrt(np.diag(covariance))
 
-    def measured(value: float, index: int, unit: float = 1.0) -> Measured:
-        return Measured.normal(unit * value, unit * float(deviation[index]), blocks)
+    def measured(value: float, index: int, unit: float = 1.0) -> Interval:
+        return Interval.normal(unit * value, unit * float(deviation[index]), blocks)
 
     both = [OFFSET, AHEAD]
     position_s = float(np.sqrt(np.array([1.0, -1.0]) @ covariance[np.ix_(both, both)] @ np.array([1.0, -1.0])))
     values = {
         "time_offset_orientation_s": measured(state.offset_s, OFFSET),
-        "time_offset_position_s": Measured.normal(state.offset_s - state.ahead_s, position_s, blocks),
+        "time_offset_position_s": Interval.normal(state.offset_s - state.ahead_s, position_s, blocks),
         "position_ahead_s": measured(state.ahead_s, AHEAD),
         "clock_ratio_ppm": measured(state.clock_ratio, CLOCK, 1e6),
         "scale": measured(state.scale, SCALE),
@@ -382,16 +382,16 @@ def _vector(measured: Floats, nominal: Floats) -> Floats:
     return rotations.log(rotations.multiply(measured, rotations.inverse(nominal)))
 
 
-def _turns(measured: Floats, nominal: Floats, covariance: Floats, blocks: int) -> tuple[Measured, Measured, Measured]:
+def _turns(measured: Floats, nominal: Floats, covariance: Floats, blocks: int) -> tuple[Interval, Interval, Interval]:
     vector, deviation = _vector(measured, nominal), np.sqrt(np.diag(covariance))
-    x, y, z = (Measured.normal(float(value), float(one), blocks) for value, one in zip(vector, deviation, strict=True))
+    x, y, z = (Interval.normal(float(value), float(one), blocks) for value, one in zip(vector, deviation, strict=True))
     return x, y, z
 
 
-def _length(vector: Floats, covariance: Floats, blocks: int) -> Measured:
+def _length(vector: Floats, covariance: Floats, blocks: int) -> Interval:
     """Length of a vector (3,) with an interval for three errors: the quantile of chi with three degrees of freedom."""
     length = float(np.linalg.norm(vector))
     largest = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     along = vector / length if length > 0.0 else np.zeros(3)
     deviation = float(np.sqrt(along @ covariance @ along)) if length > 3.0 * largest else largest
-    return Measured.normal(length, deviation * CHI_QUANTILE / NORMAL_QUANTILE, blocks, least=0.0)
+    return Interval.normal(length, deviation * CHI_QUANTILE / NORMAL_QUANTILE, blocks, least=0.0)

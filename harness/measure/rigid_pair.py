@@ -13,8 +13,8 @@ from scipy import special
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
+from harness.core.interval import Interval
 from harness.errors import BadInput
-from harness.measure.measured import Measured
 
 SPEED_EDGES_M_S = (0.0, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Edges of the classes of speed [m/s]; the first class is rest [choice]."""
@@ -35,7 +35,7 @@ class SpeedClass:
 
     from_m_s: float
     to_m_s: float
-    rms_m: Measured
+    rms_m: Interval
     """RMS of the error, of both stations together [m]."""
 
 
@@ -44,11 +44,11 @@ class RigidPair:
     """What two stations on one bar show."""
 
     stations: tuple[str, str]
-    length_m: Measured
+    length_m: Interval
     """Distance of the two stations [m]."""
-    rotation_rad: Measured
+    rotation_rad: Interval
     """RMS of the difference of the two orientations from its mean [rad]."""
-    ahead_s: Measured
+    ahead_s: Interval
     """Time by which positions run ahead of orientations [s]: `components.speed.ahead_s` of a scenario."""
     speeds: tuple[SpeedClass, ...]
     """Classes of speed in which the pair was measured."""
@@ -131,25 +131,25 @@ def _derivative(time_s: Floats, values: Floats) -> Floats:
     return out
 
 
-def _ahead(error_m: Floats, velocity_m_s: Floats, block: Ints) -> Measured:
+def _ahead(error_m: Floats, velocity_m_s: Floats, block: Ints) -> Interval:
     """Regression of the errors (N, 3) on the relative velocities (N, 3)."""
     power = np.sum(velocity_m_s**2, axis=1)
     if np.sqrt(power.mean()) < _MIN_TURN_SPEED_M_S:
-        return Measured.missing("The bar hardly turned: turn it about several axes.")
+        return Interval.missing("The bar hardly turned: turn it about several axes.")
     return _block_ratio(np.sum(velocity_m_s * error_m, axis=1), power, block)
 
 
-def _mean(values: Floats, block: Ints) -> Measured:
+def _mean(values: Floats, block: Ints) -> Interval:
     return _block_ratio(values, np.ones(len(values)), block)
 
 
-def _rms(values: Floats, block: Ints) -> Measured:
+def _rms(values: Floats, block: Ints) -> Interval:
     squared = _block_ratio(values**2, np.ones(len(values)), block)
     low, middle, high = np.sqrt(np.maximum([squared.low, squared.value, squared.high], 0.0)).tolist()
-    return Measured(middle, low, high, squared.count)
+    return Interval(middle, low, high, squared.count)
 
 
-def _block_ratio(numerator: Floats, denominator: Floats, block: Ints) -> Measured:
+def _block_ratio(numerator: Floats, denominator: Floats, block: Ints) -> Interval:
     """The ratio of two sums over (N,) values, with the standard deviation that the blocks' sums show (delta method).
 
     Values of one block may depend on each other.
@@ -160,4 +160,4 @@ def _block_ratio(numerator: Floats, denominator: Floats, block: Ints) -> Measure
     count = len(above)
     deviation = np.sqrt(count / (count - 1) * np.sum((above - ratio * below) ** 2)) / below.sum()
     half = float(special.stdtrit(count - 1, 0.975) * deviation)
-    return Measured(ratio, ratio - half, ratio + half, count)
+    return Interval(ratio, ratio - half, ratio + half, count)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 from harness.measure.static_series import StaticSeries
 
 _BLOCK_S = 10.0
@@ -13,7 +13,7 @@ _BLOCK_S = 10.0
 _FEWEST_BLOCKS = 4
 
 
-def rest_spread(series: Sequence[StaticSeries], name: str) -> Measured:
+def rest_spread(series: Sequence[StaticSeries], name: str) -> Interval:
     """Root mean square of the distance (`position_m`) or angle (`rotation_rad`) from the resting pose.
 
     The interval is that of the mean square over blocks of ten seconds, by Student's t.
@@ -28,11 +28,11 @@ def rest_spread(series: Sequence[StaticSeries], name: str) -> Measured:
             known = squared[begin : begin + size][one.valid[begin : begin + size]]
             sums.append((float(known.sum()), len(known)))
     if len(sums) < _FEWEST_BLOCKS:
-        return Measured.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of rest are needed.")
+        return Interval.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of rest are needed.")
     above, below = np.array(sums).T
     ratio = float(above.sum() / below.sum())
     count = len(above)
     deviation = float(np.sqrt(count / (count - 1) * np.sum((above - ratio * below) ** 2)) / below.sum())
     half = float(special.stdtrit(count - 1, 0.975)) * deviation
     low, middle, high = np.sqrt(np.maximum([ratio - half, ratio, ratio + half], 0.0)).tolist()
-    return Measured(middle, low, high, int(below.sum()))
+    return Interval(middle, low, high, int(below.sum()))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 from harness.measure.robust_slope import robust_slope
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 
@@ -70,8 +70,8 @@ class _SessionClocks:
 class TimingMeasurement:
     """Numbers by `TIMING_KEYS`, of all stations together and of each."""
 
-    all_stations: Mapping[str, Measured]
-    by_station: Mapping[str, Mapping[str, Measured]]
+    all_stations: Mapping[str, Interval]
+    by_station: Mapping[str, Mapping[str, Interval]]
     expected_resolution_s: float
     """Resolution of stamps in the wire format at the length of the capture, had the clock been zero at set-up [s]."""
 
@@ -112,9 +112,9 @@ class TimingAccumulator:
             **self._numbers(together, resolution_s),
             "timing.delay_s": _mean(np.array(self._delays_s)),
             "timing.stamp_resolution_s": _exact(resolution_s, sum(map(len, self._tails_s.values()))),
-            "timing.clock_age_s": Measured.missing("No record has a stamp.")
+            "timing.clock_age_s": Interval.missing("No record has a stamp.")
             if math.isnan(self._age_s)
-            else Measured(self._age_s, self._age_s - _AGE_TOLERANCE_S, self._age_s + _AGE_TOLERANCE_S, 1),
+            else Interval(self._age_s, self._age_s - _AGE_TOLERANCE_S, self._age_s + _AGE_TOLERANCE_S, 1),
             "components.clock.drift_ppm": clock,
         }
         by_station = {name: self._numbers(counts, resolution_s) for name, counts in self._counts.items()}
@@ -166,28 +166,28 @@ class TimingAccumulator:
             self._age_s = float(readings.stamp_s[known][0] - (host_s[0] - block.configured_s))
         self._longest_s = max(self._longest_s, float(host_s[-1] - block.configured_s))
 
-    def _numbers(self, counts: _StationCounts, resolution_s: float) -> dict[str, Measured]:
+    def _numbers(self, counts: _StationCounts, resolution_s: float) -> dict[str, Interval]:
         if not counts.steps:
             reason = "No two records have a stamp."
-            return dict.fromkeys(TIMING_KEYS[:2] + TIMING_KEYS[3:5], Measured.missing(reason))
+            return dict.fromkeys(TIMING_KEYS[:2] + TIMING_KEYS[3:5], Interval.missing(reason))
         rate_hz = counts.steps / counts.elapsed_s
         half_hz = rate_hz * resolution_s / counts.elapsed_s
         mean_s = counts.deviations_s / max(counts.singles, 1)
         jitter_s = math.sqrt(max(counts.squares_s2 / max(counts.singles, 1) - mean_s**2, 0.0))
         spread = jitter_s / math.sqrt(2.0 * max(counts.singles, 1))
         return {
-            "timing.rate_hz": Measured(rate_hz, rate_hz - half_hz, rate_hz + half_hz, counts.steps),
-            "timing.jitter_s": Measured.normal(jitter_s, spread, counts.singles, least=0.0),
+            "timing.rate_hz": Interval(rate_hz, rate_hz - half_hz, rate_hz + half_hz, counts.steps),
+            "timing.jitter_s": Interval.normal(jitter_s, spread, counts.singles, least=0.0),
             "timing.lost_share": count_share(counts.lost, counts.steps),
             "timing.duplicate_share": count_share(counts.duplicates, counts.records),
         }
 
-    def _clock_drift_ppm(self) -> tuple[Measured, float]:
+    def _clock_drift_ppm(self) -> tuple[Interval, float]:
         """Rate error of the device's clock [1e-6] from the longest session, and the length of it [s]."""
         clocks = max(self._clocks.values(), key=lambda one: len(one.least_s), default=None)
         points = np.array(list(clocks.least_s.values())) if clocks else np.zeros((0, 2))
         if len(points) < _FEWEST_BINS:
-            return Measured.missing(f"The clock needs {_FEWEST_BINS} s of records with stamps."), 0.0
+            return Interval.missing(f"The clock needs {_FEWEST_BINS} s of records with stamps."), 0.0
         points = points[np.argsort(points[:, 1])]
         size = -(-len(points) // _MOST_BINS)
         least = np.array([part[np.argmin(part[:, 0])] for part in np.split(points, range(size, len(points), size))])
@@ -195,7 +195,7 @@ class TimingAccumulator:
         slope, low, high = robust_slope(least[:, 1], least[:, 0])
         margin = self._resolution_s() / span_s  # rounding of the stamps is no independent noise
         drift, fast, slow = (float(1e6 * (1.0 / (1.0 + one) - 1.0)) for one in (slope, low - margin, high + margin))
-        return Measured(drift, slow, fast, len(least)), span_s
+        return Interval(drift, slow, fast, len(least)), span_s
 
     def _resolution_s(self) -> float:
         """The largest power of two of the stamp's unit that divides every stamp of the capture's end [s]."""
@@ -210,15 +210,15 @@ class TimingAccumulator:
         return float(2.0**exponent * self._seconds_per_tick)
 
 
-def count_share(count: int, total: int) -> Measured:
+def count_share(count: int, total: int) -> Interval:
     """Share of independent events among all, with the exact interval of Clopper and Pearson 1934."""
     from scipy import special
 
     if not total:
-        return Measured.missing("There is no record.")
+        return Interval.missing("There is no record.")
     low = float(special.betaincinv(count, total - count + 1, 0.025)) if count else 0.0
     high = float(special.betaincinv(count + 1, total - count, 0.975)) if count < total else 1.0
-    return Measured(count / total, low, high, count)
+    return Interval(count / total, low, high, count)
 
 
 def _repeats(readings: StationReadings) -> Bools:
@@ -252,11 +252,11 @@ def _merge(counts: Mapping[str, _StationCounts]) -> _StationCounts:
     return total
 
 
-def _mean(values: Floats) -> Measured:
+def _mean(values: Floats) -> Interval:
     if len(values) < 2:
-        return Measured.missing("No record has a stamp.")
-    return Measured.normal(float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values))), len(values), 0.0)
+        return Interval.missing("No record has a stamp.")
+    return Interval.normal(float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values))), len(values), 0.0)
 
 
-def _exact(value: float, count: int) -> Measured:
-    return Measured.missing("No record has a stamp.") if math.isnan(value) else Measured(value, value, value, count)
+def _exact(value: float, count: int) -> Interval:
+    return Interval.missing("No record has a stamp.") if math.isnan(value) else Interval(value, value, value, count)

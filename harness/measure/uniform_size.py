@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 
 FEWEST_VALUES = 10
 _TRIMMED = 4
@@ -15,7 +15,7 @@ _CUT = 0.5 * 5.991
 ratio of an end has that distribution; with large ones it has one degree of freedom, and the interval is then wider."""
 
 
-def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tuple[Measured, Measured, Measured]:
+def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tuple[Interval, Interval, Interval]:
     """Lower end, upper end and mean of the uniform distribution behind (N,) values with errors of this deviation.
 
     `strays` is the share of values that may be anywhere between zero and twice the largest value: they move the mean,
@@ -26,11 +26,11 @@ def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tup
 
     count = len(values)
     if count < FEWEST_VALUES:
-        missing = Measured.missing(f"There are {count} events, of at least {FEWEST_VALUES}.")
+        missing = Interval.missing(f"There are {count} events, of at least {FEWEST_VALUES}.")
         return missing, missing, missing
     deviation = max(deviation, 1e-9 * float(np.ptp(values)), 1e-12)
     spread = float(values.std(ddof=1))
-    mean = Measured.normal(float(values.mean()), spread / np.sqrt(count), count)
+    mean = Interval.normal(float(values.mean()), spread / np.sqrt(count), count)
     width = max(float(np.ptp(values)), deviation)
 
     floor = strays / (2.0 * float(np.abs(values).max()))
@@ -62,7 +62,7 @@ def fit_uniform(values: Floats, deviation: float, *, strays: float = 0.0) -> tup
         return _least(lambda other: cost(other, end), low, 6.0 * deviation + step) - allowed
 
     lower, upper = (
-        Measured(at, _crossing(excess, at, -step), _crossing(excess, at, step), count)
+        Interval(at, _crossing(excess, at, -step), _crossing(excess, at, step), count)
         for excess, at in ((excess_of_low, low), (excess_of_high, high))
     )
     return lower, upper, mean

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from harness.core.fields import build
+from harness.core.interval import Interval
 from harness.core.output_file import write_output
 from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
 from harness.core.toml_text import format_toml
 from harness.errors import BadFile, HarnessError
 from harness.measure.conventions import require_scale
-from harness.measure.measured import Measured
 
 UNIT_FILE = "a unit file"
 CUT_ADVICE = "Restore it from a copy, or measure the unit again."
@@ -38,11 +38,11 @@ class UnitFile:
     """Error components: name -> field -> value, as in a scenario."""
     tracker: Mapping[str, Any]
     """Fields of the scenario's table [tracker]."""
-    measured: Mapping[str, Measured] = field(default_factory=dict)
+    measured: Mapping[str, Interval] = field(default_factory=dict)
     """Dotted key -> measured number; keys of lists end in an index, such as "components.echo.size_m.0"."""
     not_measured: Mapping[str, str] = field(default_factory=dict)
     """Dotted key -> reason why it kept its default."""
-    session: Mapping[str, Measured] = field(default_factory=dict)
+    session: Mapping[str, Interval] = field(default_factory=dict)
     """What a reference showed of the session: name -> measured number."""
     capture: Mapping[str, Any] = field(default_factory=dict)
     """Origin of the measurement: file, digest, duration and more; information for people."""
@@ -91,7 +91,7 @@ def read_unit_file(path: Path | str) -> UnitFile:
             if not isinstance(value, Mapping):
                 raise TypeError(f"unit.components.{name}: expected a table, found {value!r}")
         measured, session = (
-            {key: Measured(*numbers) for key, numbers in table.items()} for table in (tables.measured, tables.session)
+            {key: Interval(*numbers) for key, numbers in table.items()} for table in (tables.measured, tables.session)
         )
         if "scale" in session:
             require_scale(1.0 + session["scale"].value)
@@ -152,7 +152,7 @@ def _text(unit: UnitFile) -> str:
     return "\n".join(f"{comment}\n{format_toml(tables)}" for comment, tables in parts)
 
 
-def _numbers(table: Mapping[str, Measured]) -> dict[str, list[float | int]]:
+def _numbers(table: Mapping[str, Interval]) -> dict[str, list[float | int]]:
     """The entries that were measured and are finite: TOML files of this project hold no other numbers."""
     return {
         key: [one.value, one.low, one.high, one.count]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 
 FEWEST_VECTORS = 10
 _STRAYS = 0.05
@@ -12,7 +12,7 @@ _CUT = 0.5 * 3.841
 """Half the 95 % quantile of chi-square with one degree of freedom."""
 
 
-def fit_length(lengths: Floats, deviation: float) -> Measured:
+def fit_length(lengths: Floats, deviation: float) -> Interval:
     """The length behind (N,) measured lengths of plane vectors, each axis with an error of this deviation.
 
     A measured length has the distribution of Rice 1945. The interval is that of the likelihood ratio.
@@ -20,7 +20,7 @@ def fit_length(lengths: Floats, deviation: float) -> Measured:
     from scipy import optimize, special
 
     if len(lengths) < FEWEST_VECTORS:
-        return Measured.missing(f"There are {len(lengths)} undisturbed coastings, of at least {FEWEST_VECTORS}.")
+        return Interval.missing(f"There are {len(lengths)} undisturbed coastings, of at least {FEWEST_VECTORS}.")
     floor = _STRAYS / (10.0 * float(np.median(lengths)))
 
     def cost(length: float) -> float:
@@ -36,4 +36,4 @@ def fit_length(lengths: Floats, deviation: float) -> Measured:
     best, allowed = float(found.x), float(found.fun) + _CUT
     low = 0.0 if cost(0.0) <= allowed else float(optimize.brentq(lambda v: cost(v) - allowed, 0.0, best))
     high = float(optimize.brentq(lambda v: cost(v) - allowed, best, 2.0 * most)) if cost(2.0 * most) > allowed else most
-    return Measured(best, low, max(high, best), len(lengths))
+    return Interval(best, low, max(high, best), len(lengths))

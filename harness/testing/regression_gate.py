@@ -19,8 +19,8 @@ from harness.core.python_process import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.report.comparison.wording import format_interval, format_signed, groups_vary
-from harness.report.comparison.writer import text
+from harness.report.comparison.page import comparison_text
+from harness.report.comparison.wording import groups_vary, line_interval
 from harness.results.manifest import Manifest
 from harness.results.reader import BASELINES, ResultSet, load_results
 from harness.results.storage import read_summary
@@ -43,7 +43,7 @@ class GateResult:
 
     def __str__(self) -> str:
         """The text that `harness compare` prints, and the traceback."""
-        return "\n\n".join(filter(None, (text(self.comparison), self.first_traceback)))
+        return "\n\n".join(filter(None, (comparison_text(self.comparison), self.first_traceback)))
 
     def properties(self) -> Iterator[tuple[str, str]]:
         """Properties for a test report: the outcome, then difference, interval and verdict of each gated line."""
@@ -52,8 +52,8 @@ class GateResult:
         for line in self.comparison.differences:
             if line.gated:
                 group = f"[{line.group}]" if groups_vary(self.comparison) else ""
-                yield f"harness.{line.metric}{group}.difference", f"{format_signed(line, line.difference)} {line.unit}"
-                yield f"harness.{line.metric}{group}.interval", format_interval(line)
+                yield f"harness.{line.metric}{group}.difference", f"{line_interval(line).number} {line.unit}"
+                yield f"harness.{line.metric}{group}.interval", line_interval(line).ends
                 yield f"harness.{line.metric}{group}.verdict", line.verdict
 
 

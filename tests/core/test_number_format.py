@@ -9,7 +9,6 @@ from harness.core.number_format import (
     decimals_for,
     format_change_percent,
     format_fixed,
-    format_interval,
     format_mean_sd,
     format_number,
     format_p_value,
@@ -42,8 +41,6 @@ def test_a_unit_gives_its_decimals() -> None:
 
 
 def test_combined_numbers() -> None:
-    assert format_interval(-0.1, 0.25, 2, signed=True) == "−0.10 to +0.25"
-    assert format_interval(None, 0.25, 2) == ""
     assert format_mean_sd(1.5, 0.25, 2) == "1.50 ± 0.25"
     assert format_mean_sd(1.5, None, 2) == "1.50"
     assert format_mean_sd(None, None, 2) == "not measured"

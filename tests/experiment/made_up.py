@@ -12,7 +12,6 @@ from harness.experiment import cells
 from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.reconstruct.contract import Method
-from harness.report.kit.style import Chart
 from harness.results.cell import Cell
 from harness.score.score import Scores
 from tests.report.fabricate import Plan, make_cell
@@ -51,9 +50,7 @@ def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: st
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where tests work; what is judged there is made up, and its page without charts, which others look at."""
     monkeypatch.setattr(cells, "evaluate_cell", judge)
-    monkeypatch.setattr(
-        "harness.report.sweep.page.sweep_chart", lambda *args: Chart("undrawn", "", "", "", "<svg></svg>")
-    )
+    monkeypatch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

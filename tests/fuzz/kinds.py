@@ -30,17 +30,15 @@ from harness.mocap.library import MotionLibrary
 from harness.mocap.read.c3d import read_c3d
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
-from harness.report.comparison.text import text as comparison_text
-from harness.report.paper.page import PaperContent, paper_page
-from harness.report.paper.text import text_tables
-from harness.report.placement.page import PlacementContent, placement_page
-from harness.report.placement.text import text as placement_text
+from harness.report.comparison.page import comparison_text
+from harness.report.kit.page_html import page_html
+from harness.report.paper.page import paper_page, paper_text
+from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
 from harness.report.run.text import run_table
 from harness.report.run.writer import write_run_page
-from harness.report.sweep.page import write_sweep_page
+from harness.report.sweep.page import sweep_text, write_sweep_page
 from harness.report.sweep.reader import read_sweep
-from harness.report.sweep.text import text as sweep_text
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run
@@ -247,8 +245,7 @@ def _make_paper(folder: Path) -> None:
 
 def _read_paper(folder: Path) -> object:
     findings = read_findings(folder / "findings.json")
-    charts = {experiment.name: [None] * len(experiment.figures) for experiment in findings.experiments}
-    return text_tables(findings), paper_page(PaperContent(findings, charts, {}))
+    return paper_text(findings), page_html(paper_page(findings), with_charts=False)
 
 
 def _make_placement(folder: Path) -> None:
@@ -257,7 +254,7 @@ def _make_placement(folder: Path) -> None:
 
 def _read_placement_findings(folder: Path) -> object:
     findings = read_placement(folder / "findings.json")
-    return placement_text(findings), placement_page(PlacementContent(findings, {}, ()))
+    return placement_text(findings), page_html(placement_page(findings), with_charts=False)
 
 
 def _make_database(folder: Path) -> None:

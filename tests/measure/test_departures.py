@@ -4,34 +4,34 @@ import math
 
 import pytest
 
+from harness.core.interval import Interval
 from harness.errors import BadInput
 from harness.measure.departures import compare_with_expected
-from harness.measure.measured import Measured
 
 
 def test_a_difference_of_196_deviations_has_p_of_5_percent() -> None:
-    measured = Measured.normal(1.0, 0.1)
-    at_the_end = compare_with_expected("x", "", measured, Measured(measured.low, measured.low, measured.low))
+    measured = Interval.normal(1.0, 0.1)
+    at_the_end = compare_with_expected("x", "", measured, Interval(measured.low, measured.low, measured.low))
     assert at_the_end.p == pytest.approx(0.05)
     assert compare_with_expected("x", "", measured, measured).p == 1.0
 
 
 def test_the_interval_of_the_expected_number_counts() -> None:
-    exact = compare_with_expected("x", "", Measured.normal(2.0, 0.3), Measured.normal(1.0, 0.0))
-    uncertain = compare_with_expected("x", "", Measured.normal(2.0, 0.3), Measured.normal(1.0, 0.4))
+    exact = compare_with_expected("x", "", Interval.normal(2.0, 0.3), Interval.normal(1.0, 0.0))
+    uncertain = compare_with_expected("x", "", Interval.normal(2.0, 0.3), Interval.normal(1.0, 0.4))
     assert exact.p == pytest.approx(math.erfc(1.0 / 0.3 / math.sqrt(2.0)))
     assert uncertain.p == pytest.approx(math.erfc(2.0 / math.sqrt(2.0)))
 
 
 def test_the_side_of_a_skewed_interval_counts() -> None:
-    skewed = Measured(1.0, 0.9, 3.0)
+    skewed = Interval(1.0, 0.9, 3.0)
     assert skewed.deviation_towards(2.0) == pytest.approx(20.0 * skewed.deviation_towards(0.5))
 
 
 def test_an_interval_contains_its_estimate() -> None:
     with pytest.raises(BadInput, match="interval"):
-        Measured(1.0, 2.0, 3.0)
+        Interval(1.0, 2.0, 3.0)
     with pytest.raises(BadInput, match="interval"):
-        Measured(math.nan, 0.0, 1.0)
-    assert not Measured.missing("no static stretch").is_measured
-    assert Measured.normal(0.1, 0.1, least=0.0).low == 0.0
+        Interval(math.nan, 0.0, 1.0)
+    assert not Interval.missing("no static stretch").is_measured
+    assert Interval.normal(0.1, 0.1, least=0.0).low == 0.0

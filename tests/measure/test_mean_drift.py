@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.core.interval import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.mean_drift import drift_speed, mean_drift
-from harness.measure.measured import Measured
 from harness.measure.noise_fit import NoiseFit
 from harness.simulate.noise import Noise
 from tests.measure.test_gauss_markov import dense_covariance
 from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth
 
-KNOWN = NoiseFit({key: Measured(value, value, value) for key, value in truth(PRESET).items()}, {}, 0)
+KNOWN = NoiseFit({key: Interval(value, value, value) for key, value in truth(PRESET).items()}, {}, 0)
 
 
 def test_the_slope_is_that_of_dense_least_squares() -> None:
@@ -48,7 +48,7 @@ def test_the_velocity_of_a_station_that_creeps_is_found() -> None:
 
 def test_without_noise_or_readings_nothing_is_measured() -> None:
     series, _ = series_and_masks(PRESET, 3, 10.0, ("one",))
-    quiet = NoiseFit(dict.fromkeys(NOISE_KEYS, Measured.missing("none")), {}, 0)
+    quiet = NoiseFit(dict.fromkeys(NOISE_KEYS, Interval.missing("none")), {}, 0)
     assert not any(one.is_measured for one in mean_drift(series, nothing(series), quiet, "position_m"))
     assert not any(one.is_measured for one in mean_drift(series, [np.ones(400, bool)], KNOWN, "rotation_rad"))
 
@@ -68,8 +68,8 @@ def test_the_speed_of_a_station_without_drift_is_compatible_with_zero() -> None:
     rng = np.random.default_rng(1)
     compatible = 0
     for _ in range(500):
-        velocity = [Measured.normal(float(value), 1.0) for value in rng.normal(size=3)]
+        velocity = [Interval.normal(float(value), 1.0) for value in rng.normal(size=3)]
         compatible += drift_speed(velocity).low == 0.0
     assert 0.92 <= compatible / 500 <= 0.98
-    assert drift_speed([Measured.normal(value, 0.1) for value in (3.0, 0.0, 4.0)]).value == pytest.approx(5.0)
-    assert not drift_speed([Measured.missing("why")] * 3).is_measured
+    assert drift_speed([Interval.normal(value, 0.1) for value in (3.0, 0.0, 4.0)]).value == pytest.approx(5.0)
+    assert not drift_speed([Interval.missing("why")] * 3).is_measured

@@ -11,10 +11,10 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
+from harness.core.interval import Interval
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.measure.measured import Measured
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.measure.registration import MountFit, Registration, register
 from harness.mocap import synthetic
@@ -40,7 +40,7 @@ def make_capture(
 
 def list_errors(
     found: Registration, tracker: Tracker, mounts: Mounts, middle_s: float = 30.0
-) -> list[tuple[str, Measured, float]]:
+) -> list[tuple[str, Interval, float]]:
     """Key, measured and true value of everything; at `middle_s` the clocks are the tracker's offset apart [s]."""
     values = found.values
     offset_s = tracker.offset_s + tracker.ratio * (found.reference_s - middle_s)

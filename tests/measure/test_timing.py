@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
+from harness.core.interval import Interval
 from harness.core.seeds import generator
-from harness.measure.measured import Measured
 from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share
 from harness.simulate.components.clock import Clock
 from harness.simulate.noise import Noise, noise_preset
@@ -176,7 +176,7 @@ def test_shares_have_the_interval_of_clopper_and_pearson(count: int, total: int,
     assert not count_share(0, 0).is_measured
 
 
-def clocks(rounds: int, seconds: float, delay: Delay, *, ppm: float, age_s: float = 0.0) -> list[Measured]:
+def clocks(rounds: int, seconds: float, delay: Delay, *, ppm: float, age_s: float = 0.0) -> list[Interval]:
     return [
         measure(capture(100 + seed, seconds, delay=delay, ppm=ppm, age_s=age_s)).all_stations[
             "components.clock.drift_ppm"

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from harness.core.interval import Interval
 from harness.errors import BadFile
-from harness.measure.measured import Measured
 from harness.measure.unit_file import UnitFile, read_unit_file, unit_value, write_unit_file
 from tests.core.digested_toml import as_earlier_version, declare_edited
 
@@ -18,9 +18,9 @@ UNIT = UnitFile(
     name="lab unit",
     components={"white": {"position_m": 0.0007}, "echo": {"share": 0.03, "size_m": [0.05, 0.3]}},
     tracker={"rate_hz": 40.0, "items": [40, 2, 11, 21, 1]},
-    measured={"components.white.position_m": Measured(0.0007, 0.00069, 0.00071, 1000)},
+    measured={"components.white.position_m": Interval(0.0007, 0.00069, 0.00071, 1000)},
     not_measured={"components.session.scale": "A reference is needed."},
-    session={"scale": Measured(0.001, 0.0, 0.002, 6)},
+    session={"scale": Interval(0.001, 0.0, 0.002, 6)},
     capture={"file": 'a "quoted" name.is900', "seconds": 60.0},
 )
 
@@ -44,7 +44,7 @@ def test_an_existing_file_is_not_replaced_unasked(tmp_path: Path) -> None:
 
 def test_a_key_that_was_not_measured_has_no_interval(tmp_path: Path) -> None:
     path = tmp_path / "unit.toml"
-    write_unit_file(path, replace(UNIT, measured={"components.echo.share": Measured.missing("no static stretch")}))
+    write_unit_file(path, replace(UNIT, measured={"components.echo.share": Interval.missing("no static stretch")}))
     assert read_unit_file(path).measured == {}
 
 
@@ -94,7 +94,7 @@ def test_a_file_of_an_earlier_version_has_to_be_whole(tmp_path: Path) -> None:
     """Every key of [measured] and [not_measured] has its value, and the last table is there."""
     path = tmp_path / "unit.toml"
     components = {**UNIT.components, "session": {"scale": 0.001}}
-    measured = {**UNIT.measured, "components.echo.size_m": Measured(0.2, 0.1, 0.3, 20)}
+    measured = {**UNIT.measured, "components.echo.size_m": Interval(0.2, 0.1, 0.3, 20)}
     write_unit_file(path, replace(UNIT, components=components, measured=measured))
     text = as_earlier_version(path)
     path.write_text(text)

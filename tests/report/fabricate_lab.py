@@ -4,21 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.seeds import generator
-from harness.measure.departures import compare_with_expected
-from harness.measure.measured import Measured
+from harness.measure.departures import Departure, compare_with_expected
+from harness.measure.profile import QualityClass, StretchLength
 from harness.measure.rigid_pair import RigidPair, SpeedClass
-from harness.report.lab.unit_content import (
+from harness.measure.unit_report import (
     CaptureSummary,
     DensityCurve,
-    DepartureCheck,
     DeviationCurve,
     EpisodeMark,
     ParameterRow,
-    QualityClass,
     RecordingAdvice,
     StationFigures,
-    StretchSummary,
     UnitReport,
 )
 
@@ -26,14 +24,14 @@ STATIONS = ("head", "pelvis", "left_wrist", "right_wrist", "left_foot", "right_f
 TOO_FEW = "4 gaps are too few: 20 are needed."
 
 
-def exact(value: float) -> Measured:
+def exact(value: float) -> Interval:
     """A number that is known exactly."""
-    return Measured(value, value, value)
+    return Interval(value, value, value)
 
 
-def number(value: float, share: float, count: int = 100) -> Measured:
+def number(value: float, share: float, count: int = 100) -> Interval:
     """A number whose interval reaches a share of it to both sides."""
-    return Measured(value, value * (1.0 - share), value * (1.0 + share), count)
+    return Interval(value, value * (1.0 - share), value * (1.0 + share), count)
 
 
 MEASURED = {
@@ -45,17 +43,17 @@ MEASURED = {
     "components.excursion.size_m.0": (number(0.0052, 0.1, 372), 0.005),
     "components.excursion.size_m.1": (number(0.0298, 0.02, 372), 0.03),
     "components.echo.share": (number(0.0304, 0.05, 2011), 0.03),
-    "components.dropout.tilt_rad": (Measured.missing(TOO_FEW), 0.00436),
+    "components.dropout.tilt_rad": (Interval.missing(TOO_FEW), 0.00436),
 }
 TIMING = {
     "timing.rate_hz": (number(40.0, 0.0001, 288_000), 40.0),
-    "components.clock.drift_ppm": (Measured(-21.0, -23.5, -18.5, 900), 20.0),
+    "components.clock.drift_ppm": (Interval(-21.0, -23.5, -18.5, 900), 20.0),
     "timing.duplicate_share": (exact(0.0), 0.0),
     "timing.stamp_resolution_s": (exact(6.1e-5), None),
 }
 
 
-def checks() -> tuple[DepartureCheck, ...]:
+def checks() -> tuple[Departure, ...]:
     """Checks of the parameters: white noise and rate of excursions depart, and one station's excursions."""
     made = [
         compare_with_expected(key, "", measured, exact(default))
@@ -63,7 +61,7 @@ def checks() -> tuple[DepartureCheck, ...]:
         if measured.is_measured
     ]
     made.append(compare_with_expected("components.excursion.onsets_per_min", "head", number(6.0, 0.2), exact(1.0)))
-    return tuple(DepartureCheck(one, min(1.0, len(made) * one.p)) for one in made)
+    return tuple(replace(one, p_holm=min(1.0, len(made) * one.p)) for one in made)
 
 
 def made_up_unit() -> UnitReport:
@@ -82,17 +80,16 @@ def made_up_unit() -> UnitReport:
     nothing = np.full(len(tau_s), np.nan)
     return UnitReport(
         name="lab",
-        command="harness characterize lab.is900rec --out unit.toml --page unit.html",
         capture=CaptureSummary(
             "lab.is900rec",
             1790.0,
             STATIONS,
             40.0,
             (
-                StretchSummary("static", 1200.0, 288_000, 0.0),
-                StretchSummary("slow", 240.0, 57_600, 1290.0),
-                StretchSummary("fast", 120.0, 28_800, 1530.0),
-                StretchSummary("covered", 120.0, 28_800, 1660.0),
+                StretchLength("static", 1200.0, 288_000),
+                StretchLength("slow", 240.0, 57_600),
+                StretchLength("fast", 120.0, 28_800),
+                StretchLength("covered", 120.0, 28_800),
             ),
             ("The last 312 bytes are not a whole block; 0.2 s are lost.",),
         ),
@@ -105,7 +102,6 @@ def made_up_unit() -> UnitReport:
         allan_orientation=tuple(curve(station) for station in STATIONS[:2]),
         allan_position_model=DeviationCurve("fitted model", tau_s, allan, nothing, nothing),
         spectra=tuple(DensityCurve(station, hz, density * rng.lognormal(0.0, 0.15, len(hz))) for station in STATIONS),
-        spectrum_model=DensityCurve("fitted model", hz, density),
         episodes=_episodes(rng),
         quality=(
             QualityClass(0.0, 0.0, 0.01, np.nan, np.nan),
@@ -120,7 +116,6 @@ def made_up_unit() -> UnitReport:
             RecordingAdvice("components.dropout.gap_s", 0.2, 0, 97, 20.0, np.nan),
         ),
         rigid_pairs=(made_up_pair(),),
-        unit_file="unit.toml",
         notes=("Latency cannot be told without a reference: harness validate measures it.",),
     )
 
@@ -138,9 +133,9 @@ def made_up_pair() -> RigidPair:
 
 def without_content() -> UnitReport:
     """A unit of which hardly anything was measured."""
-    missing = tuple(ParameterRow(key, Measured.missing(TOO_FEW), default) for key, (_, default) in MEASURED.items())
+    missing = tuple(ParameterRow(key, Interval.missing(TOO_FEW), default) for key, (_, default) in MEASURED.items())
     return UnitReport(
-        "lab", "harness characterize lab.is900rec", CaptureSummary("lab.is900rec", 30.0, STATIONS[:1], 40.0),
+        "lab", CaptureSummary("lab.is900rec", 30.0, STATIONS[:1], 40.0),
         "the preset default", missing, (), (), (),
     )  # fmt: skip
 
@@ -164,7 +159,7 @@ def _figures(station: str, n: int) -> StationFigures:
             "rate_hz": number(40.0, 0.0001),
             "jitter_s": number(0.00002, 0.1),
             "lost_share": exact(0.0),
-            "duplicate_share": exact(0.0) if n else Measured.missing("no stamps"),
+            "duplicate_share": exact(0.0) if n else Interval.missing("no stamps"),
         },
     )
 

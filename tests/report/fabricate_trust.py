@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 from harness.errors import Outcome
-from harness.report.lab.trust_content import TrustReport
 from harness.results.trust_findings import (
     Equivalence,
     ErrorDistance,
@@ -24,59 +23,55 @@ MEANS = {"ik": (14.2, 14.5), "local_pca": (9.1, 9.3), "dynamic_map": (9.8, 8.4),
 DIGEST = "5d1f" * 16
 
 
-def made_up_trust() -> TrustReport:
+def made_up_trust() -> TrustFindings:
     """A study that contradicts in one pair and exceeds one margin."""
-    return TrustReport(
-        TrustFindings(
-            title="Walking with six stations",
-            scenario="walking",
-            unit="unit.toml",
-            unit_digest="ab12" * 16,
-            plan_digest=DIGEST,
-            exploratory=False,
-            level=0.05,
-            ranked_metric=METRIC,
-            seeds=(1, 2, 3, 4, 5),
-            captures=tuple(
-                TrustCapture(f"walk_{n:02d}.is900rec", f"walking_p{n:02d}", "0f" * 32, DIGEST, 2400) for n in range(8)
-            ),
-            arms=ARMS,
-            health=tuple(
-                StationHealth(
-                    station,
-                    StreamHealth(40.0, 0.012, 3.1, 0.21, 0.93, 0.001),
-                    StreamHealth(40.0, 0.010, 2.8, None, 0.94, 0.0),
-                )
-                for station in ("head", "left_wrist", "right_wrist")
-            ),
-            distances=(
-                ErrorDistance("head", "position error", "m", 0.00012, 0.00030, 0.41, 1.0, 5.2, (40, 200)),
-                ErrorDistance("left_wrist", "position error", "m", 0.00091, 0.00035, 0.001, 0.006, 5.2, (40, 200)),
-                ErrorDistance("right_wrist", "position error", "m", -0.00002, 0.00033, 0.6, 1.0, 5.2, (40, 200)),
-                ErrorDistance("head", "orientation error", "rad", 0.0002, 0.0005, 0.001, 0.006, 5.2, (40, 200)),
-                ErrorDistance("pelvis", "orientation error", "rad", None, None, None, None, 5.2, (3, 200), "3 blocks"),
-            ),
-            equivalences=tuple(_equivalence(arm) for arm in ARMS),
-            pairs=tuple(_pair(a, b) for n, a in enumerate(ARMS) for b in ARMS[n + 1 :]),
-            rank_correlations=(
-                RankCorrelation("Kendall's tau-b", 0.67, 0.33, 1.0),
-                RankCorrelation("sim-to-real correlation", None, None, None, "2 arms and 8 clips"),
-            ),
-            outcome=Outcome.REGRESSED,
-            why="one pair contradicts",
-            notes=("Two stations of the scenario were not captured.",),
+    return TrustFindings(
+        title="Walking with six stations",
+        scenario="walking",
+        unit="unit.toml",
+        unit_digest="ab12" * 16,
+        plan_digest=DIGEST,
+        exploratory=False,
+        level=0.05,
+        ranked_metric=METRIC,
+        seeds=(1, 2, 3, 4, 5),
+        captures=tuple(
+            TrustCapture(f"walk_{n:02d}.is900rec", f"walking_p{n:02d}", "0f" * 32, DIGEST, 2400) for n in range(8)
         ),
-        "harness trust plan.toml walk_*.is900rec --page trust.html",
-    )  # fmt: skip
+        arms=ARMS,
+        health=tuple(
+            StationHealth(
+                station,
+                StreamHealth(40.0, 0.012, 3.1, 0.21, 0.93, 0.001),
+                StreamHealth(40.0, 0.010, 2.8, None, 0.94, 0.0),
+            )
+            for station in ("head", "left_wrist", "right_wrist")
+        ),
+        distances=(
+            ErrorDistance("head", "position error", "m", 0.00012, 0.00030, 0.41, 1.0, 5.2, (40, 200)),
+            ErrorDistance("left_wrist", "position error", "m", 0.00091, 0.00035, 0.001, 0.006, 5.2, (40, 200)),
+            ErrorDistance("right_wrist", "position error", "m", -0.00002, 0.00033, 0.6, 1.0, 5.2, (40, 200)),
+            ErrorDistance("head", "orientation error", "rad", 0.0002, 0.0005, 0.001, 0.006, 5.2, (40, 200)),
+            ErrorDistance("pelvis", "orientation error", "rad", None, None, None, None, 5.2, (3, 200), "3 blocks"),
+        ),
+        equivalences=tuple(_equivalence(arm) for arm in ARMS),
+        pairs=tuple(_pair(a, b) for n, a in enumerate(ARMS) for b in ARMS[n + 1 :]),
+        rank_correlations=(
+            RankCorrelation("Kendall's tau-b", 0.67, 0.33, 1.0),
+            RankCorrelation("sim-to-real correlation", None, None, None, "2 arms and 8 clips"),
+        ),
+        outcome=Outcome.REGRESSED,
+        why="one pair contradicts",
+        notes=("Two stations of the scenario were not captured.",),
+    )
 
 
-def trust_of(outcome: Outcome, **changes: Any) -> TrustReport:
+def trust_of(outcome: Outcome, **changes: Any) -> TrustFindings:
     """The study with another outcome, and other findings."""
-    report = made_up_trust()
-    return replace(report, findings=replace(report.findings, outcome=outcome, **changes))
+    return replace(made_up_trust(), outcome=outcome, **changes)
 
 
-def empty_trust() -> TrustReport:
+def empty_trust() -> TrustFindings:
     """A study in which nothing could be compared."""
     parts = ("captures", "health", "distances", "equivalences", "pairs", "rank_correlations", "notes")
     return trust_of(Outcome.NOT_COMPARABLE, why="no capture has a frame", **dict.fromkeys(parts, ()))

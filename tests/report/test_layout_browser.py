@@ -5,14 +5,15 @@ from typing import Any
 
 import pytest
 
-from harness.report.comparison.writer import write_comparison_page
+from harness.report.comparison.page import write_comparison_page
 from harness.report.coverage.page import coverage_page
-from harness.report.lab.trust_page import write_trust_page
-from harness.report.lab.unit_page import write_unit_page
-from harness.report.lab.validation_page import write_validation_page
-from harness.report.paper.writer import write_paper_page
-from harness.report.physics.writer import write_physics_page
-from harness.report.placement import writer as placement_writer
+from harness.report.kit.page_html import write_page
+from harness.report.lab.trust_page import trust_page
+from harness.report.lab.unit_page import unit_page
+from harness.report.lab.validation_page import validation_page
+from harness.report.paper.page import write_paper_page
+from harness.report.physics.page import write_physics_page
+from harness.report.placement import page as placement_page
 from harness.report.run.writer import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from tests.report.fabricate import Plan, fabricate
@@ -24,7 +25,7 @@ from tests.report.fabricate_physics import made_up as made_up_physics
 from tests.report.fabricate_placement import write_made_up
 from tests.report.fabricate_sweep import fabricate_sweep
 from tests.report.fabricate_trust import made_up_trust
-from tests.report.fabricate_validation import made_up_validation
+from tests.report.fabricate_validation import SCORES, made_up_validation
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
@@ -47,21 +48,21 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     methods = {f"a_method_with_a_long_name_{n}": 1.0 + n for n in range(12)} | {"ik": 3.0}
     plan = Plan(behaviours=("walking", "boxing"), methods=methods, duration_s=3.0, failing=("ik",))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement_writer, "draw_body_map", lambda *args, **options: (None, "not in this test"))
-        placement = placement_writer.write_placement_page(write_made_up(folder / "placement"))
-    coverage = folder / "coverage.html"
-    coverage.write_text(coverage_page(fabricate_coverage()), encoding="utf-8")
+        patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
+        placement = placement_page.write_placement_page(write_made_up(folder / "placement"))
     return {
-        "coverage": coverage,
+        "coverage": write_page(coverage_page(fabricate_coverage()), folder / "coverage.html"),
         "run": write_run_page(fabricate(folder / "run", plan), rendered=False),
         "comparison": write_comparison_page(comparison(7, ("local_pca",)), folder / "comparison.html"),
         "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),
         "placement": placement,
         "paper": write_paper_page(write_study(folder / "paper", liu())),
         "physics": write_physics_page(folder / "physics.html", made_up_physics()),
-        "unit": write_unit_page(folder / "unit.html", made_up_unit()),
-        "validation": write_validation_page(folder / "validation.html", made_up_validation()),
-        "trust": write_trust_page(folder / "trust.html", made_up_trust()),
+        "unit": write_page(unit_page(made_up_unit(), "harness characterize"), folder / "unit.html"),
+        "validation": write_page(
+            validation_page(made_up_validation(), SCORES, "harness validate"), folder / "validation.html"
+        ),
+        "trust": write_page(trust_page(made_up_trust(), "harness trust plan.toml"), folder / "trust.html"),
     }
 
 

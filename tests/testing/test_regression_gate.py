@@ -89,7 +89,7 @@ def test_a_worse_method_fails_with_the_table(project: pytest.Pytester) -> None:
     result = gated(project)
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["B is worse than A in 3 of 3 gated lines on 8 takes: *", "A: baseline main"])
-    result.stdout.fnmatch_lines(["*worse*mine:Mine*mpjpe_mm*8*"])
+    result.stdout.fnmatch_lines(["*mine:Mine*mpjpe_mm*worse*8*"])
     result.stdout.no_fnmatch_line("*Traceback*")
     result.stdout.no_fnmatch_line("*gate.py*")
 

@@ -13,10 +13,10 @@ from harness.core.fields import build
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, HarnessError
 from harness.experiment.executors import TaskExecutor
+from harness.measure.departures import Departure
 from harness.results.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.study.trust.characterization import characterize_capture
-from harness.study.trust.named_departures import NamedDeparture
 
 _STORED = "an outcome of `harness bench lab --truth`"
 _ADVICE = "Remove the file; the outcome is then computed again."
@@ -127,14 +127,13 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
     return CaptureOutcome(kind, seed, source_hash(), stored_checks(found.checks), parameters)
 
 
-def stored_checks(checks: Sequence[NamedDeparture]) -> tuple[StoredCheck, ...]:
+def stored_checks(checks: Sequence[Departure]) -> tuple[StoredCheck, ...]:
     """The checks as they are stored."""
     out = []
-    for check in checks:
-        one = check.departure
+    for one in checks:
         measured, expected = one.measured, one.expected.value
         numbers = (one.key, measured.value, _finite(measured.low), _finite(measured.high))
-        out.append(StoredCheck(*numbers, one.station, expected, check.p_holm, check.is_named))
+        out.append(StoredCheck(*numbers, one.station, expected, one.p_holm, one.is_named))
     return tuple(out)
 
 

@@ -26,6 +26,7 @@ from harness.bench.physics.scenes import (
 )
 from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.core.arrays import Floats
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
@@ -308,6 +309,6 @@ def _all_above_zero(differences: list[PairedDifference]) -> bool | None:
 def _intervals(differences: list[PairedDifference]) -> str:
     """Mean differences with their intervals; fewer than `MIN_UNITS` seeds have none."""
     return "; ".join(
-        f"{d.mean:+.2f} (too few seeds)" if d.low is None else f"{d.mean:+.2f} ({d.low:+.2f} to {d.high:+.2f})"
+        f"{Interval.of(d.mean, d.low, d.high, signed=True)}{'' if d.low is not None else ' (too few seeds)'}"
         for d in differences
     )

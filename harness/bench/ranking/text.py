@@ -6,7 +6,8 @@ from typing import Any
 
 from harness.bench.ranking.agreement import RankingAgreement
 from harness.bench.ranking.measurement import METHODS, PLACES_METHOD, RankingReport
-from harness.core.number_format import count_noun, format_fixed, format_interval, format_p_value
+from harness.core.interval import Interval
+from harness.core.number_format import count_noun, format_fixed, format_p_value
 from harness.core.text_table import Table
 from harness.results.trust_findings import PairAgreement, PairVerdict, SideDifference
 
@@ -68,7 +69,8 @@ def _pairs_table(ranking: RankingAgreement) -> Table:
 
 
 def _difference(side: SideDifference) -> tuple[str, str]:
-    return format_fixed(side.mean, 2, signed=True), format_interval(side.low, side.high, 2, signed=True)
+    number = Interval.of(side.mean, side.low, side.high, signed=True)
+    return number.number, number.ends
 
 
 def _statements(report: RankingReport) -> Iterator[str]:
@@ -78,13 +80,13 @@ def _statements(report: RankingReport) -> Iterator[str]:
 
 def statement(ranking: RankingAgreement) -> str:
     """Kendall's tau with its interval and units, the number of pairs that agree, and the cost of a choice."""
-    tau = f"Kendall's tau {format_fixed(ranking.tau, 2)}"
+    tau = f"Kendall's tau {Interval.of(ranking.tau, ranking.low, ranking.high)}"
     if ranking.reason:
         return f"{tau}, without an interval ({ranking.reason}). No pair can be told. {_cost_of_choice(ranking)}".strip()
     counts = {verdict: len(ranking.with_verdict(verdict)) for verdict in VERDICTS}
     reversed_pairs = "; ".join(map(_order, ranking.with_verdict("contradict")))
     sentences = [
-        f"{tau} ({format_interval(ranking.low, ranking.high, 2)}), {_performers(ranking)}.",
+        f"{tau}, {_performers(ranking)}.",
         f"Of {count_noun(len(ranking.pairs), 'pair')}: {counts['agree']} agree, {counts['contradict']} reversed, "
         f"{counts['cannot tell']} cannot be told.",
         f"Better on built-in motion and worse on real motion: {reversed_pairs}." if reversed_pairs else "",

@@ -2,7 +2,8 @@
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from harness.compare.comparison import Comparison, Difference, Verdict
@@ -30,15 +31,18 @@ _SYMLOG_RATIO = 40.0
 """The axis is symmetrically logarithmic if the longest row reaches this many times as far as the median row."""
 
 
-def interval_charts(comparison: Comparison, gated: bool) -> list[Chart]:
-    """A chart for each metric of the gated lines, or of the others; lines whose mean in A is zero are left out."""
+def interval_charts(comparison: Comparison, gated: bool) -> list[Callable[[], Chart]]:
+    """What draws a chart for each metric of the gated lines, or of the others.
+
+    Lines whose mean in A is zero are left out.
+    """
     chosen = [line for line in comparison.differences if line.gated == gated and line.mean_a]
     metrics = dict.fromkeys(line.metric for line in chosen)
-    charts = []
+    charts: list[Callable[[], Chart]] = []
     for number, metric in enumerate(metrics, start=1):
         lines = [line for line in chosen if line.metric == metric]
         name = f"intervals_{'gated' if gated else 'other'}_{number}"
-        charts.append(_chart(name, metric, lines, groups_vary(comparison)))
+        charts.append(partial(_chart, name, metric, lines, groups_vary(comparison)))
     return charts
 
 

@@ -13,9 +13,9 @@ from harness.core.number_format import format_change_percent
 from harness.report.comparison.wording import (
     clip_steps,
     count_directions,
-    format_interval,
     format_mean,
     format_signed,
+    line_interval,
     line_title,
     percent_of_a,
     rise_is_worse,
@@ -42,7 +42,7 @@ def slope_chart(line: Difference, number: int) -> Chart:
     caption = f"{len(line.clips)} clips: {counts}. {_largest_change(line)}"
     alt = (
         f"{line_title(line)}: mean {format_mean(line, line.mean_a)} in A, {format_mean(line, line.mean_b)} in B "
-        f"[{line.unit}]; difference {format_signed(line, line.difference)} ({format_interval(line)}), "
+        f"[{line.unit}]; difference {line_interval(line)}, "
         f"{format_change_percent(percent_of_a(line, line.difference))} of A, "
         f"margin {format_mean(line, line.margin)}: {line.verdict}. {caption}"
     )

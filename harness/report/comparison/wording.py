@@ -8,7 +8,7 @@ from typing import get_args
 from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.compare.margins import MARGINS
 from harness.compare.units import count_units
-from harness.core import number_format
+from harness.core.interval import Interval
 from harness.core.number_format import count_noun, decimals_for, format_change_percent, format_fixed
 from harness.errors import Outcome
 from harness.report.kit.text import list_first
@@ -170,9 +170,9 @@ def format_signed(line: Difference, value: float | None) -> str:
     return "–" if value is None else format_fixed(value, _decimals(line), signed=True, grouped=True)
 
 
-def format_interval(line: Difference) -> str:
-    """The 95 % interval of the difference; a dash where it was not computed."""
-    return number_format.format_interval(line.low, line.high, _decimals(line), signed=True) or "–"
+def line_interval(line: Difference) -> Interval:
+    """The difference with its 95 % interval."""
+    return Interval.of(line.difference, line.low, line.high, signed=True)
 
 
 def clip_steps(line: Difference) -> list[tuple[str, float]]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from harness.core.arrays import Floats, Ints
 from harness.core.number_format import format_fixed
-from harness.core.text_table import Table
 
 NO_FIX = "no fix"
 """Stands for a dilution of precision where ranges fix no position."""
@@ -80,27 +79,6 @@ class CoverageContent:
     """The command line that wrote the page."""
 
 
-def place_table(rows: Sequence[CoverageRow]) -> Table:
-    """Coverage by height."""
-    head = ("height above the floor", "3 or more [%]", "DOP up to 10 [%]", "median heard", "median DOP")
-    cells = [
-        (r.place, _percent(r.share), _percent(r.fixed), format_fixed(r.heard, 0), format_dilution(r.dilution))
-        for r in rows
-    ]
-    return Table(head, cells)
-
-
-def station_table(rows: Sequence[StationRow]) -> Table:
-    """Coverage by station."""
-    head = ("station", "0 heard [%]", "1 [%]", "2 [%]", "3 or more [%]", "DOP up to 10 [%]", "median DOP")
-    cells = [(r.station, *map(_percent, (*r.shares, r.fixed)), format_dilution(r.dilution)) for r in rows]
-    return Table(head, cells)
-
-
 def format_dilution(dilution: float) -> str:
     """A dilution of precision, or "no fix"."""
     return format_fixed(dilution, 2) if dilution == dilution else NO_FIX
-
-
-def _percent(share: float) -> str:
-    return format_fixed(100.0 * share, 1)

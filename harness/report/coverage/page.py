@@ -1,10 +1,12 @@
 """The page of a constellation: emitters heard and dilution of precision, by place and by station."""
 
+from collections.abc import Sequence
+from functools import partial
+
 from harness.core.number_format import format_fixed
-from harness.report.coverage.content import CoverageContent, format_dilution, place_table, station_table
-from harness.report.kit.document import Section, chart_figure, document
-from harness.report.kit.markup import Markup, join, tag
-from harness.report.kit.table import html_table
+from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
+from harness.report.coverage.content import CoverageContent, CoverageRow, StationRow, format_dilution
+from harness.report.kit.page import Block, BrowserOnly, DataTable, Drawing, Page, Prose, Section
 
 _DILUTION_NOTE = (
     "The dilution of precision (DOP) is the standard deviation of the position over that of a range: it tells how the "
@@ -12,25 +14,29 @@ _DILUTION_NOTE = (
 )
 
 
-def coverage_page(content: CoverageContent) -> str:
-    """The HTML of the page."""
-    facts = {
-        "Emitters": content.emitters,
-        "Reach": content.reach,
-        "Turn": content.turn,
-        "Clip": content.clip,
-        "Made by": content.command,
-    }
-    sections: list[Section] = [
-        ("By place", "place", _by_place(content)),
-        ("By station", "station", _by_station(content)),
-    ]
-    return document(
-        title=f"{content.name}: harness inspect",
-        kicker=f"harness inspect · {content.name}",
-        heading=heading(content),
-        facts={title: text for title, text in facts.items() if text},
-        sections=sections,
+def coverage_page(content: CoverageContent) -> Page:
+    """The page of a constellation."""
+    by_place = [Drawing(partial(draw, content)) for draw in (heard_chart, dilution_chart)]
+    by_station: list[Block] = [Drawing(partial(station_chart, content)), station_table(content.stations, content.clip)]
+    return Page(
+        verb="inspect",
+        name=content.name,
+        headline=heading(content),
+        facts={
+            "Emitters": content.emitters,
+            "Reach": content.reach,
+            "Turn": content.turn,
+            "Clip": content.clip,
+            "Made by": content.command,
+        },
+        sections=[
+            Section(
+                "By place",
+                "place",
+                [BrowserOnly([Prose(_DILUTION_NOTE)]), *by_place, place_table(content.rows, content.half_m)],
+            ),
+            Section("By station", "station", by_station if content.stations else []),
+        ],
     )
 
 
@@ -47,25 +53,27 @@ def heading(content: CoverageContent) -> str:
     return text
 
 
-def _by_place(content: CoverageContent) -> Markup:
-    from harness.report.coverage.charts import dilution_chart, heard_chart
+def place_table(rows: Sequence[CoverageRow], half_m: float) -> DataTable:
+    """Coverage by height."""
+    head = ["height above the floor", "3 or more [%]", "DOP up to 10 [%]", "median heard", "median DOP"]
+    cells = [
+        [r.place, _percent(r.share), _percent(r.fixed), format_fixed(r.heard, 0), format_dilution(r.dilution)]
+        for r in rows
+    ]
+    caption = f"A cube of {2 * half_m:g} m on the floor below the middle of the emitters, and squares in it."
+    return DataTable(head, cells, caption=caption, label="Coverage by height")
 
-    charts = [chart_figure(chart(content), 3) for chart in (heard_chart, dilution_chart)]
-    caption = f"A cube of {2 * content.half_m:g} m on the floor below the middle of the emitters, and squares in it."
-    table = html_table(place_table(content.rows), caption, label="Coverage by height")
-    return join(tag("p", _DILUTION_NOTE), *charts, table)
 
-
-def _by_station(content: CoverageContent) -> Markup:
-    from harness.report.coverage.charts import station_chart
-
-    if not content.stations:
-        return Markup()
+def station_table(rows: Sequence[StationRow], clip: str) -> DataTable:
+    """Coverage by station."""
+    head = ["station", "0 heard [%]", "1 [%]", "2 [%]", "3 or more [%]", "DOP up to 10 [%]", "median DOP"]
+    cells = [[r.station, *map(_percent, (*r.shares, r.fixed)), format_dilution(r.dilution)] for r in rows]
     caption = (
-        f"Shares of the time of {content.clip}, below the middle of its path: direct sound only, past the body, loud "
-        "enough for the direction in which the station faces."
+        f"Shares of the time of {clip}, below the middle of its path: direct sound only, past the body, loud enough "
+        "for the direction in which the station faces."
     )
-    return join(
-        chart_figure(station_chart(content), 3),
-        html_table(station_table(content.stations), caption, label="Coverage by station"),
-    )
+    return DataTable(head, cells, caption=caption, label="Coverage by station")
+
+
+def _percent(share: float) -> str:
+    return format_fixed(100.0 * share, 1)

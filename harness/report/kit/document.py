@@ -81,10 +81,10 @@ def chart_figure(chart: Chart, level: int = 0) -> Markup:
     return join(title, tag("figure", *content, class_="chart", data_hover=lines))
 
 
-def chart_panel(chart: Chart) -> Markup:
-    """A small chart with its title and caption, for a grid of charts."""
+def chart_panel(chart: Chart, heading: Markup | None = None) -> Markup:
+    """A small chart with a heading, by default its title, and its caption, for a grid of charts."""
     caption = tag("figcaption", chart.caption) if chart.caption else None
-    return tag("figure", tag("h3", chart.title), chart_image(chart), caption, class_="panel")
+    return tag("figure", heading or tag("h3", chart.title), chart_image(chart), caption, class_="panel")
 
 
 def chart_image(chart: Chart) -> Markup:

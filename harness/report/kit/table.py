@@ -31,6 +31,6 @@ def statistic_cell(mean: float | None, sd: float | None, unit: str, *, n: int, c
     return join(format_number(mean, unit), spread, None if n == column_n else count_note(n))
 
 
-def stacked_cell(upper: Any, lower: str, class_: str = "spread under") -> Markup:
+def stacked_cell(upper: Any, lower: Any, class_: str = "spread under") -> Markup:
     """A cell of two lines, the lower one in small type; an empty lower line is left out."""
     return join(upper, tag("span", lower, class_=class_) if lower else None)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from harness.measure.departures import Departure
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
-from harness.report.lab.departure_wording import condense_departures
-from harness.report.lab.quantities import format_both, quantity
-from harness.report.lab.unit_content import DepartureCheck
+from harness.report.lab.departures import condense_departures
+from harness.report.lab.quantities import quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +25,14 @@ _TICK_SPACING = 0.07
 """Least distance of two ticks, as a share of the axis."""
 
 
-def check_chart(every: Sequence[DepartureCheck], expected_from: str) -> Chart | None:
+def check_chart(every: Sequence[Departure], expected_from: str) -> Chart | None:
     """Measured over expected number of each check, with its interval; None if no check has a ratio."""
     checks = _with_ratio(every)
     if not checks:
         return None
     names = [_check_name(check) for check in checks]
     texts = "; ".join(
-        f"{name} {format_both(check.departure.measured, quantity(check.departure.key))}"
-        f"{', a departure' if check.is_named else ''}"
+        f"{name} {quantity(check.key).of(check.measured)}{', a departure' if check.is_named else ''}"
         for name, check in zip(names, checks, strict=True)
     )
     return draw_chart(
@@ -47,19 +46,17 @@ def check_chart(every: Sequence[DepartureCheck], expected_from: str) -> Chart | 
     )
 
 
-def _check_name(check: DepartureCheck) -> str:
-    label = quantity(check.departure.key).label
-    return f"{label}, {check.departure.station}" if check.departure.station else label
+def _check_name(check: Departure) -> str:
+    label = quantity(check.key).label
+    return f"{label}, {check.station}" if check.station else label
 
 
-def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequence[str]) -> None:
+def _draw_checks(figure: "Figure", checks: Sequence[Departure], names: Sequence[str]) -> None:
     axes = figure.subplots()
     ends = []
     for row, check in enumerate(checks):
-        one = check.departure
-        ratio, low, high = (
-            end / one.expected.value for end in (one.measured.value, one.measured.low, one.measured.high)
-        )
+        number = check.measured.scaled(1.0 / check.expected.value)
+        ratio, low, high = number.value, number.low, number.high
         colour = COLOURS[0] if check.is_named else FAINT
         low, high = max(low, _LEAST_RATIO), min(high, _MOST_RATIO)
         axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt")
@@ -75,15 +72,13 @@ def _draw_checks(figure: "Figure", checks: Sequence[DepartureCheck], names: Sequ
     axes.set_xlabel("measured over expected")
 
 
-def _with_ratio(checks: Sequence[DepartureCheck]) -> list[DepartureCheck]:
+def _with_ratio(checks: Sequence[Departure]) -> list[Departure]:
     """The checks whose numbers have a ratio: those of all stations together, and departures of single ones."""
     told = condense_departures(checks)
     return [
         check
         for check in checks
-        if (not check.departure.station or check in told)
-        and check.departure.expected.value > 0.0
-        and check.departure.measured.value > 0.0
+        if (not check.station or check in told) and check.expected.value > 0.0 and check.measured.value > 0.0
     ]
 
 

@@ -5,8 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from harness.core.number_format import NOT_MEASURED, decimals_for, format_fixed
-from harness.measure.measured import Measured
+from harness.core.interval import Interval
 
 
 @dataclass(frozen=True)
@@ -23,6 +22,19 @@ class Quantity:
     def title(self) -> str:
         """The name with its unit, for the head of a column or an axis."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def of(self, number: Interval) -> Interval:
+        """A number in SI units in the unit of the quantity."""
+        return number.scaled(self.factor, self.unit)
+
+    def bare(self, number: Interval) -> Interval:
+        """A number in the unit of the quantity, which the head of a column or a row names."""
+        return number.scaled(self.factor)
+
+    def exact(self, value: float) -> str:
+        """A number that is known exactly, with its unit, in at most four significant digits."""
+        rounded = float(f"{self.factor * value:.4g}")
+        return Interval(rounded, rounded, rounded, unit=self.unit).number
 
 
 _MM, _DEG, _MS, _PERCENT = ("mm", 1e3), ("deg", math.degrees(1.0)), ("ms", 1e3), ("%", 100.0)
@@ -103,7 +115,6 @@ _SUFFIXES: tuple[tuple[str, str, float], ...] = (
     ("_m", *_MM),
 )
 """Ends of keys that have no name here, with their unit."""
-_MOST_DECIMALS, _MOST_DIGITS = 6, 5
 
 
 def quantity(key: str) -> Quantity:
@@ -117,59 +128,3 @@ def quantity(key: str) -> Quantity:
 def is_known(key: str) -> bool:
     """Whether the key has a name of its own."""
     return key in _NAMES
-
-
-def format_value(number: Measured, shown: Quantity, *, with_unit: bool = True) -> str:
-    """The estimate with as many decimals as its interval deserves; "not measured" without one, and a plain 0."""
-    if not number.is_measured:
-        return NOT_MEASURED
-    decimals = measured_decimals(number, shown) if number.value else 0
-    text = format_fixed(shown.factor * number.value, decimals, grouped=True)
-    return with_unit_of(text, shown) if with_unit else text
-
-
-def format_ends(number: Measured, shown: Quantity) -> str:
-    """The interval, "1.48 to 1.53"; "exact" without a width, a dash where nothing was measured."""
-    if not number.is_measured:
-        return "–"
-    if number.low == number.high:
-        return "exact"
-    decimals = measured_decimals(number, shown)
-    return " to ".join(_end(shown.factor * end, decimals) for end in (number.low, number.high))
-
-
-def format_both(number: Measured, shown: Quantity) -> str:
-    """ "1.50 mm (1.48 to 1.53)"; the interval is left out where it has no width."""
-    if not number.is_measured or number.low == number.high:
-        return format_value(number, shown)
-    return f"{format_value(number, shown)} ({format_ends(number, shown)})"
-
-
-def format_plain(value: float, shown: Quantity) -> str:
-    """A number that is known exactly, with its unit, in at most four significant digits."""
-    rounded = float(f"{shown.factor * value:.4g}")
-    return with_unit_of(format_fixed(rounded, _plain_decimals(rounded), grouped=True), shown)
-
-
-def with_unit_of(text: str, shown: Quantity) -> str:
-    """A number with the unit of its quantity behind it."""
-    return f"{text} {shown.unit}" if shown.unit else text
-
-
-def measured_decimals(number: Measured, shown: Quantity) -> int:
-    """Decimals that show two digits of half the interval's width, and at most five digits of the value."""
-    half, value = 0.5 * shown.factor * (number.high - number.low), shown.factor * number.value
-    if half > 0.0 and math.isfinite(half):
-        enough = decimals_for(value or half, digits=_MOST_DIGITS, most=_MOST_DECIMALS)
-        return min(decimals_for(half, digits=2, most=_MOST_DECIMALS), enough)
-    return _plain_decimals(value)
-
-
-def _end(value: float, decimals: int) -> str:
-    return format_fixed(value, decimals, grouped=True) if math.isfinite(value) else "∞"
-
-
-def _plain_decimals(value: float) -> int:
-    """Decimals of a number without trailing zeros, in four significant digits."""
-    text = f"{value:.4g}"
-    return len(text.partition(".")[2]) if "e" not in text and "." in text else 0

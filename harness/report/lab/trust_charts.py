@@ -4,19 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from harness.core.interval import Interval
 from harness.core.number_format import format_fixed
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_label, quantity
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, series_colour
-from harness.report.lab.trust_wording import (
-    interval_title,
-    metric_title,
-    pair_title,
-    side_text,
-    sort_equivalences,
-    sort_pairs,
-)
 from harness.results.trust_findings import (
     Equivalence,
     EquivalenceVerdict,
@@ -25,6 +18,7 @@ from harness.results.trust_findings import (
     SideDifference,
     TrustFindings,
 )
+from harness.score.metrics import DEFINITIONS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,21 +37,46 @@ _MOST_MARGINS = 6.0
 """Differences are drawn up to so many margins."""
 
 
-def charts(findings: TrustFindings) -> dict[str, Chart]:
-    """Name of the section -> its chart; a chart without anything to show is left out."""
-    drawn = {
-        "pairs": _pairs(findings) if any(pair.device.mean is not None for pair in findings.pairs) else None,
-        "ranks": _ranks(findings) if len(_ranked(findings)) > 1 else None,
-        "equivalence": _equivalence(findings) if _with_interval(findings.equivalences) else None,
-        "distances": _distances(findings) if _measured(findings.distances) else None,
-    }
-    return {name: chart for name, chart in drawn.items() if chart is not None}
+def metric_title(metric: str) -> str:
+    """The metric with its unit; a metric that has no definition by its name."""
+    return metric_label(metric) if metric in DEFINITIONS else metric
 
 
-def _pairs(findings: TrustFindings) -> Chart:
+def interval_title(findings: TrustFindings) -> str:
+    """Name of the intervals: those of two one-sided tests at the level of the plan."""
+    return f"{100.0 * (1.0 - 2.0 * findings.level):g} % interval"
+
+
+def pair_title(pair: PairAgreement) -> str:
+    """The two arms of a pair."""
+    return f"{pair.a} against {pair.b}"
+
+
+def side_interval(side: SideDifference) -> Interval:
+    """Mean difference of one side with its interval."""
+    return Interval.of(side.mean, side.low, side.high, signed=True)
+
+
+def sort_pairs(pairs: Sequence[PairAgreement]) -> list[PairAgreement]:
+    """The pairs sorted by verdict, contradictions first; pairs of one verdict keep their order."""
+    order = ("contradict", "cannot tell", "agree")
+    return sorted(pairs, key=lambda pair: order.index(pair.verdict))
+
+
+def sort_equivalences(rows: Sequence[Equivalence]) -> list[Equivalence]:
+    """The rows sorted by verdict, those beyond the margin first."""
+    order = ("beyond the margin", "cannot tell", "equivalent")
+    return sorted(rows, key=lambda row: order.index(row.verdict))
+
+
+def pairs_chart(findings: TrustFindings) -> Chart | None:
+    """Difference of each pair on both sides; None without any."""
     pairs = [pair for pair in sort_pairs(findings.pairs) if pair.device.mean is not None][:_MOST_PAIRS]
+    if not pairs:
+        return None
     texts = "; ".join(
-        f"{pair_title(pair)} {side_text(pair.device)} on the device and {side_text(pair.simulated)} in the simulation, "
+        f"{pair_title(pair)} {side_interval(pair.device).number} on the device and "
+        f"{side_interval(pair.simulated).number} in the simulation, "
         f"{pair.verdict}"
         for pair in pairs
     )
@@ -112,8 +131,11 @@ def _ranked(findings: TrustFindings) -> list[tuple[str, float, float]]:
     ]
 
 
-def _ranks(findings: TrustFindings) -> Chart:
+def ranks_chart(findings: TrustFindings) -> Chart | None:
+    """Mean error of each method on both sides; None with fewer than two."""
     arms = _ranked(findings)
+    if len(arms) < 2:
+        return None
     margin = next(one.margin for one in findings.equivalences if one.metric == findings.ranked_metric)
     texts = "; ".join(f"{arm} {x:.3g} and {y:.3g}" for arm, x, y in arms)
     return draw_chart(
@@ -145,12 +167,11 @@ def _draw_ranks(figure: "Figure", arms: Sequence[tuple[str, float, float]], marg
     figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper")
 
 
-def _with_interval(rows: Sequence[Equivalence]) -> list[Equivalence]:
-    return [row for row in sort_equivalences(rows) if row.difference is not None and row.low is not None]
-
-
-def _equivalence(findings: TrustFindings) -> Chart:
-    rows = _with_interval(findings.equivalences)
+def equivalence_chart(findings: TrustFindings) -> Chart | None:
+    """Differences in units of the margin; None without any interval."""
+    rows = [r for r in sort_equivalences(findings.equivalences) if r.difference is not None and r.low is not None]
+    if not rows:
+        return None
     texts = "; ".join(
         f"{row.arm} {quantity(row.metric)} {_in_margins(row.difference, row):.2g}, {row.verdict}" for row in rows
     )
@@ -190,12 +211,11 @@ def _draw_equivalence(figure: "Figure", rows: Sequence[Equivalence]) -> None:
     axes.set_xlabel("simulation − device [margins]")
 
 
-def _measured(rows: Sequence[ErrorDistance]) -> list[ErrorDistance]:
-    return [row for row in rows if row.distance is not None and row.split_half]
-
-
-def _distances(findings: TrustFindings) -> Chart:
-    rows = _measured(findings.distances)
+def distances_chart(findings: TrustFindings) -> Chart | None:
+    """Distances of the errors over the device's own; None without any."""
+    rows = [row for row in findings.distances if row.distance is not None and row.split_half]
+    if not rows:
+        return None
     texts = "; ".join(f"{row.station} {row.feature} {_ratio(row):.2g}" for row in rows)
     return draw_chart(
         "distances",

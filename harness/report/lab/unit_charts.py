@@ -6,21 +6,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.measure.profile import QualityClass
 from harness.measure.rigid_pair import RigidPair
-from harness.report.kit.chart import add_legend, decimate, draw_chart
-from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_log_scale
-from harness.report.kit.style import COLOURS, FAINT, INK, Chart, series_style
-from harness.report.lab.check_chart import check_chart
-from harness.report.lab.unit_content import (
+from harness.measure.unit_report import (
+    EPISODE_KINDS,
     CaptureSummary,
     DensityCurve,
     DeviationCurve,
     EpisodeMark,
-    QualityClass,
     UnitReport,
 )
-from harness.report.lab.unit_tables import episode_counts, kinds_of
+from harness.report.kit.chart import add_legend, decimate, draw_chart
+from harness.report.kit.rows import label_rows
+from harness.report.kit.scales import set_log_scale
+from harness.report.kit.style import COLOURS, INK, Chart, series_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,25 +31,29 @@ _MOST_MARKS = 3000
 """Episodes of one kind and station that are drawn; of more the largest."""
 
 
-def charts(report: UnitReport) -> dict[str, Chart]:
-    """Name of the section -> its chart; a chart without anything to show is left out."""
-    drawn = {
-        "checks": check_chart(report.checks, report.expected_from),
-        "allan": _allan(report) if report.allan_position or report.allan_orientation else None,
-        "spectrum": _spectrum(report) if report.spectra else None,
-        "episodes": _episodes(report) if report.episodes else None,
-        "quality": _quality(report.quality) if any(one.to > 0.0 for one in report.quality) else None,
-        **{f"pair_{n}": _pair(pair, n) for n, pair in enumerate(report.rigid_pairs) if pair.speeds},
-    }
-    return {name: chart for name, chart in drawn.items() if chart is not None}
+def kinds_of(episodes: Sequence[EpisodeMark]) -> list[str]:
+    """The kinds of episodes that there are, in their order."""
+    return [kind for kind in EPISODE_KINDS if any(one.kind == kind for one in episodes)]
 
 
-def _allan(report: UnitReport) -> Chart:
+def _episode_counts(episodes: Sequence[EpisodeMark]) -> str:
+    """Number of episodes of each kind in words."""
+    counts = {kind: sum(one.kind == kind for one in episodes) for kind in kinds_of(episodes)}
+    plural = {"echo": "echoes"}
+    return ", ".join(
+        f"{count:,} {kind if count == 1 else plural.get(kind, f'{kind}s')}" for kind, count in counts.items()
+    )
+
+
+def allan_chart(report: UnitReport) -> Chart | None:
+    """Allan deviations of position and orientation; None without any."""
     groups = [
         ("position, one axis [mm]", 1e3, report.allan_position, report.allan_position_model),
         ("orientation, one axis [deg]", np.degrees(1.0), report.allan_orientation, report.allan_orientation_model),
     ]
     shown = [group for group in groups if group[2]]
+    if not shown:
+        return None
     has_model = any(model is not None for *_, model in shown)
 
     def draw(figure: "Figure") -> None:
@@ -100,13 +103,15 @@ def _line(n: int) -> dict[str, Any]:
     return {key: value for key, value in series_style(n).items() if key != "marker"}
 
 
-def _spectrum(report: UnitReport) -> Chart:
+def spectrum_chart(report: UnitReport) -> Chart | None:
+    """Spectrum of the position of each station; None without any."""
+    if not report.spectra:
+        return None
+
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
         for n, curve in enumerate(report.spectra):
             axes.plot(*_density(curve), label=curve.station, **_line(n))
-        if report.spectrum_model is not None:
-            axes.plot(*_density(report.spectrum_model), label=report.spectrum_model.station, **_MODEL)
         set_log_scale(axes, "x")
         set_log_scale(axes, "y")
         axes.set_xlabel("frequency [Hz]")
@@ -130,10 +135,13 @@ def _density(curve: DensityCurve) -> tuple[Floats, Floats]:
     return decimate(curve.frequency_hz, 1e6 * curve.density_m2_hz)
 
 
-def _episodes(report: UnitReport) -> Chart:
+def episodes_chart(report: UnitReport) -> Chart | None:
+    """Time line of the episodes of each station; None without any."""
+    if not report.episodes:
+        return None
     stations = report.capture.stations
     kinds = kinds_of(report.episodes)
-    counts = episode_counts(report.episodes)
+    counts = _episode_counts(report.episodes)
     return draw_chart(
         "episodes",
         "Episodes over the capture",
@@ -168,26 +176,16 @@ def _draw_episodes(
         axes.add_collection(LineCollection(segments, colors=colour, linewidths=height_pt, capstyle="butt"))
         axes.plot([], [], color=colour, linewidth=height_pt, label=kind)
     label_rows(axes, stations)
-    for stretch in capture.stretches:
-        if stretch.name and 0.0 <= stretch.begin_s < until_s:
-            begin = stretch.begin_s / scale
-            axes.axvline(begin, color=FAINT, linewidth=0.9)
-            axes.annotate(
-                stretch.name,
-                (begin, 1.0),
-                xytext=(3.0, 1.0),
-                xycoords=axes.get_xaxis_transform(),
-                textcoords="offset points",
-                va="bottom",
-                fontsize=9.0,
-                color=FAINT,
-            )
     axes.set_xlim(0.0, until_s / scale)
     axes.set_xlabel(f"time since the start [{unit}]")
     add_legend(figure, axes)
 
 
-def _quality(classes: Sequence[QualityClass]) -> Chart:
+def quality_chart(classes: Sequence[QualityClass]) -> Chart | None:
+    """Share and error of the readings in each class of quality; None without a class but that of the lost ones."""
+    if not any(one.to > 0.0 for one in classes):
+        return None
+
     def draw(figure: "Figure") -> None:
         shares, errors = figure.subplots(1, 2)
         names = ["lost" if one.to == 0.0 else f"{one.to:g}" for one in classes]
@@ -223,7 +221,11 @@ def _quality(classes: Sequence[QualityClass]) -> Chart:
     )
 
 
-def _pair(pair: RigidPair, n: int) -> Chart:
+def pair_chart(pair: RigidPair) -> Chart | None:
+    """Error of two stations on a bar by speed; None without motion."""
+    if not pair.speeds:
+        return None
+
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
         middle = [0.5 * (one.from_m_s + one.to_m_s) for one in pair.speeds]
@@ -237,7 +239,7 @@ def _pair(pair: RigidPair, n: int) -> Chart:
 
     names = " and ".join(pair.stations)
     return draw_chart(
-        f"pair_{n}",
+        "pair",
         f"Error of {names} in motion",
         "How far the vector from one station to the other departs from that of a rigid bar: the errors of both "
         "stations together, without any reference. An error that both share does not show.",

@@ -2,187 +2,364 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from functools import partial
 
-from harness.core.files import write_text
-from harness.core.number_format import count_noun
-from harness.report.kit.document import Section, chart_figure, document
-from harness.report.kit.markup import Markup, bullet_list, details, join, tag
-from harness.report.kit.style import Chart
-from harness.report.kit.table import html_table
-from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import condense_departures, departure_text
-from harness.report.lab.stacked_intervals import stack_intervals
-from harness.report.lab.unit_charts import charts
-from harness.report.lab.unit_content import ParameterRow, UnitReport
-from harness.report.lab.unit_tables import (
-    allan_table,
-    capture_text,
-    episodes_table,
-    pair_table,
-    parameters_table,
-    quality_table,
-    reasons,
-    spectrum_table,
-    stations_page_table,
-    stretches_table,
+import numpy as np
+
+from harness.core.interval import Interval
+from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
+from harness.measure.profile import QualityClass, StretchLength
+from harness.measure.rigid_pair import RigidPair
+from harness.measure.unit_report import (
+    STATION_FIGURES,
+    CaptureSummary,
+    DensityCurve,
+    EpisodeMark,
+    ParameterRow,
+    RecordingAdvice,
+    StationFigures,
+    UnitReport,
 )
-from harness.report.lab.unit_wording import advice_text, answer, description
+from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section
+from harness.report.lab.check_chart import check_chart
+from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
+from harness.report.lab.quantities import quantity
+from harness.report.lab.unit_charts import (
+    allan_chart,
+    episodes_chart,
+    kinds_of,
+    pair_chart,
+    quality_chart,
+    spectrum_chart,
+)
 
+_FREQUENCIES, _TAUS = 8, 8
+"""Rows of the tables of spectra and of Allan deviations."""
 _INTERVALS = (
     "Below the numbers: intervals that hold the true value in 95 of 100 captures. From: the number of events or of "
     "independent samples."
 )
-_DEPARTURES = (
-    "A departure is a number that differs from the expected one by more than chance explains: p after Holm's "
-    "correction over all checks is at most 0.05."
+_STATIONS = (
+    "Spread: standard deviation at rest, of the position in space and of the orientation. White noise and drift are "
+    "its parts on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
 )
+_EPISODES = "Excursion: a displacement of seconds. Echo: a burst of outliers. Gap: a loss."
 
 
-def write_unit_page(path: Path, report: UnitReport) -> Path:
-    """Write the page to `path` and return it; its folder is created."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, unit_page(report, charts(report)))
-    return path
-
-
-def unit_page(report: UnitReport, drawn: Mapping[str, Chart]) -> str:
-    """The HTML of the page, with the charts of `unit_charts.charts`; a section without its chart has its table open."""
-    facts = {
-        "Capture": capture_text(report.capture),
-        "Damage": " ".join(report.capture.damage),
-        "Unit file": report.unit_file,
-        "Expected": f"numbers of {report.expected_from}",
-    }
-    sections: list[Section] = [
-        ("Checks", "checks", _checks(report, drawn)),
-        ("Error model", "parameters", _parameters(report.parameters, "Error model")),
-        ("Clock and records", "timing", _parameters(report.timing, "Clock and records")),
-        ("Stations", "stations", _stations(report)),
-        ("Allan deviation", "allan", _allan(report, drawn)),
-        ("Spectrum", "spectrum", _with_chart(drawn, "spectrum", _spectrum_numbers(report))),
-        ("Episodes", "episodes", _with_chart(drawn, "episodes", _episode_numbers(report))),
-        ("Quality", "quality", _with_chart(drawn, "quality", _quality_numbers(report))),
-        ("Stations on a bar", "bar", _pairs(report, drawn)),
-        ("How long to record", "advice", bullet_list([advice_text(one) for one in report.advice])),
-        ("Capture", "capture", _capture(report)),
-        ("Made by", "command", tag("pre", tag("code", report.command))),
-    ]
-    return document(
-        title=f"{report.name}: harness characterize",
-        kicker="harness characterize",
-        heading=answer(report),
-        facts={title: text for title, text in facts.items() if text},
-        sections=sections,
-        lead=_lead(report),
-    )
-
-
-def _lead(report: UnitReport) -> Markup:
-    """The departures, then what the unit is like."""
+def unit_page(report: UnitReport, command: str, unit_file: str = "") -> Page:
+    """The page of a unit that `command` measured, and whose unit file has this name."""
     described = " ".join(description(report))
-    return join(
-        bullet_list([departure_text(check) for check in condense_departures(report.checks)]),
-        tag("p", described) if described else None,
+    return Page(
+        verb="characterize",
+        name=report.name,
+        headline=departures_sentence(report.name, report.checks, report.expected_from),
+        lead=[Bullets(departure_texts(report.checks)), *([Prose(described)] if described else [])],
+        facts={
+            "Capture": capture_text(report.capture),
+            "Damage": " ".join(report.capture.damage),
+            "Unit file": unit_file,
+            "Expected": f"numbers of {report.expected_from}",
+        },
+        sections=[
+            Section(
+                "Checks",
+                "checks",
+                [
+                    Drawing(
+                        partial(check_chart, report.checks, report.expected_from),
+                        departures_table(report.checks),
+                        f"All {count_noun(len(report.checks), 'check')}",
+                    )
+                ],
+            ),
+            Section("Error model", "parameters", _parameters(report.parameters)),
+            Section("Clock and records", "timing", _parameters(report.timing)),
+            Section("Stations", "stations", [_stations_table(report.stations)]),
+            Section(
+                "Allan deviation",
+                "allan",
+                [Drawing(partial(allan_chart, report), tuple(_allan_tables(report)))],
+                terminal=False,
+            ),
+            Section(
+                "Spectrum",
+                "spectrum",
+                [Drawing(partial(spectrum_chart, report), _spectrum_table(report.spectra))],
+                terminal=False,
+            ),
+            Section(
+                "Episodes", "episodes", [Drawing(partial(episodes_chart, report), _episodes_table(report.episodes))]
+            ),
+            Section(
+                "Quality",
+                "quality",
+                [Drawing(partial(quality_chart, report.quality), _quality_table(report.quality))],
+                terminal=False,
+            ),
+            Section(
+                "Stations on a bar",
+                "bar",
+                [Drawing(partial(pair_chart, pair), _pair_table(pair)) for pair in report.rigid_pairs],
+            ),
+            Section("How long to record", "advice", [Bullets([advice_text(one) for one in report.advice])]),
+            Section(
+                "Capture",
+                "capture",
+                [stretches_table(report.capture.stretches), Bullets([*report.capture.damage, *report.notes])],
+            ),
+        ],
+        command=command,
     )
 
 
-def _checks(report: UnitReport, drawn: Mapping[str, Chart]) -> Markup:
-    if not report.checks:
-        return Markup()
-    table = html_table(
-        stack_intervals(departures_table(report.checks)),
-        "The least likely first. Below the numbers: 95 % intervals.",
-        label="checks",
+def description(report: UnitReport) -> list[str]:
+    """What the unit is like, in short sentences; numbers that were not measured are left out."""
+    values = {row.key: row.measured for row in (*report.parameters, *report.timing) if row.measured.is_measured}
+    sentences = (
+        _spread_sentence(report),
+        _noise_sentence(values),
+        _excursion_sentence(values),
+        _share_sentence(values),
+        _timing_sentence(values),
     )
-    unfolded = details(f"All {count_noun(len(report.checks), 'check')}", table) if "checks" in drawn else table
-    chart = chart_figure(drawn["checks"]) if "checks" in drawn else None
-    return join(tag("p", _DEPARTURES), chart, unfolded)
+    return [sentence for sentence in sentences if sentence]
 
 
-def _parameters(rows: Sequence[ParameterRow], label: str) -> Markup:
-    if not rows:
-        return Markup()
-    why = bullet_list(reasons(rows))
-    return join(
-        html_table(stack_intervals(parameters_table(rows)), _INTERVALS, label=label),
-        tag("p", "Not measured, and why:", class_="caption") if why else None,
-        why,
+def _spread_sentence(report: UnitReport) -> str:
+    spreads = {
+        name: [found for row in report.stations if (found := row.figures.get(name)) and found.is_measured]
+        for name in ("spread_m", "spread_rad")
+    }
+    parts = [
+        f"{noun} scatters by {_range(numbers, f'station.{name}')}"
+        for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
+        if numbers
+    ]
+    return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
+
+
+def _range(numbers: Sequence[Interval], key: str) -> str:
+    shown = quantity(key)
+    ends = [
+        format_fixed(shown.factor * end, 2) for end in (min(n.value for n in numbers), max(n.value for n in numbers))
+    ]
+    return f"{' to '.join(dict.fromkeys(ends))} {shown.unit}"
+
+
+def _noise_sentence(values: Mapping[str, Interval]) -> str:
+    nouns = {"components.white.position_m": "white noise", "components.drift.position_m": "drift"}
+    parts = [f"{_number(values, key)} of {noun}" for key, noun in nouns.items() if key in values]
+    lasting = _number(values, "components.drift.correlation_s")
+    return (
+        f"On each axis a position has {' and '.join(parts)}{', which lasts ' * bool(lasting)}{lasting}."
+        if parts
+        else ""
     )
 
 
-def _stations(report: UnitReport) -> Markup:
-    if not report.stations:
-        return Markup()
-    caption = (
-        "Spread: standard deviation at rest, of the position in space and of the orientation. White noise and drift "
-        "are its parts on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
-    )
-    return html_table(stations_page_table(report.stations), caption, label="stations")
+def _number(values: Mapping[str, Interval], key: str) -> str:
+    return quantity(key).of(values[key]).number if key in values else ""
 
 
-def _allan(report: UnitReport, drawn: Mapping[str, Chart]) -> Markup:
-    tables = [
-        html_table(allan_table(curves, factor, unit), caption, label=caption)
-        for curves, factor, unit, caption in (
-            (report.allan_position, 1e3, "mm", "Allan deviation of the position"),
-            (report.allan_orientation, math.degrees(1.0), "deg", "Allan deviation of the orientation"),
+def _excursion_sentence(values: Mapping[str, Interval]) -> str:
+    rate = values.get("components.excursion.onsets_per_min")
+    if rate is None:
+        return ""
+    size, stay = (_ends_text(values, f"components.excursion.{name}") for name in ("size_m", "stay_s"))
+    tail = "".join([f" of {size}" if size else "", f" for {stay}" if stay else ""])
+    return f"A station has {rate.number} excursions a minute{tail}."
+
+
+def _ends_text(values: Mapping[str, Interval], key: str) -> str:
+    if f"{key}.0" in values and f"{key}.1" in values:
+        return f"{quantity(f'{key}.0').bare(values[f'{key}.0']).number} to {_number(values, f'{key}.1')}"
+    return _number(values, key)
+
+
+def _share_sentence(values: Mapping[str, Interval]) -> str:
+    nouns = {
+        "components.echo.share": "echoes",
+        "components.dropout.share": "lost",
+        "timing.duplicate_share": "sent twice",
+    }
+    parts = [f"{_number(values, key)} are {noun}" for key, noun in nouns.items() if key in values]
+    joined = " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+    return f"Of the readings {joined}." if parts else ""
+
+
+def _timing_sentence(values: Mapping[str, Interval]) -> str:
+    rate = _number(values, "tracker.rate_hz") or _number(values, "timing.rate_hz")
+    clock = values.get("components.clock.drift_ppm")
+    parts = [f"records of a station come at {rate}"] if rate else []
+    if clock:
+        size = clock if clock.value >= 0.0 else clock.scaled(-1.0)
+        word = "fast" if clock.value >= 0.0 else "slow"
+        parts.append(f"the clock runs {quantity('components.clock.drift_ppm').of(size).number} {word}")
+    text = " and ".join(parts)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def advice_text(advice: RecordingAdvice) -> str:
+    """How long to record for a wanted precision."""
+    label, percent = quantity(advice.key).label, f"{100.0 * advice.precision:g} %"
+    had = f"This capture has {count_noun(advice.events, 'event')} in {_minutes(advice.minutes)}"
+    if advice.events >= advice.needed_events:
+        return (
+            f"To know the {label} to {percent}: {had.lower()}, which is enough ({advice.needed_events:,} are needed)."
         )
+    if not math.isfinite(advice.needed_minutes):
+        return f"To know the {label} to {percent}: {advice.needed_events:,} events are needed. {had}: no rate to go by."
+    needed = f"record {_minutes(advice.needed_minutes)} at this rate ({advice.needed_events:,} events)"
+    return f"To know the {label} to {percent}: {needed}. {had}."
+
+
+def _minutes(minutes: float) -> str:
+    return f"{format_fixed(minutes, 1 if minutes < 10.0 else 0, grouped=True)} min"
+
+
+def capture_text(capture: CaptureSummary) -> str:
+    """The capture in a few words."""
+    minutes = format_fixed(capture.duration_s / 60.0, 1, grouped=True)
+    return f"{capture.name}: {count_noun(len(capture.stations), 'station')} at {capture.rate_hz:g} Hz, {minutes} min"
+
+
+def _parameters(parameters: Sequence[ParameterRow]) -> list[Block]:
+    """Parameters with their interval, the default, and why numbers were not measured."""
+    rows = [
+        [
+            quantity(row.key).label,
+            quantity(row.key).of(row.measured),
+            f"{row.measured.count:,}" if row.measured.count else "–",
+            "–" if row.default is None else quantity(row.key).exact(row.default),
+            row.status,
+        ]
+        for row in parameters
+    ]
+    why: dict[str, list[str]] = {}
+    for row in parameters:
+        if not row.measured.is_measured:
+            why.setdefault(row.measured.reason, []).append(quantity(row.key).label)
+    reasons = [f"{', '.join(labels)}: {reason}" for reason, labels in why.items()]
+    table = DataTable(["number", "measured", "from", "default", "status"], rows, caption=_INTERVALS)
+    return [table, Bullets(reasons, "Not measured, and why", "not measured: ")]
+
+
+def _stations_table(rows: Sequence[StationFigures]) -> DataTable:
+    """A row for each figure, a column for each station."""
+    names = [name for name in STATION_FIGURES if any(name in row.figures for row in rows)]
+    cells = [[quantity(f"station.{name}").title, *(_figure(row, name) for row in rows)] for name in names]
+    return DataTable(["", *(row.station for row in rows)], cells, caption=_STATIONS, intervals_printed=False)
+
+
+def _figure(row: StationFigures, name: str) -> Interval | str:
+    number = row.figures.get(name)
+    return quantity(f"station.{name}").bare(number) if number and number.is_measured else "–"
+
+
+def stretches_table(stretches: Sequence[StretchLength]) -> DataTable:
+    """The stretches of a capture."""
+    rows = [
+        [one.name or "without a mark", format_fixed(one.duration_s, 1, grouped=True), f"{one.records:,}"]
+        for one in stretches
+    ]
+    return DataTable(["stretch", "duration [s]", "records"], rows, caption="Parts of the capture.", label="stretches")
+
+
+def _allan_tables(report: UnitReport) -> list[DataTable]:
+    """Allan deviations at a few averaging times."""
+    groups = (
+        (report.allan_position, 1e3, "mm", "Allan deviation of the position"),
+        (report.allan_orientation, math.degrees(1.0), "deg", "Allan deviation of the orientation"),
+    )
+    return [
+        DataTable(
+            ["averaging time [s]", *(f"{curve.station} [{unit}]" for curve in curves)],
+            [
+                [f"{tau_s:.3g}", *(_significant(factor * _nearest(c.tau_s, c.deviation, tau_s)) for c in curves)]
+                for tau_s in _spaced(curves[0].tau_s, _TAUS)
+            ],
+            caption=caption,
+            label=caption,
+        )
+        for curves, factor, unit, caption in groups
         if curves
     ]
-    return _with_chart(drawn, "allan", join(*tables) if tables else Markup())
 
 
-def _spectrum_numbers(report: UnitReport) -> Markup:
-    return (
-        html_table(spectrum_table(report.spectra), "Density near these frequencies.", label="spectrum")
-        if report.spectra
-        else Markup()
-    )
+def _spectrum_table(curves: Sequence[DensityCurve]) -> DataTable:
+    """Densities at a few frequencies."""
+    rows = [
+        [f"{hz:.3g}", *(_significant(1e6 * _nearest(c.frequency_hz, c.density_m2_hz, hz)) for c in curves)]
+        for hz in (_spaced(curves[0].frequency_hz, _FREQUENCIES) if curves else ())
+    ]
+    head = ["frequency [Hz]", *(f"{curve.station} [mm²/Hz]" for curve in curves)]
+    return DataTable(head, rows, caption="Density near these frequencies.")
 
 
-def _episode_numbers(report: UnitReport) -> Markup:
-    if not report.episodes:
-        return Markup()
-    caption = (
-        "Excursion: a displacement of seconds. Echo: a burst of outliers. Gap: a loss. Coast: falling quality before "
-        "a loss."
-    )
-    return html_table(episodes_table(report.episodes), caption, label="episodes")
+def _spaced(values: np.ndarray, count: int) -> list[float]:
+    """At most `count` of the rising values, about evenly spaced on a logarithmic axis."""
+    wanted = np.geomspace(values[0], values[-1], count)
+    return sorted({float(values[np.abs(np.log(values / value)).argmin()]) for value in wanted})
 
 
-def _quality_numbers(report: UnitReport) -> Markup:
-    return (
-        html_table(quality_table(report.quality), "A class includes its upper end.", label="quality")
-        if report.quality
-        else Markup()
-    )
+def _nearest(at: np.ndarray, values: np.ndarray, wanted: float) -> float:
+    return float(values[np.abs(at - wanted).argmin()])
 
 
-def _pairs(report: UnitReport, drawn: Mapping[str, Chart]) -> Markup:
-    parts = []
-    for n, pair in enumerate(report.rigid_pairs):
-        names = " and ".join(pair.stations)
-        table = html_table(
-            stack_intervals(pair_table(pair)),
-            "Errors of both stations together. Below the numbers: 95 % intervals.",
-            label=f"bar of {names}",
+def _significant(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else NOT_MEASURED
+
+
+def _episodes_table(episodes: Sequence[EpisodeMark]) -> DataTable:
+    """Number, total time and medians of the episodes of each kind that there is."""
+    rows = []
+    for kind in kinds_of(episodes):
+        found = [one for one in episodes if one.kind == kind]
+        duration_s = np.array([one.duration_s for one in found])
+        known = [one.size_m for one in found if np.isfinite(one.size_m)]
+        rows.append(
+            [
+                kind,
+                f"{len(found):,}",
+                format_fixed(float(duration_s.sum()), 1, grouped=True),
+                format_fixed(float(np.median(duration_s)), 3),
+                format_fixed(1e3 * float(np.median(known)), 1) if known else "–",
+            ]
         )
-        parts.append(_with_chart(drawn, f"pair_{n}", table))
-    return join(*parts) if parts else Markup()
-
-
-def _capture(report: UnitReport) -> Markup:
-    stretches = (
-        html_table(stretches_table(report.capture), "Parts of the capture.", label="stretches")
-        if report.capture.stretches
-        else Markup()
+    return DataTable(
+        ["kind", "number", "in all [s]", "median duration [s]", "median size [mm]"], rows, caption=_EPISODES
     )
-    return join(stretches, bullet_list([*report.capture.damage, *report.notes]))
 
 
-def _with_chart(drawn: Mapping[str, Chart], name: str, table: Markup) -> Markup:
-    """A chart with its numbers folded, or the numbers alone."""
-    if not table or name not in drawn:
-        return table
-    return join(chart_figure(drawn[name]), details("Numbers of this chart", table))
+def _quality_table(classes: Sequence[QualityClass]) -> DataTable:
+    """Share and error of the readings in each class of quality."""
+    rows = [
+        [
+            "lost (0)" if one.to == 0.0 else f"above {one.above:g} to {one.to:g}",
+            format_share(one.share, 2),
+            "–" if one.to == 0.0 else _millimetres(one.median_m),
+            "–" if one.to == 0.0 else _millimetres(one.quantile95_m),
+        ]
+        for one in classes
+    ]
+    head = ["quality", "share of the readings", "median error [mm]", "95 % quantile [mm]"]
+    return DataTable(head, rows, caption="A class includes its upper end.")
+
+
+def _millimetres(value_m: float) -> str:
+    return format_fixed(1e3 * value_m, 1) if np.isfinite(value_m) else NOT_MEASURED
+
+
+def _pair_table(pair: RigidPair) -> DataTable:
+    """What two stations on one bar show."""
+    numbers = {
+        "distance of the stations": quantity("length_m").of(pair.length_m),
+        "change of the angle between them (RMS)": quantity("rotation_rad").of(pair.rotation_rad),
+        "positions ahead of orientations": quantity("components.speed.ahead_s").of(pair.ahead_s),
+    }
+    numbers |= {
+        f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s (RMS)": quantity("rms_m").of(one.rms_m) for one in pair.speeds
+    }
+    caption = "Errors of both stations together. Below the numbers: 95 % intervals."
+    names = " and ".join(pair.stations)
+    return DataTable([names, "measured"], [*map(list, numbers.items())], caption=caption, label=f"bar of {names}")

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.measure.validation_report import ResidualSeries, ValidationReport
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, Chart
-from harness.report.lab.quantities import format_both, quantity
-from harness.report.lab.validation_content import RegistrationNumber, ResidualSeries, ValidationReport
+from harness.report.lab.quantities import quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,29 +21,19 @@ _MOST_POINTS = 1200
 """Points of one curve; more are averaged in pairs, fours and so on: the largest is drawn."""
 
 
-def charts(report: ValidationReport) -> dict[str, Chart]:
-    """Name of the section -> its chart; a chart without anything to show is left out."""
-    offsets = [one for one in report.numbers if one.key in _OFFSETS and one.measured.is_measured]
-    drawn = {
-        "registration": _offsets(offsets) if len(offsets) > 1 else None,
-        "residuals": _residuals(report) if report.residuals else None,
-    }
-    return {name: chart for name, chart in drawn.items() if chart is not None}
-
-
-def _offsets(offsets: list[RegistrationNumber]) -> Chart:
-    names = [_name(one) for one in offsets]
-    texts = "; ".join(
-        f"{name} {format_both(one.measured, quantity(one.key))}" for name, one in zip(names, offsets, strict=True)
-    )
+def offsets_chart(report: ValidationReport) -> Chart | None:
+    """The time offsets by orientation and by position; None unless both were measured."""
+    offsets = {key: report.numbers[key] for key in _OFFSETS if key in report.numbers}
+    if len(offsets) < 2 or not all(number.is_measured for number in offsets.values()):
+        return None
+    names = [quantity(key).label.removeprefix("time offset ") for key in offsets]
+    shown = [quantity(key).of(number) for key, number in offsets.items()]
 
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()
-        for row, one in enumerate(offsets):
-            colour = COLOURS[1] if one.key == _OFFSETS[0] else COLOURS[0]
-            number = one.measured
-            axes.plot([1e3 * number.low, 1e3 * number.high], [row, row], color=colour, linewidth=2.2)
-            axes.plot(1e3 * number.value, row, "o", color=colour, markersize=6)
+        for row, (number, colour) in enumerate(zip(shown, (COLOURS[1], COLOURS[0]), strict=True)):
+            axes.plot([number.low, number.high], [row, row], color=colour, linewidth=2.2)
+            axes.plot(number.value, row, "o", color=colour, markersize=6)
         label_rows(axes, names)
         axes.set_xlabel("time offset [ms]")
 
@@ -52,19 +42,17 @@ def _offsets(offsets: list[RegistrationNumber]) -> Chart:
         "Time offset by orientation and by position",
         "How much later the stream is than its reference, with its 95 % interval. The two are estimated apart. Their "
         "difference is an error of the position along the velocity: positions that are not of the moment of the stamp.",
-        f"Time offsets: {texts}.",
+        f"Time offsets: {'; '.join(f'{name} {number}' for name, number in zip(names, shown, strict=True))}.",
         draw,
         _FRAME_IN + _ROW_IN * len(offsets),
     )
 
 
-def _name(one: RegistrationNumber) -> str:
-    label = quantity(one.key).label.removeprefix("time offset ")
-    return f"{label}, {one.station}" if one.station else label
-
-
-def _residuals(report: ValidationReport) -> Chart:
+def residuals_chart(report: ValidationReport) -> Chart | None:
+    """The errors of each station over time; None without any."""
     series = report.residuals
+    if not series:
+        return None
     return draw_chart(
         "residuals",
         "Errors of each station over time",

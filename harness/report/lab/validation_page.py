@@ -1,33 +1,20 @@
 """The page of a validated capture: how far it is from its reference, then the registration, then each station."""
 
-from collections.abc import Mapping
-from pathlib import Path
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
 
-from harness.core.files import write_text
-from harness.core.number_format import count_noun
-from harness.core.text_table import Table
-from harness.report.kit.document import Section, chart_figure, document
-from harness.report.kit.markup import Markup, bullet_list, details, join, tag
-from harness.report.kit.style import Chart
-from harness.report.kit.table import html_table
-from harness.report.lab.check_table import departures_table
-from harness.report.lab.departure_wording import condense_departures, departure_text
-from harness.report.lab.stacked_intervals import stack_intervals
-from harness.report.lab.unit_tables import capture_text, stretches_table
-from harness.report.lab.validation_charts import charts
-from harness.report.lab.validation_content import ValidationReport
-from harness.report.lab.validation_tables import (
-    accuracy_reasons,
-    accuracy_table,
-    number_reasons,
-    numbers_table,
-    poses_table,
-    scores_table,
-)
-from harness.report.lab.validation_wording import registration_sentences, validation_answer
+from harness.core.interval import Interval
+from harness.core.number_format import format_fixed, format_number, format_share
+from harness.measure.validation_report import ValidationReport
+from harness.report.kit.metric_labels import metric_label
+from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
+from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
+from harness.report.lab.quantities import quantity
+from harness.report.lab.unit_page import capture_text, stretches_table
+from harness.report.lab.validation_charts import offsets_chart, residuals_chart
+from harness.score.metrics import DEFINITIONS
 
-_FEWEST_CHECKS = 5
-"""Checks that are shown where none is a departure."""
 _REGISTRATION = (
     "These numbers were estimated from the capture and its reference, and taken out before errors were computed. An "
     "error that looks like one of them is therefore here and not in the errors of the stations."
@@ -36,82 +23,156 @@ _POSES = (
     "The room is the pose of the tracker's frame in the reference's. A mount is the pose of a station on its body, "
     "with the offset of its housing. Below the numbers: 95 % intervals."
 )
-_ACCURACY = "Errors of each station after the registration. Below the numbers: 95 % intervals."
+_DEGREES = math.degrees(1.0)
 
 
-def write_validation_page(path: Path, report: ValidationReport) -> Path:
-    """Write the page to `path` and return it; its folder is created."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, validation_page(report, charts(report)))
-    return path
-
-
-def validation_page(report: ValidationReport, drawn: Mapping[str, Chart]) -> str:
-    """The HTML of the page, with the charts of `validation_charts.charts`."""
-    facts = {
-        "Capture": capture_text(report.capture),
-        "Reference": report.truth,
-        "Damage": " ".join(report.capture.damage),
-        "Expected": f"numbers of {report.expected_from}" if report.checks else "",
-    }
-    sections: list[Section] = [
-        ("Checks", "checks", _checks(report)),
-        ("Registration", "registration", _registration(report, drawn)),
-        ("Room and mounts", "poses", _table(poses_table(report), _POSES, "room and mounts")),
-        ("Accuracy", "accuracy", _accuracy(report)),
-        ("Errors over time", "residuals", chart_figure(drawn["residuals"]) if "residuals" in drawn else Markup()),
-        ("Reconstruction", "scores", _table(scores_table(report), "Errors of methods on this capture.", "scores")),
-        ("Capture", "capture", _capture(report)),
-        ("Made by", "command", tag("pre", tag("code", report.command))),
-    ]
-    return document(
-        title=f"{report.name}: harness validate",
-        kicker="harness validate",
-        heading=validation_answer(report),
-        facts={title: text for title, text in facts.items() if text},
-        sections=sections,
-        lead=_lead(report),
+def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, float | None]], command: str) -> Page:
+    """The page of a capture that `command` validated; `scores` are errors of methods on it, by method and metric."""
+    return Page(
+        verb="validate",
+        name=report.name,
+        headline=validation_answer(report),
+        lead=[
+            Bullets([*report.exchanged, *departure_texts(report.checks)]),
+            Prose(" ".join(registration_sentences(report))),
+        ],
+        facts={
+            "Capture": capture_text(report.capture),
+            "Reference": report.truth,
+            "Damage": " ".join(report.capture.damage),
+            "Expected": f"numbers of {report.expected_from}" if report.checks else "",
+        },
+        sections=[
+            Section("Checks", "checks", [departures_table(report.checks)]),
+            Section(
+                "Registration",
+                "registration",
+                [
+                    *([BrowserOnly([Prose(_REGISTRATION)])] if report.numbers else []),
+                    Drawing(partial(offsets_chart, report)),
+                    _numbers_table(report),
+                    Bullets(_number_reasons(report), prefix="not measured: "),
+                ],
+            ),
+            Section("Room and mounts", "poses", [_poses_table(report)]),
+            Section(
+                "Accuracy",
+                "accuracy",
+                [_accuracy_table(report), Bullets(_accuracy_reasons(report), prefix="not measured: ")],
+            ),
+            Section("Errors over time", "residuals", [Drawing(partial(residuals_chart, report))], terminal=False),
+            Section("Reconstruction", "scores", [_scores_table(scores)]),
+            Section(
+                "Capture",
+                "capture",
+                [stretches_table(report.capture.stretches), Bullets([*report.capture.damage, *report.notes])],
+            ),
+        ],
+        command=command,
     )
 
 
-def _lead(report: ValidationReport) -> Markup:
-    faults = bullet_list([*report.exchanged, *(departure_text(check) for check in condense_departures(report.checks))])
-    return join(faults, tag("p", " ".join(registration_sentences(report))))
-
-
-def _checks(report: ValidationReport) -> Markup:
+def validation_answer(report: ValidationReport) -> str:
+    """How far the capture is from its reference, and what departs from the expected numbers."""
+    errors = _median_text(report)
+    departures = departures_sentence(report.name, report.checks, report.expected_from)
+    if not errors:
+        return departures
     if not report.checks:
-        return Markup()
-    shown = len(report.departures) or _FEWEST_CHECKS
-    table = html_table(
-        stack_intervals(departures_table(report.checks, shown)),
-        "The least likely first. Below the numbers: 95 % intervals. A departure has a p of at most 0.05 after Holm's "
-        "correction.",
-        label="checks",
+        return f"{report.name} lies {errors} from its reference."
+    return f"{report.name} lies {errors} from its reference. {departures.replace(report.name, 'It', 1)}"
+
+
+def _median_text(report: ValidationReport) -> str:
+    """Medians over the stations, "2.1 to 3.0 mm and 0.4 to 0.6 deg (median of each station)"."""
+    places = [row.position.median.scaled(1e3).value for row in report.accuracy.values()]
+    turns = [row.orientation.median.scaled(_DEGREES).value for row in report.accuracy.values()]
+    parts = [
+        f"{_range([value for value in values if math.isfinite(value)], decimals)} {unit}"
+        for values, decimals, unit in ((places, 1, "mm"), (turns, 2, "deg"))
+        if any(map(math.isfinite, values))
+    ]
+    return f"{' and '.join(parts)} (median of each station)" if parts else ""
+
+
+def _range(values: Sequence[float], decimals: int) -> str:
+    return " to ".join(dict.fromkeys(format_fixed(end, decimals) for end in (min(values), max(values))))
+
+
+def registration_sentences(report: ValidationReport) -> list[str]:
+    """What was estimated before errors were computed, in short sentences."""
+    matched = (
+        f"{report.matched_frames:,} of {report.expected_frames:,} frames were matched "
+        f"({format_share(report.matched_share, 1)})."
     )
-    if shown >= len(report.checks):
-        return table
-    every = html_table(stack_intervals(departures_table(report.checks)), "The least likely first.", label="all checks")
-    return join(table, details(f"All {count_noun(len(report.checks), 'check')}", every))
+    shown = [
+        f"{quantity(key).label}: {quantity(key).of(one)}" for key, one in report.numbers.items() if one.is_measured
+    ]
+    return [matched, *([f"Estimated from the capture: {'; '.join(shown)}."] if shown else [])]
 
 
-def _registration(report: ValidationReport, drawn: Mapping[str, Chart]) -> Markup:
-    if not report.numbers:
-        return Markup()
-    chart = chart_figure(drawn["registration"]) if "registration" in drawn else None
-    table = _table(numbers_table(report), "Below the estimates: 95 % intervals.", "registration")
-    return join(tag("p", _REGISTRATION), chart, table, bullet_list(number_reasons(report)))
+def _numbers_table(report: ValidationReport) -> DataTable:
+    """Time offsets, clock, scale and heading errors with their intervals."""
+    rows = [[quantity(key).label, quantity(key).of(one)] for key, one in report.numbers.items()]
+    caption = "Below the estimates: 95 % intervals."
+    return DataTable(["number", "estimate"], rows, caption=caption, label="registration")
 
 
-def _accuracy(report: ValidationReport) -> Markup:
-    return join(_table(accuracy_table(report), _ACCURACY, "accuracy"), bullet_list(accuracy_reasons(report)))
+def _number_reasons(report: ValidationReport) -> list[str]:
+    return [f"{quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
 
 
-def _table(table: Table, caption: str, label: str) -> Markup:
-    """A table with its intervals below the numbers; nothing without rows."""
-    return html_table(stack_intervals(table), caption, label=label) if table.rows else Markup()
+def _poses_table(report: ValidationReport) -> DataTable:
+    """Position and orientation of the room and of each mount."""
+    rows = [
+        [
+            f"{pose.name} on {pose.body}" if pose.body else pose.name,
+            *(axis.scaled(1e3) for axis in pose.position_m),
+            " ".join(format_fixed(float(value), 4) for value in pose.rotation),
+            f"± {format_fixed(math.degrees(pose.angle_rad), 2)} deg",
+        ]
+        for pose in report.poses
+    ]
+    head = ["pose", *(f"{axis} [mm]" for axis in "xyz"), "quaternion w x y z", "orientation"]
+    return DataTable(head, rows, caption=_POSES, intervals_printed=False)
 
 
-def _capture(report: ValidationReport) -> Markup:
-    stretches = _table(stretches_table(report.capture), "Parts of the capture.", "stretches")
-    return join(stretches, bullet_list([*report.capture.damage, *report.notes]))
+def _accuracy_table(report: ValidationReport) -> DataTable:
+    """Errors of each station after the registration."""
+    rows = [
+        [
+            station,
+            *_quantiles(row.position.median, row.position.rms, row.position.quantile95, factor=1e3),
+            *_quantiles(row.orientation.median, row.orientation.rms, row.orientation.quantile95, factor=_DEGREES),
+            f"{row.readings:,}",
+            format_share(row.lost_share, 2),
+        ]
+        for station, row in report.accuracy.items()
+    ]
+    figures = [f"{name} [{unit}]" for unit in ("mm", "deg") for name in ("median", "RMS", "95 %")]
+    caption = "Errors of each station after the registration. Below the numbers: 95 % intervals."
+    return DataTable(["station", *figures, "readings", "lost"], rows, caption=caption, intervals_printed=False)
+
+
+def _quantiles(*numbers: Interval, factor: float) -> list[Interval]:
+    return [number.scaled(factor) for number in numbers]
+
+
+def _accuracy_reasons(report: ValidationReport) -> list[str]:
+    """Why errors of stations were not measured, each reason once with its stations."""
+    stations: dict[str, list[str]] = {}
+    for station, row in report.accuracy.items():
+        for reason in dict.fromkeys((row.position.rms.reason, row.orientation.rms.reason)):
+            if reason:
+                stations.setdefault(reason, []).append(station)
+    return [f"{', '.join(names)}: {reason}" for reason, names in stations.items()]
+
+
+def _scores_table(scores: Mapping[str, Mapping[str, float | None]]) -> DataTable:
+    """A row for each method, a column for each metric."""
+    metrics = list(dict.fromkeys(metric for values in scores.values() for metric in values))
+    rows = [
+        [method, *(format_number(values.get(metric), DEFINITIONS[metric].unit) for metric in metrics)]
+        for method, values in scores.items()
+    ]
+    return DataTable(["method", *map(metric_label, metrics)], rows, caption="Errors of methods on this capture.")

@@ -6,7 +6,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import NOT_MEASURED, format_number
-from harness.results.findings import BarChart, FindingsTable, LineChart
+from harness.report.kit.page import DataTable
+from harness.results.findings import BarChart, LineChart
 
 _MOST_IN_ALT_TEXT = 12
 """Most numbers in an alternative text; with more of them it refers to the table."""
@@ -14,7 +15,7 @@ SeriesValues = Mapping[str, Sequence[float | None]]
 """Series -> a value for each group or point; None where nothing was measured."""
 
 
-def figure_table(figure: BarChart | LineChart) -> FindingsTable:
+def figure_table(figure: BarChart | LineChart) -> DataTable:
     """Every value of a bar chart, or summary statistics of each line of a line chart."""
     return _bar_table(figure) if isinstance(figure, BarChart) else _line_table(figure)
 
@@ -33,7 +34,7 @@ def alt_text(figure: BarChart | LineChart) -> str:
     start = f"{figure.title}: bars of {', '.join(figure.series)} in {figure.unit}"
     if len(figure.groups) * len(figure.series) > _MOST_IN_ALT_TEXT:
         return f"{start} for {len(figure.groups)} groups; the table after the figure has the numbers."
-    bars = [f"{row[0]}: {', '.join(map(_label_value, table.columns[1:], row[1:]))}" for row in table.rows]
+    bars = [f"{row[0]}: {', '.join(map(_label_value, table.head[1:], row[1:]))}" for row in table.rows]
     return f"{start}. {'; '.join(bars)}."
 
 
@@ -49,11 +50,11 @@ def series_values(values: SeriesValues, series: str, count: int) -> Floats:
     return np.array([np.nan if value is None else value for value in row], dtype=float)
 
 
-def _label_value(column: str, text: str) -> str:
+def _label_value(column: str, text: object) -> str:
     return f"{column} {text}"
 
 
-def _bar_table(bars: BarChart) -> FindingsTable:
+def _bar_table(bars: BarChart) -> DataTable:
     published = [name for name in bars.series if any(v is not None for v in bars.published.get(name, ()))]
     columns = ("", *bars.series, *(f"{name}, published" if len(bars.series) > 1 else "published" for name in published))
     rows: list[tuple[str, ...]] = []
@@ -61,7 +62,7 @@ def _bar_table(bars: BarChart) -> FindingsTable:
         ours = [_bar_cell(bars, name, n) for name in bars.series]
         paper = [_format_value(value_at(bars.published, name, n), bars.unit, "") for name in published]
         rows.append((group, *ours, *paper))
-    return FindingsTable(f"{bars.title} [{bars.unit}]", columns, tuple(rows))
+    return DataTable(columns, rows, f"{bars.title} [{bars.unit}]")
 
 
 def _bar_cell(bars: BarChart, name: str, n: int) -> str:
@@ -76,14 +77,14 @@ def _bar_cell(bars: BarChart, name: str, n: int) -> str:
     return text
 
 
-def _line_table(lines: LineChart) -> FindingsTable:
+def _line_table(lines: LineChart) -> DataTable:
     columns = ("", "mean", "median", "95th percentile", "largest", "points")
     rows: list[tuple[str, ...]] = []
     for name, values in (lines.series if is_measured(lines) else {}).items():
         finite = np.array([value for value in values if value is not None], dtype=float)
         figures = [finite.mean(), *np.quantile(finite, [0.5, 0.95, 1.0])] if len(finite) else [None] * 4
         rows.append((name, *(_format_value(value, "") for value in figures), f"{len(finite):,} of {len(lines.x):,}"))
-    return FindingsTable(f"{lines.title}: {lines.y_label}", columns, tuple(rows))
+    return DataTable(columns, rows, f"{lines.title}: {lines.y_label}")
 
 
 def _format_value(value: float | None, unit: str, absent: str = NOT_MEASURED) -> str:

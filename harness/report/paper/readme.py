@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from harness.report.kit.marked_block import describe_code, replace_block
-from harness.report.paper.text import statements_text
+from harness.report.paper.page import statements_text
 from harness.results.findings import PaperFindings
 
 

@@ -25,17 +25,8 @@ _LEAST_SHARE = 1e-6
 """Share at which bars on a logarithmic axis begin, unless a smaller one is shown."""
 
 
-def charts(comparison: ErrorModelComparison) -> dict[str, Chart]:
-    """Name of the section -> its chart: "spectrum", "excursions", "gaps" and "quality"."""
-    return {
-        "spectrum": _spectrum(comparison),
-        "excursions": _excursions(comparison),
-        "gaps": _gaps(comparison),
-        "quality": _quality(comparison),
-    }
-
-
-def _spectrum(comparison: ErrorModelComparison) -> Chart:
+def spectrum_chart(comparison: ErrorModelComparison) -> Chart:
+    """Spectra of the position error."""
     counts = "; ".join(f"{model.label}: {count_noun(model.segments, 'segment')}" for model in comparison.models)
     return draw_chart(
         "spectrum",
@@ -65,7 +56,8 @@ def _draw_spectrum(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -
     add_legend(figure, axes)
 
 
-def _excursions(comparison: ErrorModelComparison) -> Chart:
+def excursions_chart(comparison: ErrorModelComparison) -> Chart:
+    """Durations and sizes of the excursions."""
     limit = f"{1e3 * comparison.limit_m:g} mm"
     counts = "; ".join(
         f"{model.label}: {count_noun(len(model.excursion_s), 'excursion')}" for model in comparison.models
@@ -104,7 +96,8 @@ def _draw_excursions(figure: "Figure", comparison: ErrorModelComparison) -> None
     add_legend(figure, durations)
 
 
-def _gaps(comparison: ErrorModelComparison) -> Chart:
+def gaps_chart(comparison: ErrorModelComparison) -> Chart:
+    """Durations of the gaps."""
     counts = "; ".join(
         f"{model.label}: {count_noun(len(model.gap_s), 'gap')}, {format_share(model.lost_share, 2)} of the readings"
         for model in comparison.models
@@ -160,7 +153,8 @@ def rates_of_at_least(values: Floats, model: TrackerErrorStatistics) -> tuple[Fl
     return different, model.per_minute(len(ordered) - smaller.astype(float))
 
 
-def _quality(comparison: ErrorModelComparison) -> Chart:
+def quality_chart(comparison: ErrorModelComparison) -> Chart:
+    """Share and error of the readings in each class of quality."""
     return draw_chart(
         "quality",
         "Quality, and the error at each quality",

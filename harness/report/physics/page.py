@@ -1,10 +1,12 @@
 """The page of the tracker's physics: the truth table first, then the error models side by side."""
 
-from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 
-from harness.report.kit.document import Section, chart_figure, document
-from harness.report.kit.markup import Markup, details, join, tag
-from harness.report.kit.style import Chart
+from harness.errors import BadInput
+from harness.report.kit.page import Drawing, Page, Section
+from harness.report.kit.page_html import write_page
+from harness.report.physics.charts import excursions_chart, gaps_chart, quality_chart, spectrum_chart
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.tables import (
     excursions_table,
@@ -16,31 +18,34 @@ from harness.report.physics.tables import (
 from harness.report.physics.truth_table import result_sentence, truth_table
 
 
-def physics_page(comparison: ErrorModelComparison, charts: Mapping[str, Chart]) -> str:
-    """The HTML of the page, with the charts of `physics.charts`; a section without its chart has its table open."""
+def write_physics_page(path: Path, comparison: ErrorModelComparison) -> Path:
+    """Write the page to `path` and return it; its folder is created. BadInput without any error model."""
+    if not comparison.models:
+        raise BadInput("There is no error model to show.", "Give at least one.")
+    return write_page(physics_page(comparison), path)
+
+
+def physics_page(comparison: ErrorModelComparison) -> Page:
+    """The page of a comparison of error models."""
     models = comparison.models
-    tables = {
-        "Spectrum": ("spectrum", spectrum_table(models)),
-        "Excursions": ("excursions", excursions_table(models)),
-        "Gaps": ("gaps", gaps_table(models)),
-        "Quality": ("quality", quality_table(models)),
+    parts = {
+        "Spectrum": (spectrum_chart, spectrum_table(models)),
+        "Excursions": (excursions_chart, excursions_table(models)),
+        "Gaps": (gaps_chart, gaps_table(models)),
+        "Quality": (quality_chart, quality_table(models)),
     }
-    sections: list[Section] = [
-        ("Summary", "summary", summary_table(comparison)),
-        *((title, name, _chart_and_numbers(charts.get(name), table)) for title, (name, table) in tables.items()),
-        ("Made by", "command", tag("pre", tag("code", comparison.command))),
-    ]
-    return document(
-        title="Physics of the tracker: harness bench physics",
-        kicker="harness bench physics",
-        heading=result_sentence(models[0].label, comparison.rows),
+    return Page(
+        verb="bench physics",
+        name="",
+        headline=result_sentence(models[0].label, comparison.rows),
+        lead=[truth_table(comparison.rows)],
         facts={model.label: model.source for model in models},
-        sections=sections,
-        lead=truth_table(comparison.rows),
+        sections=[
+            Section("Summary", "summary", [summary_table(comparison)]),
+            *(
+                Section(title, title.lower(), [Drawing(partial(draw, comparison), table)])
+                for title, (draw, table) in parts.items()
+            ),
+        ],
+        command=comparison.command,
     )
-
-
-def _chart_and_numbers(chart: Chart | None, table: Markup) -> Markup:
-    if chart is None:
-        return table
-    return join(chart_figure(chart), details("Numbers of this chart", table))

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.number_format import format_fixed, format_share
-from harness.core.text_table import Table
-from harness.report.kit.markup import Markup
-from harness.report.kit.table import NOT_MEASURED_CELL, html_table
+from harness.core.number_format import NOT_MEASURED, format_fixed, format_share
+from harness.report.kit.page import DataTable
 from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics
 
 _EPISODE_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -17,7 +15,7 @@ _FREQUENCIES = 9
 """Rows of the table of the spectrum; the frequencies are spaced evenly on a logarithmic axis."""
 
 
-def summary_table(comparison: ErrorModelComparison) -> Markup:
+def summary_table(comparison: ErrorModelComparison) -> DataTable:
     """A row for each figure, a column for each model."""
     models, limit = comparison.models, f"{1e3 * comparison.limit_m:g} mm"
     rows: list[list[object]] = [
@@ -36,10 +34,10 @@ def summary_table(comparison: ErrorModelComparison) -> Markup:
     caption = (
         "Pooled over recordings and stations. Per minute: for each minute and station. Lost readings have no error."
     )
-    return html_table(Table(["figure", *(m.label for m in models)], rows), caption, label="summary")
+    return DataTable(["figure", *(m.label for m in models)], rows, caption=caption, label="summary")
 
 
-def spectrum_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
+def spectrum_table(models: Sequence[TrackerErrorStatistics]) -> DataTable:
     """The density at a few frequencies [mm^2/Hz]."""
     shown_hz = np.geomspace(models[0].frequency_hz[0], models[0].frequency_hz[-1], _FREQUENCIES)
     rows = []
@@ -48,22 +46,22 @@ def spectrum_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
         densities = [_significant(1e6 * m.density_m2_hz[n]) for m, n in zip(models, nearest, strict=True)]
         rows.append([f"{models[0].frequency_hz[nearest[0]]:.3g}", *densities])
     head = ["frequency [Hz]", *(m.label for m in models)]
-    return html_table(Table(head, rows), "Density [mm²/Hz] at the frequencies nearest to these.", label="spectrum")
+    return DataTable(head, rows, caption="Density [mm²/Hz] at the frequencies nearest to these.", label="spectrum")
 
 
-def excursions_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
+def excursions_table(models: Sequence[TrackerErrorStatistics]) -> DataTable:
     """Quantiles of the durations and sizes of excursions."""
     columns = {f"{m.label}, duration [s]": m.excursion_s for m in models}
     columns |= {f"{m.label}, size [mm]": 1e3 * m.excursion_peak_m for m in models}
     return _quantile_table(columns, "excursions")
 
 
-def gaps_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
+def gaps_table(models: Sequence[TrackerErrorStatistics]) -> DataTable:
     """Quantiles of the durations of gaps."""
     return _quantile_table({f"{m.label}, duration [s]": m.gap_s for m in models}, "gaps")
 
 
-def quality_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
+def quality_table(models: Sequence[TrackerErrorStatistics]) -> DataTable:
     """The share of the readings in each class of quality, and the median and the 95 % quantile of their error."""
     edges = models[0].quality_edges
     classes = ["lost", *(f"{low:g} to {high:g}" for low, high in itertools.pairwise(edges))]
@@ -81,15 +79,15 @@ def quality_table(models: Sequence[TrackerErrorStatistics]) -> Markup:
         *(f"{m.label}, share" for m in models),
         *(f"{m.label}, {name} error [mm]" for m in models for name in ("median", "95 %")),
     ]
-    return html_table(Table(head, rows), "A class includes its upper end.", label="quality")
+    return DataTable(head, rows, caption="A class includes its upper end.", label="quality")
 
 
-def _quantile_table(columns: dict[str, Floats], label: str) -> Markup:
+def _quantile_table(columns: dict[str, Floats], label: str) -> DataTable:
     rows: list[list[object]] = [["number", *(f"{len(values):,}" for values in columns.values())]]
     for share in _EPISODE_QUANTILES:
         cells = [format_fixed(float(np.quantile(v, share)), 2) if len(v) else "–" for v in columns.values()]
         rows.append(["longest or largest" if share == 1.0 else f"{100.0 * share:g} % quantile", *cells])
-    return html_table(Table(["", *columns], rows), f"Quantiles over all {label}.", label=label)
+    return DataTable(["", *columns], rows, caption=f"Quantiles over all {label}.", label=label)
 
 
 def _median(values: Floats, decimals: int) -> str:
@@ -98,8 +96,8 @@ def _median(values: Floats, decimals: int) -> str:
 
 
 def _number(value: float | Floats, decimals: int) -> object:
-    return format_fixed(float(value), decimals, grouped=True) if np.isfinite(value) else NOT_MEASURED_CELL
+    return format_fixed(float(value), decimals, grouped=True) if np.isfinite(value) else NOT_MEASURED
 
 
 def _significant(value: float) -> object:
-    return f"{value:.3g}" if np.isfinite(value) else NOT_MEASURED_CELL
+    return f"{value:.3g}" if np.isfinite(value) else NOT_MEASURED

@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
-from harness.core.number_format import count_noun
-from harness.report.kit.markup import Markup, join, scroll_box, tag
+from harness.core.number_format import NOT_MEASURED, count_noun
+from harness.report.kit.page import Badge, DataTable, Stack
 from harness.report.kit.statement_lines import MARKS
-from harness.report.kit.table import NOT_MEASURED_CELL, stacked_cell
 from harness.report.kit.text import list_first
-from harness.report.kit.verdict_badge import verdict_badge
 from harness.results.benchmark_statement import BenchmarkStatement
 
 _HEAD = ("condition", "held to", "measured", "verdict", "published")
@@ -34,33 +32,16 @@ def result_sentence(model: str, rows: Sequence[BenchmarkStatement]) -> str:
     return f"Of {count_noun(len(rows), 'row')} of the truth table, {model} {counted}."
 
 
-def truth_table(rows: Sequence[BenchmarkStatement]) -> Markup | None:
-    """The table of the page; None without rows."""
-    if not rows:
-        return None
-    head = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in _HEAD), role="row")
-    body = [
-        tag(
-            "tr",
-            tag("th", row.text, scope="row", role="rowheader"),
-            _cell("held to", row.target),
-            _cell("measured", tag("span", stacked_cell(row.measured or NOT_MEASURED_CELL, row.why))),
-            _cell("verdict", verdict_badge(row.verdict or "no verdict", MARKS[row.verdict] or "–")),
-            _cell("published", row.reference or "–"),
-            role="row",
-        )
+def truth_table(rows: Sequence[BenchmarkStatement]) -> DataTable:
+    """The table of the page: how a figure was measured stands below it."""
+    cells = [
+        [
+            row.text,
+            row.target,
+            Stack(row.measured or NOT_MEASURED, row.why),
+            Badge(row.verdict or "no verdict", MARKS[row.verdict] or "–"),
+            row.reference or "–",
+        ]
         for row in rows
     ]
-    table = tag(
-        "table",
-        tag("thead", head, role="rowgroup"),
-        tag("tbody", *body, role="rowgroup"),
-        class_="claims statements",
-        role="table",
-        aria_label="truth table",
-    )
-    return join(tag("p", _CAPTION, class_="caption"), scroll_box(table, "truth table"))
-
-
-def _cell(label: str, content: object) -> Markup:
-    return tag("td", content, data_label=label, role="cell")
+    return DataTable(_HEAD, cells, caption=_CAPTION, label="truth table", cards=True)

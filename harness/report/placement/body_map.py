@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.number_format import format_fixed
 from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
 from harness.report.kit.style import FAINT, INK, Chart
-from harness.report.placement.wording import format_signed, plain_name
+from harness.report.placement.wording import plain_name
 from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def _chart(
 ) -> Chart:
     values = {n: value for n, place in enumerate(places) if (value := shown.values.get(place.name)) is not None}
     order = sorted(values, key=lambda n: -values[n])
-    texts = {n: f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order[:_MOST_NAMED]}
+    texts = {n: f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order[:_MOST_NAMED]}
     texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
     def draw(figure: "Figure") -> None:
@@ -146,7 +147,7 @@ def _chart(
         named.get(name.replace("left_", "right_", 1)) == value for name, value in named.items() if "left_" in name
     )
     pairs = " Both stations of a pair that is worn together have the pair's value." if has_pairs else ""
-    contributions = ", ".join(f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order)
+    contributions = ", ".join(f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order)
     return draw_chart(
         f"body_map_{number}",
         f"{shown.description[0].upper()}{shown.description[1:]}",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
@@ -13,12 +14,10 @@ from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
 from harness.report.placement.wording import (
     TIE_NOTE,
-    format_error,
     format_rank_range,
-    format_signed,
-    format_value,
     plain_name,
     search_gain_sentence,
+    set_error,
     set_name,
     worth_label,
 )
@@ -38,12 +37,17 @@ _ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20
 """Heights of a row and of the frame [in]; most rows of a ranking."""
 
 
-def pareto_chart(findings: PlacementFindings) -> Chart:
-    """Error against the number of stations: every set as a point, the best of each size joined, ties circled."""
+def pareto_chart(findings: PlacementFindings) -> Chart | None:
+    """Error against the number of stations: every set as a point, the best of each size joined, ties circled.
+
+    None without a measured set.
+    """
     best = measured_best(findings)
+    if not best:
+        return None
     rates = {t.rate_hz for t in findings.tried}
     rate = f" Below each number: the rate that the link can carry ({findings.link})." if len(rates) > 1 else ""
-    values = "; ".join(f"{len(b.stations)}: {set_name(b.stations)}, {format_error(findings, t)}" for b, t in best)
+    values = "; ".join(f"{len(b.stations)}: {set_name(b.stations)}, {set_error(findings, t)}" for b, t in best)
     return draw_chart(
         "pareto",
         "Error against the number of stations",
@@ -115,7 +119,7 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
         axes.margins(x=0.06)
         axes.set_xlabel(f"error without it minus error with it [{findings.unit}]")
 
-    values = ", ".join(f"{plain_name(row.candidate)} {format_signed(row.difference)}" for row in rows)
+    values = ", ".join(f"{plain_name(row.candidate)} {_signed(row.difference)}" for row in rows)
     return draw_chart(
         f"worth_{number}_{to_file_name(contributions[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
@@ -146,7 +150,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
         axes.margins(x=0.06)
         axes.set_xlabel(f"{findings.metric} [{findings.unit}]")
 
-    values = "; ".join(f"{step.changed or 'start'}: {format_value(tried.mean)}" for step, tried in measured)
+    values = "; ".join(f"{step.changed or 'start'}: {set_error(findings, tried).number}" for step, tried in measured)
     notes = f" Ended: {search.ended}." if search.ended else ""
     notes += f" {gain}." if (gain := search_gain_sentence(search, findings.unit)) else ""
     return draw_chart(
@@ -154,7 +158,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
         f"{search.mode}: {plain_name(search.title)}",
         "One row for each step, from the top: the change, with tied changes in brackets. Filled: the paired 95 % "
         f"interval of the improvement excludes zero. Grey lines: interval of the mean.{notes}",
-        f"{search.mode}, {search.title}: {values} {findings.unit}.",
+        f"{search.mode}, {search.title}: {values}.",
         draw,
         _FRAME_IN + 1.3 * _ROW_IN * len(measured),
     )
@@ -185,14 +189,16 @@ def stability_chart(findings: PlacementFindings) -> Chart:
             shade = colours(0.08 + 0.77 * float(np.clip(tau, 0.0, 1.0)))
             axes.add_patch(Rectangle((column - 0.48, row - 0.46), 0.96, 0.92, facecolor=shade, linewidth=0.0))
             ink = "#ffffff" if tau > 0.55 else "#1a1a1a"
-            axes.text(column, row, format_value(tau), ha="center", va="center", color=ink, fontsize=9)
+            axes.text(column, row, Interval(tau).number, ha="center", va="center", color=ink, fontsize=9)
         axes.set_xlim(-0.5, max(len(names) - 0.5, 5.5))
         axes.set_ylim(len(names) - 0.5, -0.5)
         hide_frame(axes)
         axes.set_yticks(range(len(names)), [f"{c.name} ({c.kind})" for c in findings.conditions])
         axes.set_xticks(range(len(names)), names, rotation=25, ha="right", rotation_mode="anchor")
 
-    values = ", ".join(f"{pair.a} and {pair.b} {_tau_text(pair)}" for pair in findings.agreements)
+    values = ", ".join(
+        f"{pair.a} and {pair.b} {Interval.of(pair.tau, pair.low, pair.high).number}" for pair in findings.agreements
+    )
     return draw_chart(
         "stability",
         "Stability of the ranking",
@@ -203,27 +209,9 @@ def stability_chart(findings: PlacementFindings) -> Chart:
     )
 
 
+def _signed(value: float | None) -> str:
+    return Interval.of(value, None, None, signed=True).number
+
+
 def _tau(pair: RankAgreement | None) -> float | None:
     return pair.tau if pair else None
-
-
-def _tau_text(pair: RankAgreement) -> str:
-    return format_value(pair.tau)
-
-
-def charts(findings: PlacementFindings) -> dict[str, list[Chart]]:
-    """Section of the page -> its charts; a section without charts has an empty list."""
-    modes: dict[tuple[str, tuple[str, ...]], list[MarginalContribution]] = {}
-    for contribution in findings.worth:
-        modes.setdefault((contribution.mode, contribution.base), []).append(contribution)
-    measured = any(tried.mean is not None for tried in findings.tried) and findings.best
-    shown = [rows for rows in modes.values() if any(row.difference is not None for row in rows)]
-    return {
-        "pareto": [pareto_chart(findings)] if measured else [],
-        "rankings": [
-            ranking_chart(findings, r, n) for n, r in enumerate(findings.rankings, start=1) if len(r.rows) > 1
-        ],
-        "worth": [worth_chart(findings, rows, n) for n, rows in enumerate(shown, start=1)],
-        "paths": [search_chart(findings, search) for search in findings.searches if len(search.steps) > 1],
-        "stability": [stability_chart(findings)] if len(findings.conditions) > 1 else [],
-    }

@@ -4,14 +4,8 @@ from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.units import count_clips
-from harness.core.number_format import (
-    NOT_MEASURED,
-    count_noun,
-    decimals_for,
-    format_fixed,
-    format_interval,
-    format_share,
-)
+from harness.core.interval import Interval
+from harness.core.number_format import NOT_MEASURED, count_noun, format_share
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
@@ -86,9 +80,10 @@ def sentence(findings: PlacementFindings) -> str:
     best = smallest_sufficient_set(findings)
     if best is None:
         return "No set of stations was measured."
-    error = format_error(findings, findings.of(best.stations))
+    error = set_error(findings, findings.of(best.stations))
     sentences = [f"{_recommendation(findings, best)}: {set_name(best.stations)}, {error}."]
-    if held_out := format_held_out(findings, best):
+    if best.held_out is not None:
+        held_out = held_out_error(findings, best)
         sentences.append(f"On {count_noun(best.held_out_clips, 'held-out clip')} the error is {held_out}.")
     if best.ties:
         sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
@@ -111,9 +106,9 @@ def _size_sentence(findings: PlacementFindings, size: int) -> str:
 
 def _size_error(findings: PlacementFindings, best: BestSet) -> str:
     """The error on held-out clips; where there are none, the one that favours the set."""
-    if held_out := format_held_out(findings, best):
-        return f"{held_out} on {count_noun(best.held_out_clips, 'held-out clip')}"
-    return f"{format_error(findings, findings.of(best.stations))} on the clips on which it was chosen"
+    if best.held_out is not None:
+        return f"{held_out_error(findings, best)} on {count_noun(best.held_out_clips, 'held-out clip')}"
+    return f"{set_error(findings, findings.of(best.stations))} on the clips on which it was chosen"
 
 
 def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
@@ -147,14 +142,14 @@ def power_sentences(power: StatisticalPower) -> list[str]:
         first = f"{clips} can show a difference between {sets}; how large it must be is unknown.{took}"
     else:
         first = (
-            f"{clips} can show a difference of {format_value(power.shown)} {power.unit} between two of {sets} "
+            f"{clips} can show a difference of {Interval(power.shown, unit=power.unit)} between two of {sets} "
             f"(power 80 %, p corrected for {power.sets - 1:,} comparisons).{took}"
         )
     if power.needed_clips is None or power.wanted is None or power.needed_clips <= power.clips:
         return [first]
     more = f", about {format_duration(power.needed_duration_s)}" if power.needed_duration_s is not None else ""
     second = (
-        f"A difference of {format_value(power.wanted)} {power.unit}, a tenth of the error, would need about "
+        f"A difference of {Interval(power.wanted, unit=power.unit)}, a tenth of the error, would need about "
         f"{power.needed_clips:,} clips{more}. Spread and time are those of the first {power.pilot_sets} sets."
     )
     return [first, second]
@@ -210,60 +205,24 @@ def measured_errors(tried: StationSetResult) -> dict[str, float]:
     return {clip: value for clip, value in tried.errors.items() if value is not None}
 
 
-def format_error(findings: PlacementFindings, tried: StationSetResult | None) -> str:
-    """The mean error of a set with its interval: "1.90 deg (1.78 to 2.02)"."""
-    if tried is None or tried.mean is None:
-        return NOT_MEASURED
-    return format_mean(findings, tried.mean, tried.low, tried.high)
+def set_error(findings: PlacementFindings, tried: StationSetResult | None) -> Interval:
+    """The mean error of a set with its interval."""
+    if tried is None:
+        return Interval.missing(NOT_MEASURED)
+    return Interval.of(tried.mean, tried.low, tried.high, findings.unit)
 
 
-def format_held_out(findings: PlacementFindings, best: BestSet) -> str:
-    """The error of a set on held-out clips; "" where there are none."""
-    if best.held_out is None:
-        return ""
-    return format_mean(findings, best.held_out, best.held_out_low, best.held_out_high)
-
-
-def format_mean(findings: PlacementFindings, mean: float, low: float | None, high: float | None) -> str:
-    """A mean with its unit and interval: "1.90 deg (1.78 to 2.02)"."""
-    text = f"{format_value(mean)} {findings.unit}".rstrip()
-    interval = format_value_interval(low, high)
-    return f"{text} ({interval})" if interval else text
+def held_out_error(findings: PlacementFindings, best: BestSet) -> Interval:
+    """The error of a set on held-out clips."""
+    return Interval.of(best.held_out, best.held_out_low, best.held_out_high, findings.unit)
 
 
 def search_gain_sentence(search: PlacementSearch, unit: str) -> str:
     """How much a search improves the error on held-out clips; "" where that was not measured."""
     if search.held_out is None:
         return ""
-    gain = format_difference(search.held_out, search.held_out_low, search.held_out_high)
-    clips = count_noun(search.held_out_clips, "held-out clip")
-    return f"On {clips} the last set lowers the error by {gain} {unit}".rstrip()
-
-
-def format_difference(mean: float | None, low: float | None, high: float | None) -> str:
-    """ "+0.30 (+0.21 to +0.38)", with the decimals that the smallest of the three needs not to read 0.00."""
-    decimals = max(2, decimals_for(mean, low, high))
-    interval = format_interval(low, high, decimals, signed=True)
-    text = format_fixed(mean, decimals, signed=True)
-    return f"{text} ({interval})" if interval and mean is not None else text
-
-
-def format_signed(value: float | None) -> str:
-    """A difference with its sign and two decimals."""
-    return format_fixed(value, 2, signed=True)
-
-
-def format_value(value: float | None) -> str:
-    """Two decimals; more for small values that would read 0.00, fewer for values from 100 on."""
-    if value is None:
-        return NOT_MEASURED
-    decimals = 0 if abs(value) >= 1000.0 else 1 if abs(value) >= 100.0 else max(2, decimals_for(value))
-    return format_fixed(value, decimals, grouped=True)
-
-
-def format_value_interval(low: float | None, high: float | None) -> str:
-    """ "1.78 to 2.02"; empty where the interval was not computed."""
-    return "" if low is None or high is None else f"{format_value(low)} to {format_value(high)}"
+    gain = Interval.of(search.held_out, search.held_out_low, search.held_out_high, unit, signed=True)
+    return f"On {count_noun(search.held_out_clips, 'held-out clip')} the last set lowers the error by {gain}"
 
 
 def ranks_by_condition(findings: PlacementFindings, most: int) -> list[tuple[StationNames, list[int | None]]]:
@@ -287,7 +246,7 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     if not pair.changes:
         return f"no pair of {pairs:,} changes its order"
     first = pair.changed[0]
-    before, after = (format_signed(difference) for difference in first.differences)
+    before, after = (Interval(difference, signed=True).number for difference in first.differences)
     tested = first.significant is not None
     shown = f", {pair.significant_changes:,} significantly" if tested else " (too few clips or too many sets to test)"
     verb = "changes its" if pair.changes == 1 else "change their"

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from harness.compare.paired_statistics import compare_paired
-from harness.core.number_format import NOT_MEASURED, format_fixed, format_interval
+from harness.core.interval import Interval
+from harness.core.number_format import NOT_MEASURED, format_fixed
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.table import html_table
@@ -44,7 +45,7 @@ def cost_table(cells: Sequence[Mapping[str, Any]]) -> Table | None:
             exact = by_clip.get(_EXACT, {})
             errors = [error for error in exact.values() if error is not None]
             mean = format_fixed(float(np.mean(errors)) if errors else None, decimals)
-            costs = [_format_cost(by_clip.get(kind, {}), exact, decimals) for kind in kinds]
+            costs = [_format_cost(by_clip.get(kind, {}), exact) for kind in kinds]
             rows.append([*(names[i] for i in shown), title, mean, *costs])
     return Table(head, rows, text_columns=len(head))
 
@@ -62,9 +63,9 @@ def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
     return html_table(table, caption, label=_TITLE) if table else Markup()
 
 
-def _format_cost(errors: Mapping[str, float | None], exact: Mapping[str, float | None], decimals: int) -> str:
+def _format_cost(errors: Mapping[str, float | None], exact: Mapping[str, float | None]) -> str:
     increase = compare_paired(errors, exact)
     if increase.mean is None:
         return NOT_MEASURED
-    interval = format_interval(increase.low, increase.high, decimals, signed=True) or "too few clips"
-    return f"{format_fixed(increase.mean, decimals, signed=True)} ({interval})"
+    number = Interval.of(increase.mean, increase.low, increase.high, signed=True)
+    return str(number) if increase.low is not None else f"{number} (too few clips)"

@@ -1,13 +1,20 @@
 """The page of a sweep, written from its index: best method, effect of varied keys, failures, data files."""
 
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
+from harness.compare.margins import GATED_METRICS
 from harness.compare.paired_statistics import MIN_UNITS
-from harness.core.files import write_text
-from harness.report.kit.document import Section, chart_panel, document
-from harness.report.kit.markup import Markup, bullet_list, details, join, tag
+from harness.compare.ranking import find_best
+from harness.core.arrays import Bools
+from harness.core.interval import Interval
+from harness.core.number_format import NOT_MEASURED, count_noun, format_number
+from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
+from harness.report.kit.page_html import write_page
+from harness.report.kit.page_text import page_text
+from harness.report.kit.ranking import BOLD_NOTE
 from harness.report.kit.text import list_first
 from harness.report.sweep.charts import (
     MAX_INTERVALS,
@@ -18,104 +25,229 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     sweep_chart,
 )
-from harness.report.sweep.data import METRICS, SweepData, VariedKey
+from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, unit_of
 from harness.report.sweep.reader import read_sweep
-from harness.report.sweep.tables import failures, scenario_table, value_table
-from harness.report.sweep.wording import describe_effect, list_values, sentence
+from harness.report.sweep.wording import FailureGroup, describe_effect, group_failures, list_values, sentence
 from harness.results.index import INDEX_FILE
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.score.metrics import DEFINITIONS
 
 _EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario, method"
+_MOST_FAILURES, _MOST_PRINTED, _MOST_CELLS, _MOST_ROWS = 50, 8, 20, 60
+"""Most kinds of failure on the page and in a terminal, most cells of a kind, and most rows in a terminal."""
+_LOWER_IS_BETTER = ("deg", "mm", "ms")
+"""Units of metrics whose lower values are better."""
 
 
 def write_sweep_page(out: Path) -> Path:
     """Write OUT/report.html of the sweep in `out` and return its path; BadFile if `out` holds no sweep."""
-    path = out / "report.html"
-    write_text(path, sweep_page(read_sweep(out)))
-    return path
+    return write_page(sweep_page(read_sweep(out)), out / "report.html")
 
 
-def sweep_page(sweep: SweepData) -> str:
-    """The HTML of the page."""
+def sweep_page(sweep: SweepData) -> Page:
+    """The page of a sweep."""
     intervals = min(len(sweep.series), MAX_SERIES) * sum(
         len(key.labels) * len(scenarios_varying(sweep, key)[:MAX_SCENARIOS]) for key in sweep.keys
     )
-    with_intervals = intervals <= MAX_INTERVALS
     slow = f"Intervals: {intervals:,} take too long to compute; use fewer values, scenarios or methods to see them"
-    sections: list[Section] = [
-        ("Varied keys", "varied", _varied(sweep, with_intervals=with_intervals)),
-        ("Methods by scenario", "scenarios", _scenarios(sweep)),
-        ("Failures", "failures", failures(sweep)),
-        ("Data files", "table", _files(sweep)),
-    ]
-    return document(
-        title=f"{sweep.name}: harness sweep",
-        kicker=f"harness sweep · {sweep.name}",
-        heading=sentence(sweep),
-        facts=_facts(sweep),
+    with_intervals = intervals <= MAX_INTERVALS
+    return Page(
+        verb="sweep",
+        name=sweep.name,
+        headline=sentence(sweep),
+        facts={
+            "Scenarios": list_first(sweep.scenarios, 8),
+            "Clips": f"{len(sweep.clips):,}",
+            "Methods": list_first(sweep.series, 12),
+            **{f"Varied: {key.name}": f"{list_values(key)}: {describe_effect(sweep, key)}" for key in sweep.keys},
+            "Made by": sweep.command,
+        },
         missing=[] if with_intervals else [slow],
-        sections=sections,
+        sections=[
+            Section("Varied keys", "varied", _varied(sweep, with_intervals=with_intervals)),
+            Section("Methods by scenario", "scenarios", _scenarios(sweep)),
+            Section("Failures", "failures", _failures(sweep)),
+            Section("Data files", "table", _files(sweep)),
+        ],
     )
 
 
-def _facts(sweep: SweepData) -> Mapping[str, str]:
-    facts = {
-        "Scenarios": list_first(sweep.scenarios, 8),
-        "Clips": f"{len(sweep.clips):,}",
-        "Methods": list_first(sweep.series, 12),
-        **{f"Varied: {key.name}": f"{list_values(key)}: {describe_effect(sweep, key)}" for key in sweep.keys},
-        "Made by": sweep.command,
-    }
-    return {title: text for title, text in facts.items() if text}
+def sweep_text(sweep: SweepData) -> str:
+    """The sweep for a terminal; its length is limited however many cells there are."""
+    groups = group_failures(sweep)
+    failures = [f"{len(g.cells):,}, such as {g.cells[0]}: {g.message}" for g in groups[:_MOST_PRINTED]]
+    more = len(groups) - len(failures)
+    rest = [Prose(f"and {more:,} more kinds of failure, in summary.json")] if more else []
+    effects = [[key.name, describe_effect(sweep, key)] for key in sweep.keys]
+    sections = [
+        Section("Methods", "methods", [_methods_table(sweep)]),
+        Section("Varied keys", "varied", [DataTable(["varied", f"lowest and highest mean {PRIMARY_METRIC}"], effects)]),
+        Section("Failures", "failures", [Bullets(failures, prefix="FAILED "), *rest]),
+    ]
+    return page_text(Page("sweep", sweep.name, sentence(sweep), {}, sections))
 
 
-def _varied(sweep: SweepData, *, with_intervals: bool) -> Markup:
+def _methods_table(sweep: SweepData) -> DataTable:
+    """A row for each scenario and series that has cells."""
+    rows: list[list[object]] = []
+    for s, scenario in enumerate(sweep.scenarios):
+        for n, series in enumerate(sweep.series):
+            selected = sweep.select(s, n)
+            if selected.any():
+                found = {metric: sweep.statistic(metric, selected) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
+                clips = max(statistic.clips for statistic in found.values())
+                means = [_mean_text(statistic, metric) for metric, statistic in found.items()]
+                rows.append([scenario, series, f"{int(selected.sum()):,}", clips, *means])
+    head = ["scenario", "method", "cells", "clips", "joint angle [deg]", "position [mm]"]
+    return DataTable(head, rows, most_printed=_MOST_ROWS)
+
+
+def _varied(sweep: SweepData, *, with_intervals: bool) -> list[Block]:
     """For each key a chart for each scenario that varies it, and the numbers folded."""
     if not sweep.keys:
-        return Markup()
+        return []
     text = (
         f"Mean {PRIMARY_METRIC} over clips; each clip is first averaged over all other varied values. Bars: 95 % "
         f"interval, if there are at least {MIN_UNITS} clips."
     )
-    charts: list[Markup] = []
-    tables: list[Markup] = []
+    charts, tables = [], []
     for key in sweep.keys:
         scenarios = scenarios_varying(sweep, key)
         by_scenario = {n: curves(sweep, key, n, with_intervals=with_intervals) for n in scenarios[:MAX_SCENARIOS]}
-        charts += [chart_panel(sweep_chart(sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
+        charts += [(None, partial(sweep_chart, sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
         if (more := len(scenarios) - len(by_scenario)) > 0:
             text += f" For {key.name}, {more:,} more scenarios are only in summary.csv."
-        numbers = [_tables(sweep, key, n, lines) for n, lines in by_scenario.items()]
-        tables.append(details(f"Numbers: {key.name}", *numbers))
-    return join(tag("p", text), tag("div", *charts, class_="panels broad") if charts else None, *tables)
+        numbers = [table for n, lines in by_scenario.items() for table in _value_tables(sweep, key, n, lines)]
+        tables.append(BrowserOnly(numbers, f"Numbers: {key.name}"))
+    return [Prose(text), Panels(charts, broad=True), *tables]
 
 
-def _tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequence[Curve]) -> Markup:
+def _value_tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequence[Curve]) -> list[DataTable]:
     secondary = curves(sweep, key, scenario, SECONDARY_METRIC, with_intervals=False)
-    return join(
-        value_table(sweep, key, scenario, primary, PRIMARY_METRIC),
-        value_table(sweep, key, scenario, secondary, SECONDARY_METRIC),
-    )
-
-
-def _scenarios(sweep: SweepData) -> Markup:
-    if not len(sweep):
-        return Markup()
-    first, further = METRICS[:2], METRICS[2:]
-    more = details("More metrics", *(scenario_table(sweep, metric) for metric in further))
-    return join(*(scenario_table(sweep, metric) for metric in first), more)
-
-
-def _files(sweep: SweepData) -> Markup:
-    def file(name: str) -> Markup:
-        return tag("code", name)
-
-    items: list[Any] = [
-        join(file("summary.csv"), f": {len(sweep):,} rows in the order of the plan, with every metric."),
-        join(
-            file(INDEX_FILE),
-            ": a database with the same data and more, such as the run time of each cell. An example query:",
-        ),
+    return [
+        _value_table(sweep, key, scenario, lines, metric)
+        for lines, metric in ((primary, PRIMARY_METRIC), (secondary, SECONDARY_METRIC))
     ]
-    query = tag("pre", tag("code", f'sqlite3 {INDEX_FILE} "{_EXAMPLE}"'))
-    return join(bullet_list(items), query)
+
+
+def _value_table(sweep: SweepData, key: VariedKey, scenario: int, lines: Sequence[Curve], metric: str) -> DataTable:
+    """The numbers of a chart: a row for each curve, a column for each value of the key."""
+    titles = [f"{key.name}={text}" for text in key.labels]
+    over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or with its 95 % interval"
+    series = [curve.colour_index for curve in lines]
+    best = [
+        _best_rows(sweep, metric, ((s, sweep.select(scenario, s, **{key.name: value})) for s in series))
+        for value in range(len(titles))
+    ]
+    return _grid(metric, over, titles, [c.name for c in lines], [c.points for c in lines], best)
+
+
+def _scenarios(sweep: SweepData) -> list[Block]:
+    if not len(sweep):
+        return []
+    tables = [scenario_table(sweep, metric) for metric in METRICS]
+    return [*tables[:2], BrowserOnly(tables[2:], "More metrics")]
+
+
+def scenario_table(sweep: SweepData, metric: str) -> DataTable:
+    """A row for each series, a column for each scenario and, if there are several, one for all of them."""
+    columns: list[int | None] = [*range(len(sweep.scenarios)), *([None] if len(sweep.scenarios) > 1 else [])]
+    series = range(len(sweep.series))
+    rows = [[sweep.statistic(metric, sweep.select(c, s)) for c in columns] for s in series]
+    titles = ["all" if c is None else sweep.scenarios[c].replace("_", " ") for c in columns]
+    over = "± standard deviation over clips, each averaged over varied values"
+    best = [_best_rows(sweep, metric, ((s, sweep.select(c, s)) for s in series)) for c in columns]
+    return _grid(metric, over, titles, sweep.series, rows, best)
+
+
+def _grid(
+    metric: str,
+    over: str,
+    titles: Sequence[str],
+    names: Sequence[str],
+    statistics: Sequence[Sequence[Statistic]],
+    best: Sequence[Collection[int]],
+) -> DataTable:
+    """A row for each name. A column's head has its number of clips; cells with fewer clips have their own.
+
+    `best` has the rows that are bold, for each column.
+    """
+    clips = [max((row[n].clips for row in statistics), default=0) for n in range(len(titles))]
+    head = ["method", *(f"{title} n\u00a0{n}" for title, n in zip(titles, clips, strict=True))]
+    rows = [
+        [name, *(_cell(item, metric, at in best[n], clips[n]) for n, item in enumerate(row))]
+        for at, (name, row) in enumerate(zip(names, statistics, strict=True))
+    ]
+    definition = DEFINITIONS[metric]
+    caption = f"{definition.text}. Mean {over}.{BOLD_NOTE if any(best) else ''}"
+    return DataTable(head, rows, f"{metric} [{definition.unit}]:", caption, metric)
+
+
+def _cell(statistic: Statistic, metric: str, best: bool, column_clips: int) -> object:
+    note = f" n\u00a0{statistic.clips}" if statistic.clips not in (0, column_clips) else ""
+    has_interval = statistic.mean is not None and statistic.low is not None and not note
+    cell = (
+        Interval.of(statistic.mean, statistic.low, statistic.high)
+        if has_interval
+        else f"{_mean_text(statistic, metric)}{note}"
+    )
+    return Strong(cell) if best else cell
+
+
+def _mean_text(statistic: Statistic, metric: str) -> str:
+    if statistic.mean is None:
+        return NOT_MEASURED
+    spread = "" if statistic.sd is None else f" ± {format_number(statistic.sd, unit_of(metric))}"
+    return f"{format_number(statistic.mean, unit_of(metric))}{spread}"
+
+
+def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]]) -> set[int]:
+    """The rows that are better than every other one, for each kind of performer and each lag.
+
+    A row is a series and its cells.
+    """
+    if DEFINITIONS[metric].unit not in _LOWER_IS_BETTER:
+        return set()
+    groups: dict[tuple[str, int], dict[int, Bools]] = {}
+    for n, (series, selected) in enumerate(rows):
+        groups.setdefault((sweep.performers[series], sweep.lags[series]), {})[n] = selected
+
+    def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
+        values = {str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}
+        return find_best(values, metric, sweep.clip_performers)
+
+    # The gated metrics are read only where the lines of this metric alone leave a best row.
+    candidates = [cells for cells in groups.values() if best(cells, (metric,))]
+    return {int(row) for cells in candidates if (row := best(cells, (metric, *GATED_METRICS)))}
+
+
+def _failures(sweep: SweepData) -> list[Block]:
+    """Each kind of failure once, with its cells, the traceback of the first, and the command that retries them."""
+    groups = group_failures(sweep)
+    more = len(groups) - _MOST_FAILURES
+    rest = [Prose(f"And {more:,} more kinds; summary.json has them all.")] if more > 0 else []
+    text = "Finished cells are kept. This command runs the failed ones again:"
+    retry: list[Block] = [Prose(text), Code(sweep.command)] if groups and sweep.command else []
+    return [*retry, *(_failure(group, sweep.command) for group in groups[:_MOST_FAILURES]), *rest]
+
+
+def _failure(group: FailureGroup, command: str) -> Block:
+    more = len(group.cells) - _MOST_CELLS
+    cells = [*group.cells[:_MOST_CELLS], *([f"and {more:,} more"] if more > 0 else [])]
+    alone = [Code(f"{command} --cell {shlex.quote(group.cells[0])}")] if command else []
+    first = Prose("Message of the first cell, and the command that runs it alone:")
+    blocks: list[Block] = [Bullets(cells), first, Code(group.traceback), *alone]
+    return BrowserOnly(blocks, f"{count_noun(len(group.cells), 'cell')}: {group.message}")
+
+
+def _files(sweep: SweepData) -> list[Block]:
+    index = f"`{INDEX_FILE}`: a database with the same data and more, such as the run time of each cell."
+    return [
+        Bullets(
+            [
+                f"`summary.csv`: {len(sweep):,} rows in the order of the plan, with every metric.",
+                f"{index} An example query:",
+            ]
+        ),
+        Code(f'sqlite3 {INDEX_FILE} "{_EXAMPLE}"'),
+    ]

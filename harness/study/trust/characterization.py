@@ -1,6 +1,5 @@
 """Characterisation of a unit: its profile as a unit file, and its departures from what is expected."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
-from harness.measure.measured import Measured
+from harness.measure.departures import Departure
 from harness.measure.profile import UnitProfile, measure_profile
-from harness.measure.recording_time import events_for_precision
 from harness.measure.unit_file import UnitFile
+from harness.measure.unit_report import UnitReport, unit_report
 from harness.results.digests import file_digest
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.study.trust.expected_values import (
@@ -23,7 +23,7 @@ from harness.study.trust.expected_values import (
     preset_values,
     unit_values,
 )
-from harness.study.trust.named_departures import NamedDeparture, check_departures
+from harness.study.trust.named_departures import check_departures
 
 REFERENCE_NEEDED = "A reference is needed: `harness validate`."
 DEFAULT_KEPT = {
@@ -36,8 +36,6 @@ DEFAULT_KEPT = {
 CHECKED_TIMING = ("timing.lost_share", "timing.duplicate_share", "timing.stamp_resolution_s", "timing.clock_age_s")
 STATION_CHECKS = ("components.dropout.share", "components.echo.share", "components.white.position_m")
 """Parameters that are also checked for each station."""
-PRECISION = 0.2
-"""Relative half width of the interval of a rate that is aimed at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +44,20 @@ class Characterization:
 
     profile: UnitProfile
     unit: UnitFile
-    checks: tuple[NamedDeparture, ...]
+    checks: tuple[Departure, ...]
     expected_from: str
     """Origin of the expected numbers: the preset, or the name of an earlier unit."""
 
     @property
-    def named(self) -> tuple[NamedDeparture, ...]:
+    def named(self) -> tuple[Departure, ...]:
         """The departures that are significant after the correction."""
         return tuple(check for check in self.checks if check.is_named)
 
     @property
-    def needed_minutes(self) -> float:
-        """Minutes of rest after which the rate of excursions has the precision; NaN without any excursion."""
-        rate = self.profile.parameters["components.excursion.onsets_per_min"]
-        if not rate.is_measured or not rate.value > 0.0:
-            return math.nan
-        return events_for_precision(PRECISION) / (rate.value * len(self.profile.stations))
+    def report(self) -> UnitReport:
+        """All that the unit's page shows."""
+        defaults = {key: number.value for key, number in preset_values().items()}
+        return unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
 
 
 def characterize_capture(
@@ -100,7 +96,7 @@ def make_unit_file(profile: UnitProfile, name: str, path: Path) -> UnitFile:
     )
 
 
-def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Measured]:
+def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Interval]:
     """Everything that is checked: (key, station) -> number; of a uniform distribution its mean, not its ends."""
     parameters = {key: one for key, one in profile.parameters.items() if not key[-1].isdecimal()}
     numbers = {(key, ""): one for key, one in {**parameters, **_means(profile)}.items()}
@@ -111,7 +107,7 @@ def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Measured]:
     return numbers
 
 
-def expected_numbers(profile: UnitProfile, known: Mapping[str, Measured]) -> dict[tuple[str, str], Measured]:
+def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dict[tuple[str, str], Interval]:
     """What is expected of the measured numbers: the known ones, and of the line that no record is lost or repeated."""
     line = dict.fromkeys(("timing.lost_share", "timing.duplicate_share", "timing.clock_age_s"), 0.0)
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
@@ -120,7 +116,7 @@ def expected_numbers(profile: UnitProfile, known: Mapping[str, Measured]) -> dic
     return {(key, ""): one for key, one in {**known, **{key: _exact(value) for key, value in line.items()}}.items()}
 
 
-def _means(profile: UnitProfile) -> dict[str, Measured]:
+def _means(profile: UnitProfile) -> dict[str, Interval]:
     return {key: profile.episodes.means[key] for key in UNIFORM_KEYS if key in profile.episodes.means}
 
 
@@ -145,5 +141,5 @@ def _describe_capture(profile: UnitProfile, path: Path) -> dict[str, Any]:
     }
 
 
-def _exact(value: float) -> Measured:
-    return Measured(value, value, value)
+def _exact(value: float) -> Interval:
+    return Interval(value, value, value)

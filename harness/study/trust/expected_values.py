@@ -5,8 +5,8 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.core.fields import replace_fields
+from harness.core.interval import Interval
 from harness.errors import BadInput
-from harness.measure.measured import Measured
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import noise_preset
 
@@ -30,12 +30,12 @@ def preset_components() -> dict[str, Any]:
     }
 
 
-def preset_values() -> dict[str, Measured]:
+def preset_values() -> dict[str, Interval]:
     """Dotted key -> number of the preset `default`, known exactly; of a uniform distribution also its mean."""
     return _with_means({key: _exact(value) for key, value in flatten_components(preset_components())})
 
 
-def unit_values(unit: UnitFile) -> dict[str, Measured]:
+def unit_values(unit: UnitFile) -> dict[str, Interval]:
     """Dotted key -> number that an earlier unit file measured, with its interval; of a uniform distribution its mean.
 
     Keys that the file did not measure are left out. BadInput for values that no scenario would accept.
@@ -79,7 +79,7 @@ def nest_components(values: Mapping[str, float], base: Mapping[str, Any]) -> dic
     return out
 
 
-def _with_means(values: dict[str, Measured]) -> dict[str, Measured]:
+def _with_means(values: dict[str, Interval]) -> dict[str, Interval]:
     """The numbers, and for each pair of ends of a uniform distribution its mean under the key without an index.
 
     A mean that is there already stays: it was measured itself.
@@ -92,5 +92,5 @@ def _with_means(values: dict[str, Measured]) -> dict[str, Measured]:
     return values
 
 
-def _exact(value: float) -> Measured:
-    return Measured(value, value, value)
+def _exact(value: float) -> Interval:
+    return Interval(value, value, value)

@@ -1,36 +1,16 @@
 """The departures that are named: those that remain significant after Holm's correction over all checks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
-from harness.compare.significance import SIGNIFICANCE, holm
+from harness.compare.significance import holm
+from harness.core.interval import Interval
 from harness.measure.departures import Departure, compare_with_expected
-from harness.measure.measured import Measured
-
-
-@dataclass(frozen=True)
-class NamedDeparture:
-    """A check with its corrected p-value."""
-
-    departure: Departure
-    p_holm: float
-    """p-value corrected for the number of checks (Holm 1979)."""
-
-    @property
-    def is_named(self) -> bool:
-        """Whether the measured number differs from the expected one at the 5 % level over all checks."""
-        return self.p_holm <= SIGNIFICANCE
-
-    @property
-    def ratio(self) -> float:
-        """Measured over expected number; infinite where nothing was expected."""
-        expected = self.departure.expected.value
-        return self.departure.measured.value / expected if expected else float("inf")
 
 
 def check_departures(
-    measured: Mapping[tuple[str, str], Measured], expected: Mapping[tuple[str, str], Measured]
-) -> list[NamedDeparture]:
+    measured: Mapping[tuple[str, str], Interval], expected: Mapping[tuple[str, str], Interval]
+) -> list[Departure]:
     """Compare every number that was measured and is expected; both map (key, station) to a number.
 
     A station's number whose own expectation is missing is compared with that of all stations (station ""). The result
@@ -44,7 +24,7 @@ def check_departures(
     return correct_departures(checks)
 
 
-def correct_departures(checks: Sequence[Departure]) -> list[NamedDeparture]:
+def correct_departures(checks: Sequence[Departure]) -> list[Departure]:
     """The checks with their p-values corrected for their number."""
     corrected = holm([check.p for check in checks])
-    return [NamedDeparture(check, p) for check, p in zip(checks, corrected, strict=True)]
+    return [replace(check, p_holm=p) for check, p in zip(checks, corrected, strict=True)]

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.interval import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import find_playback, registered_take
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.measure.accuracy import ErrorQuantiles, error_quantiles
+from harness.measure.accuracy import StationAccuracy, error_quantiles
 from harness.measure.departures import Departure, compare_with_expected
-from harness.measure.measured import Measured
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
@@ -27,6 +27,8 @@ from harness.measure.registration import (
 )
 from harness.measure.station_identity import identify_stations
 from harness.measure.unit_file import UnitFile
+from harness.measure.unit_report import CaptureSummary
+from harness.measure.validation_report import ValidationReport, estimated_poses, residual_series
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
@@ -34,7 +36,7 @@ from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
 from harness.study.trust.expected_values import preset_components, preset_values
-from harness.study.trust.named_departures import NamedDeparture, correct_departures
+from harness.study.trust.named_departures import correct_departures
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,
@@ -58,16 +60,6 @@ _LOOPED_CORRELATION = 0.8
 """Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
 
 
-@dataclass(frozen=True)
-class StationResult:
-    """Errors of one station after the registration."""
-
-    position: ErrorQuantiles
-    orientation: ErrorQuantiles
-    readings: int
-    lost_share: float
-
-
 @dataclass(frozen=True, eq=False)
 class Validation:
     """What a reference shows of a capture."""
@@ -77,10 +69,10 @@ class Validation:
     registration: Registration
     exchanged: Mapping[str, str]
     """Station -> body that carries it, where that is not the stated one."""
-    numbers: Mapping[str, Measured]
+    numbers: Mapping[str, Interval]
     """Time offsets, clock, scale, heading, latency, by key."""
-    stations: Mapping[str, StationResult]
-    checks: tuple[NamedDeparture, ...]
+    stations: Mapping[str, StationAccuracy]
+    checks: tuple[Departure, ...]
     expected_from: str
     duration_s: float
     records: int
@@ -88,9 +80,38 @@ class Validation:
     """What of the capture was left out, a sentence each."""
 
     @property
-    def named(self) -> tuple[NamedDeparture, ...]:
+    def named(self) -> tuple[Departure, ...]:
         """The departures that are significant after the correction."""
         return tuple(check for check in self.checks if check.is_named)
+
+    def report(self, capture: Path) -> ValidationReport:
+        """All that the page of the capture at this path shows."""
+        wire = self.reader.wire
+        expected = round(self.registration.overlap_s * wire.rate_hz)
+        return ValidationReport(
+            name=capture.stem,
+            capture=CaptureSummary(
+                capture.name, self.duration_s, wire.stations, wire.rate_hz, damage=tuple(self.reader.damage)
+            ),
+            truth=self.truth.title,
+            matched_frames=round(self.registration.matched * expected),
+            expected_frames=expected,
+            expected_from=self.expected_from,
+            numbers=self.numbers,
+            poses=estimated_poses(self.registration),
+            accuracy=self.stations,
+            checks=self.checks,
+            residuals=residual_series(self.registration),
+            exchanged=tuple(
+                f"{station} is on {body}, not on {self.truth.body_of[station]}: stations are exchanged."
+                for station, body in self.exchanged.items()
+            ),
+            notes=(
+                *self.notes,
+                *self.truth.notes,
+                "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
+            ),
+        )
 
 
 def load_truth(
@@ -191,7 +212,7 @@ def validate_capture(
     period_s = record_period_s(poses)
     stations = {}
     for station, errors in registration.errors.items():
-        stations[station] = StationResult(
+        stations[station] = StationAccuracy(
             error_quantiles(errors.position_m, errors.valid, period_s),
             error_quantiles(errors.rotation_rad, errors.valid, period_s),
             int(errors.valid.sum()),
@@ -274,10 +295,10 @@ def _identify(poses: Mapping[str, MeasuredPoses], truth: TruthMotion) -> tuple[d
     return found, {station: body for station, body in found.items() if body != stated[station]}
 
 
-def _latency_s(readings: Mapping[str, StationReadings], registration: Registration, truth: TruthMotion) -> Measured:
+def _latency_s(readings: Mapping[str, StationReadings], registration: Registration, truth: TruthMotion) -> Interval:
     """Median time from the sample to the reception of its record."""
     if not truth.host_clock:
-        return Measured.missing(_NO_HOST_CLOCK)
+        return Interval.missing(_NO_HOST_CLOCK)
     delays = []
     for station in registration.mounts:
         known = np.isfinite(readings[station].measured_s)
@@ -286,11 +307,11 @@ def _latency_s(readings: Mapping[str, StationReadings], registration: Registrati
     middle = float(np.median(np.concatenate(delays)))
     offset = registration.values["time_offset_orientation_s"]
     half = 0.5 * (offset.high - offset.low)
-    return Measured(middle, middle - half, middle + half, offset.count)
+    return Interval(middle, middle - half, middle + half, offset.count)
 
 
 def _checks(
-    numbers: Mapping[str, Measured],
+    numbers: Mapping[str, Interval],
     registration: Registration,
     truth: TruthMotion,
     pairs: Mapping[str, str],
@@ -304,9 +325,9 @@ def _checks(
     known = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
-        "scale": Measured.normal(0.0, preset["session"]["scale"]),
-        "heading_rad": Measured.normal(0.0, 0.0),
-        "latency_s": Measured.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
+        "scale": Interval.normal(0.0, preset["session"]["scale"]),
+        "heading_rad": Interval.normal(0.0, 0.0),
+        "latency_s": Interval.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
     }
     if expected is not None:
         known |= {key: one for key, one in expected.measured.items() if key in known}
@@ -323,7 +344,7 @@ def _checks(
 def _mount_checks(registration: Registration, truth: TruthMotion, station: str, offset_m: float) -> list[Departure]:
     """Rotation and displacement of a station from its nominal mount, by chi-square with three degrees of freedom."""
     mount, nominal = registration.mounts[station], truth.nominal[station]
-    exact = Measured(0.0, 0.0, 0.0)
+    exact = Interval(0.0, 0.0, 0.0)
     vector = np.array([one.value for one in mount.turn_from(nominal.body_from_station)])
     moved_m = mount.position_m - nominal.position_m
     spread = mount.covariance[3:, 3:] + offset_m**2 * np.eye(3)  # the origin in the housing is known to a millimetre

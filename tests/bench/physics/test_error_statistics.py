@@ -9,7 +9,7 @@ import pytest
 from harness.bench.physics.error_statistics import RecordedErrors, error_statistics
 from harness.errors import BadInput
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.report.physics.writer import write_physics_page
+from harness.report.physics.page import write_physics_page
 from tests.report.reading import text_of
 
 RATE_HZ, SAMPLES = 40.0, 1200

@@ -87,7 +87,7 @@ def test_the_statement_on_boxing_says_that_five_performers_are_too_few() -> None
     planned = plan_rankings()
     text = format_rankings(RankingReport(rank_rows(planted_rows(planned), planned)))
     why = "too few units: 5 real performers, of at least 6"
-    assert f"boxing, methods: Kendall's tau 1.00, without an interval ({why}). No pair can be told. ik has" in text
+    assert f"boxing, methods: Kendall's tau 1, without an interval ({why}). No pair can be told. ik has" in text
 
 
 def test_a_failed_cell_leaves_its_method_out_and_makes_the_outcome_incomplete() -> None:
@@ -132,7 +132,7 @@ def test_the_text_names_units_pairs_and_what_would_be_enough() -> None:
     ]
     assert rows[8:10] == [
         "a, b reversed −1.00 −1.24 to −0.76 +1.00 +0.76 to +1.24 < 0.001 6",
-        "a, c agree −1.10 −1.10 to −1.10 −0.10 −0.10 to −0.10 < 0.001 6",
+        "a, c agree −1.1 −1.1 to −1.1 −0.1 −0.1 to −0.1 < 0.001 6",
     ]
     numbers, why = (
         "−0.10 −0.34 to +0.14 −1.10 −1.34 to −0.86 0.177 35",

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.comparison.writer import write_comparison_page
+from harness.report.comparison.page import write_comparison_page
 from tests.report.fabricate_comparison import comparison
 from tests.report.watching import is_whole_and_quiet
 

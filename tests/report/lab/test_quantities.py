@@ -4,20 +4,11 @@ import math
 
 import pytest
 
+from harness.core.interval import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.measured import Measured
 from harness.measure.timing import TIMING_KEYS
-from harness.report.lab.quantities import (
-    Quantity,
-    format_both,
-    format_ends,
-    format_plain,
-    format_value,
-    is_known,
-    measured_decimals,
-    quantity,
-)
-from harness.report.lab.unit_content import STATION_FIGURES
+from harness.measure.unit_report import STATION_FIGURES
+from harness.report.lab.quantities import Quantity, is_known, quantity
 from harness.study.trust.expected_values import preset_values
 
 
@@ -27,10 +18,10 @@ def test_every_number_that_is_measured_has_a_name() -> None:
 
 
 def test_numbers_are_shown_in_the_unit_of_their_key() -> None:
-    assert format_plain(0.00075, quantity("components.white.position_m")) == "0.75 mm"
-    assert format_plain(math.radians(0.25), quantity("components.drift.pitch_roll_rad")) == "0.25 deg"
-    assert format_plain(0.03, quantity("components.echo.share")) == "3 %"
-    assert format_plain(0.002, quantity("components.speed.ahead_s")) == "2 ms"
+    assert quantity("components.white.position_m").exact(0.00075) == "0.75 mm"
+    assert quantity("components.drift.pitch_roll_rad").exact(math.radians(0.25)) == "0.25 deg"
+    assert quantity("components.echo.share").exact(0.03) == "3 %"
+    assert quantity("components.speed.ahead_s").exact(0.002) == "2 ms"
 
 
 @pytest.mark.parametrize(
@@ -54,28 +45,9 @@ def test_an_unknown_key_is_its_own_name_with_the_unit_of_its_end(key: str, unit:
     assert found.title == (f"{key} [{unit}]" if unit else key)
 
 
-def test_the_interval_sets_the_decimals() -> None:
+def test_an_interval_is_scaled_to_the_unit_of_its_key() -> None:
     length = Quantity("length", "mm", 1e3)
-    assert format_both(Measured(0.0015, 0.0014, 0.0016), length) == "1.50 mm (1.40 to 1.60)"
-    assert format_both(Measured(0.0015, 0.0005, 0.0025), length) == "1.5 mm (0.5 to 2.5)"
-    assert format_value(Measured(1.23456, 1.2, 1.3), length) == "1,235 mm"
-    assert format_value(Measured(1.23456, 1.2, 1.3), length, with_unit=False) == "1,235"
-    assert measured_decimals(Measured(0.0015, 0.0, math.inf), length) == 1
-    assert format_ends(Measured(-0.001, -0.002, math.inf), length) == "−2 to ∞"
-
-
-def test_at_most_five_digits_of_a_value_are_shown() -> None:
-    rate = Quantity("rate", "Hz")
-    assert format_both(Measured(39.9992, 39.999199, 39.999201), rate) == "39.999 Hz (39.999 to 39.999)"
-    assert format_value(Measured(0.0, 0.0, 5e-5), Quantity("share", "%", 100.0)) == "0 %"
-
-
-def test_a_number_without_width_is_exact_and_one_that_is_missing_says_so() -> None:
-    length = Quantity("length", "mm", 1e3)
-    exact = Measured(0.002, 0.002, 0.002)
-    assert (format_both(exact, length), format_ends(exact, length)) == ("2 mm", "exact")
-    missing = Measured.missing("no events")
-    assert (format_value(missing, length), format_ends(missing, length)) == ("not measured", "–")
-    assert format_both(missing, length) == "not measured"
-    assert format_plain(0.0, length) == "0 mm"
-    assert format_plain(1234.56, length) == "1,235,000 mm"
+    number = Interval(0.0015, 0.0014, 0.0016)
+    assert (str(length.of(number)), length.bare(number).number) == ("1.5 mm (1.4 to 1.6)", "1.5")
+    assert str(length.of(Interval.missing("no events"))) == "not measured"
+    assert (length.exact(0.0), length.exact(1234.56)) == ("0 mm", "1,235,000 mm")

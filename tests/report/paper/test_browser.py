@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.paper.writer import write_paper_page
+from harness.report.paper.page import write_paper_page
 from tests.report.fabricate_paper import liu, write_study
 
 
@@ -48,7 +48,7 @@ def test_each_figure_of_a_claim_has_its_name_beside_it_on_a_phone(page: Any) -> 
     """The head of the table is not shown there, but read out; the rows are still rows of a table."""
     phone = page.viewport_size["width"] < 640
     name = "(cell) => getComputedStyle(cell, '::before').content"
-    cell = page.locator(".claims:not(.statements) td").first
+    cell = page.get_by_role("table", name="claims", exact=True).locator("td").first
     assert cell.evaluate(name) == ('"kind"' if phone else "none")
     table = page.get_by_role("table", name="claims", exact=True)
     assert table.get_by_role("columnheader").count() == 7

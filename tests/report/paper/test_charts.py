@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS
 from harness.report.paper.bar_chart import draw_bars, height_in, is_horizontal
-from harness.report.paper.charts import charts
+from harness.report.paper.charts import figure_charts
 from harness.report.paper.figure_table import figure_table
 from harness.report.paper.line_chart import draw_lines
 from harness.results.findings import BarChart, LineChart, PaperExperiment
@@ -119,7 +119,10 @@ def test_a_name_has_one_colour_wherever_it_is_drawn(monkeypatch: pytest.MonkeyPa
     several = [
         BarChart("", "", ("a",), dict.fromkeys(names, (1.0,))) for names in (("x", "ik"), ("y", "z"), ("z", "ik"))
     ]
-    charts(replace(liu(), experiments=(*liu().experiments, replace(EMPTY, figures=tuple(several)))))
+    findings = replace(liu(), experiments=(*liu().experiments, replace(EMPTY, figures=tuple(several))))
+    for experiment in findings.experiments:
+        for draw_figure in figure_charts(findings, experiment):
+            draw_figure()
     assert len(found) == 6
     for names, places in found:
         assert set(places) == names

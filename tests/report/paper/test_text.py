@@ -3,17 +3,18 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import harness
 from harness.cli import main
+from harness.core.interval import Interval
 from harness.errors import BadFile
-from harness.report.kit.statement_lines import WIDTH, format_difference, format_interval, format_p
+from harness.report.kit.statement_lines import WIDTH
+from harness.report.paper.page import claims_table, paper_text, statements_table, statements_text
 from harness.report.paper.readme import update_readme
-from harness.report.paper.side_by_side import printed_statements
-from harness.report.paper.text import statements_text, text_tables
-from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.benchmark_statement import BenchmarkStatement, Verdict
 from harness.results.findings import PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
@@ -25,16 +26,10 @@ def letters(text: str) -> str:
 
 
 def test_every_claim_is_told_whole() -> None:
-    told = letters(text_tables(liu()))
+    told = letters(paper_text(liu()))
     for claim in (claim for experiment in liu().experiments for claim in experiment.claims):
-        for text in (
-            claim.target,
-            claim.measured,
-            claim.why,
-            format_difference(claim),
-            format_interval(claim),
-            claim.verdict,
-        ):
+        number = Interval.of(claim.value, claim.low, claim.high)
+        for text in (claim.target, claim.measured, claim.why, claim.verdict, number.ends):
             assert letters(text) in told
     for text in ("8 of 16 printed statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
         assert letters(text) in told
@@ -47,65 +42,40 @@ def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
     findings = replace(
         liu(), experiments=(PaperExperiment("a", long, long, (long,), (claim, claim)), *kim().experiments)
     )
-    lines = text_tables(findings).split("\n")
+    lines = paper_text(findings).split("\n")
     assert max(map(len, lines)) <= WIDTH
     assert not any(line.endswith(" ") for line in lines)
     if repeats > 1:
         assert any(len(line) > 0.9 * WIDTH for line in lines)
 
 
-def test_columns_stand_under_their_titles() -> None:
-    lines = text_tables(liu()).split("\n")
-    top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("statement"))
-    for title in ("published", "measured", "difference", "95 % interval", "clips", "verdict"):
-        at = lines[top].index(title)
-        assert lines[top + 1][at - 2 : at] == "  "
-        assert lines[top + 1][at] != " "
-
-
 def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
     claim = BenchmarkStatement("one\ntwo\t three", "a\nb", "c", "reproduced")
-    told = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
-    assert "one two three  printed  a b        c         reproduced" in told
+    told = paper_text(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
+    assert "one two three  printed  a b        c         ✓ reproduced" in told
+
+
+def stated(measured: str = "", verdict: Verdict = "cannot tell", **figures: Any) -> BenchmarkStatement:
+    return BenchmarkStatement("", "order", measured, verdict, **figures)
 
 
 @pytest.mark.parametrize(
-    ("values", "unit", "told"),
+    ("claim", "told"),
     [
-        ((0.5, 0.25, 0.75), "deg", ("0.50 deg", "0.25 to 0.75")),
-        ((-0.5, -0.75, -0.25), "deg", ("−0.50 deg", "−0.75 to −0.25")),
-        ((0.004, -0.001, 0.01), "deg", ("0.004 deg", "−0.001 to 0.010")),
-        ((0.5, None, None), "deg", ("0.50 deg", "")),
-        ((0.0, 0.0, 0.0), "mm", ("0.0 mm", "0.0 to 0.0")),
-        ((1e-12, -1e-12, 1.0), "", ("0.0000", "0.0000 to 1.0000")),
-        ((None, None, None), "deg", ("", "")),
-        ((12.0, None, None), "frames/s", ("12 frames/s", "")),
+        (stated(value=0.5, low=0.254, high=0.746, unit="deg"), "0.50 deg (0.25 to 0.75)"),
+        (
+            stated(value=0.004, low=-0.001, high=0.01, unit="deg", p_holm=0.0312),
+            "0.004 deg (−0.001 to 0.010) (p 0.031)",
+        ),
+        (stated(value=1.0, low=0.5, high=1.5, p_holm=0.0004), "1.0 (0.5 to 1.5) (p < 0.001)"),
+        (stated("1.21 deg", value=1.21, unit="deg"), ""),
+        (stated("1.21 against 2", value=0.79, unit="deg"), "0.79 deg"),
+        (stated(verdict="not run"), ""),
     ],
 )
-def test_an_interval_that_does_not_hold_zero_never_reads_so(
-    values: tuple[float | None, float | None, float | None], unit: str, told: tuple[str, str]
-) -> None:
-    claim = BenchmarkStatement("", "", "", "cannot tell", "", 7, *values, unit)
-    assert (format_difference(claim), format_interval(claim)) == told
-
-
-@pytest.mark.parametrize(("p", "told"), [(None, ""), (0.0004, "< 0.001"), (0.0312, "0.031"), (1.0, "1.000")])
-def test_p_after_holm_stands_beside_the_interval(p: float | None, told: str) -> None:
-    claim = BenchmarkStatement(
-        "first", "order", "1 against 2", "reproduced", "", 12, 1.0, 0.5, 1.5, "deg", p=0.0001, p_holm=p
-    )
-    assert format_p(claim) == told
-    text = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
-    assert ("p (Holm)" in text) == (p is not None)
-    assert told in text
-
-
-def test_a_figure_that_is_ours_already_is_not_told_twice() -> None:
-    assert format_difference(BenchmarkStatement("", "1.25 deg", "1.21 deg", "reproduced", value=1.21, unit="deg")) == ""
-    assert (
-        format_difference(BenchmarkStatement("", "order", "1.21 against 2", "cannot tell", value=0.79, unit="deg"))
-        == "0.79 deg"
-    )
+def test_a_difference_has_its_interval_and_p_and_is_told_once(claim: BenchmarkStatement, told: str) -> None:
+    (row,) = claims_table([claim]).rows
+    assert str(row[4]) == told
 
 
 def test_tables_are_put_where_those_of_the_same_paper_and_motion_stand(tmp_path: Path) -> None:
@@ -201,13 +171,10 @@ def test_a_printed_statement_has_one_row_with_both_readings() -> None:
         ),
     )
     findings = replace(liu(), experiments=(PaperExperiment("a", "b", "", (), claims),))
-    first, second = printed_statements(findings)
-    assert (first.text, first.published) == ("a: dynamic_map errs less", "order")
-    assert first.claims == {"as printed": claims[0], "ours": claims[1]}
-    assert second.claims == {"as printed": claims[2], "ours": claims[2]}
+    first, second = ([str(cell) for cell in row] for row in statements_table(findings).rows)
+    assert first == ["a: dynamic_map errs less", "order", "✓ reproduced (1 against 2 deg)",
+                     "✗ not reproduced (3 against 2 deg)"]  # fmt: skip
+    assert second == ["five modes", "99 %", "≠ not comparable (95 %)", "≠ not comparable (95 %)"]
     lines = statements_text(findings).split("\n")
-    (row,) = [line for line in lines if line.startswith("a: ")]
-    assert row.split("  ")[-1].strip() == "not reproduced"
-    assert row.index("1 against 2 deg") < row.index("reproduced") < row.index("3 against 2 deg")
     assert lines[-1].startswith("1 further claim:")
     assert "7 against 8" not in statements_text(findings)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from harness.report.placement.page import PlacementContent, placement_page
-from harness.report.placement.text import text
+from harness.report.kit.page_html import page_html
+from harness.report.placement.page import placement_page, placement_text
 from harness.report.placement.wording import (
     changes_sentence,
     format_duration,
@@ -38,11 +38,11 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
     assert sentence(asked) == (
-        "Best two stations for walking: both ankles, 2.00 deg (1.80 to 2.20) on 16 held-out clips; tied with 2 of the "
+        "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out clips; tied with 2 of the "
         "54 other pairs that were tried: head + pelvis; sternum + pelvis."
     )
-    assert text(asked).startswith("Best two stations for walking: both ankles")
-    assert f"<h1>{sentence(asked)}</h1>" in placement_page(PlacementContent(asked, {}, ()))
+    assert placement_text(asked).startswith("Best two stations for walking: both ankles")
+    assert placement_page(asked).headline == sentence(asked)
 
 
 def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindings) -> None:
@@ -78,7 +78,7 @@ def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> N
         "comparisons). The study takes 10 min."
     )
     assert second == (
-        "A difference of 0.30 deg, a tenth of the error, would need about 190 clips, about 1.9 h. Spread and time are "
+        "A difference of 0.3 deg, a tenth of the error, would need about 190 clips, about 1.9 h. Spread and time are "
         "those of the first 4 sets."
     )
     assert power_sentences(replace(POWER, needed_clips=16)) == [first]
@@ -98,9 +98,9 @@ def test_too_few_clips_are_said_before_anything_else() -> None:
 
 
 def test_the_text_and_the_page_keep_what_was_announced(findings: PlacementFindings) -> None:
-    assert power_sentences(POWER)[0] in " ".join(text(findings).split())
-    assert power_sentences(POWER)[1] in placement_page(PlacementContent(findings, {}, ()))
-    assert "<dt>Clips</dt>" not in placement_page(PlacementContent(replace(findings, power=None), {}, ()))
+    assert power_sentences(POWER)[0] in " ".join(placement_text(findings).split())
+    assert power_sentences(POWER)[1] in page_html(placement_page(findings), with_charts=False)
+    assert "<dt>Clips</dt>" not in page_html(placement_page(replace(findings, power=None)), with_charts=False)
 
 
 @pytest.mark.parametrize(
@@ -123,20 +123,20 @@ def test_sets_have_a_rank_under_each_condition(findings: PlacementFindings) -> N
     assert len(ranks_by_condition(few, 2)) == 2
     assert ranks_by_condition(replace(few, better="higher"), 9)[0] == (("sternum",), [1, None, 1])
     assert ranks_by_condition(replace(few, conditions=()), 9) == []
-    rows = [line.split() for line in text(few).splitlines() if line.startswith("sternum  ")]
+    rows = [line.split() for line in placement_text(few).splitlines() if line.startswith("sternum  ")]
     assert ["sternum", "3", "not", "measured", "3"] in rows
-    assert 'aria-label="ranks"' in placement_page(PlacementContent(few, {}, ()))
+    assert 'aria-label="ranks"' in page_html(placement_page(few), with_charts=False)
 
 
 def test_changes_of_order_are_counted_and_the_first_is_named(findings: PlacementFindings) -> None:
     change = ChangedOrder(("head",), ("left_ankle", "right_ankle"), (0.5, -0.25), significant=True)
     pair = RankAgreement("a", "b", 0.5, 5, changed=(change,), changes=3, significant_changes=1)
-    said = "3 of 10 pairs change their order, 1 significantly: first head against both ankles, +0.50 to −0.25 deg"
+    said = "3 of 10 pairs change their order, 1 significantly: first head against both ankles, +0.5 to −0.25 deg"
     assert changes_sentence(findings, pair) == said
     own = replace(pair, a=findings.conditions[0].name)
-    assert said in " ".join(text(replace(findings, agreements=(own,))).split())
-    assert "pairs of conditions that are on the page alone: 1" in text(replace(findings, agreements=(own, pair)))
-    assert said in placement_page(PlacementContent(replace(findings, agreements=(pair,)), {}, ()))
+    assert said in " ".join(placement_text(replace(findings, agreements=(own,))).split())
+    assert "are on the page alone: 1." in placement_text(replace(findings, agreements=(own, pair)))
+    assert said in page_html(placement_page(replace(findings, agreements=(pair,))), with_charts=False)
     untested = replace(pair, changes=1, changed=(replace(change, significant=None),))
     assert changes_sentence(findings, untested).startswith(
         "1 of 10 pairs changes its order (too few clips or too many sets to test): first"

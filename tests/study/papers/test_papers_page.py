@@ -9,7 +9,7 @@ import pytest
 
 import harness
 from harness.report.kit.statement_lines import MARKS
-from harness.report.paper.verdicts import MEANINGS
+from harness.report.paper.page import KINDS
 from harness.results.findings import PaperExperiment
 from harness.study.papers.paper import PAPERS, load_paper
 from harness.study.papers.paper_study import PaperStudy
@@ -26,7 +26,7 @@ def test_every_experiment_and_no_other_has_a_row() -> None:
 
 def test_every_verdict_has_a_row() -> None:
     assert re.findall(r"^\| (\S) ([a-z ]+) \|", PAGE.split("## Reproduction")[1], re.MULTILINE) == [
-        (MARKS[word], word) for word in MEANINGS
+        (MARKS[kind], kind) for kind in KINDS
     ]
 
 

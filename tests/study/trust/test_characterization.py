@@ -28,10 +28,10 @@ def white(folder: Path) -> Characterization:
 
 
 def test_doubled_white_noise_is_named_with_its_size(white: Characterization) -> None:
-    named = {(check.departure.key, check.departure.station): check for check in white.named}
+    named = {(check.key, check.station): check for check in white.named}
     position = named["components.white.position_m", ""]
-    assert position.departure.measured.contains(0.0015)
-    assert position.ratio == pytest.approx(2.0, rel=0.03)
+    assert position.measured.contains(0.0015)
+    assert position.measured.value / position.expected.value == pytest.approx(2.0, rel=0.03)
     assert ("components.white.orientation_rad", "") in named
     assert ("components.white.position_m", "torso") in named
     assert not [key for key, _ in named if "white" not in key]
@@ -62,13 +62,13 @@ def test_a_unit_is_no_departure_from_itself(white: Characterization, folder: Pat
 def test_another_day_is_compared_with_an_earlier_unit(white: Characterization, folder: Path) -> None:
     unit: UnitFile = white.unit
     found = characterize_capture(planted_capture("clock", 1002, folder), expected=unit)
-    named = {check.departure.key for check in found.named}
+    named = {check.key for check in found.named}
     assert {"components.white.position_m", "components.clock.drift_ppm"} <= named
 
 
 def test_a_clock_that_was_not_set_is_named(folder: Path) -> None:
     found = characterize_capture(planted_capture("stamps", 1001, folder))
-    named = {check.departure.key: check.departure.measured for check in found.named}
+    named = {check.key: check.measured for check in found.named}
     assert named["timing.stamp_resolution_s"].value == pytest.approx(0.002)
     assert named["timing.clock_age_s"].value == pytest.approx(18_000.0, abs=1.0)
 
@@ -81,4 +81,5 @@ def test_means_are_checked_and_not_the_ends(white: Characterization) -> None:
 
 def test_the_needed_time_follows_the_rate(white: Characterization) -> None:
     rate = white.profile.parameters["components.excursion.onsets_per_min"].value
-    assert white.needed_minutes == pytest.approx(97 / (6 * rate))
+    (advice,) = white.report.advice
+    assert advice.needed_minutes == pytest.approx(97 / (6 * rate))

@@ -3,8 +3,8 @@
 import pytest
 
 from harness.core.fields import replace_fields
+from harness.core.interval import Interval
 from harness.errors import BadInput
-from harness.measure.measured import Measured
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import Noise, noise_preset
 from harness.study.trust.expected_values import (
@@ -37,15 +37,15 @@ def test_changed_numbers_are_put_in_their_places() -> None:
 def test_the_mean_of_a_uniform_distribution_is_expected_too() -> None:
     values = preset_values()
     assert values["components.excursion.size_m"].value == pytest.approx(0.0175)
-    assert values["components.echo.share"] == Measured(0.03, 0.03, 0.03)
+    assert values["components.echo.share"] == Interval(0.03, 0.03, 0.03)
 
 
 def test_an_earlier_unit_is_expected_with_its_intervals() -> None:
     measured = {
-        "components.echo.share": Measured(0.05, 0.04, 0.06, 100),
-        "components.echo.size_m": Measured(0.2, 0.19, 0.21, 100),
-        "components.echo.size_m.0": Measured(0.1, 0.09, 0.11, 100),
-        "components.echo.size_m.1": Measured(0.3, 0.29, 0.31, 100),
+        "components.echo.share": Interval(0.05, 0.04, 0.06, 100),
+        "components.echo.size_m": Interval(0.2, 0.19, 0.21, 100),
+        "components.echo.size_m.0": Interval(0.1, 0.09, 0.11, 100),
+        "components.echo.size_m.1": Interval(0.3, 0.29, 0.31, 100),
     }
     values = unit_values(UnitFile("u", {"echo": {"share": 0.05}}, {}, measured))
     assert values == measured

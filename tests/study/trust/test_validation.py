@@ -63,7 +63,7 @@ def test_a_sound_capture_shows_the_preset_and_no_departure(found: Validation) ->
     assert numbers["components.clock.drift_ppm"].value == pytest.approx(20.0, abs=10.0)
     assert numbers["time_offset_orientation_s"].value == pytest.approx(2e-5 * found.registration.reference_s, abs=2e-4)
     assert numbers["latency_s"].value == pytest.approx(TrackerConfig().latency_s + TrackerConfig().record_s, abs=2e-4)
-    checked = [(check.departure.key, check.departure.station) for check in found.checks]
+    checked = [(check.key, check.station) for check in found.checks]
     assert {key for key, station in checked if not station} == {
         "components.speed.ahead_s", "components.clock.drift_ppm", "scale", "heading_rad", "latency_s",
     }  # fmt: skip
@@ -84,11 +84,11 @@ def test_exchanged_stations_are_named_and_have_no_mount_checks(boxing: Path, tru
     found = validate_capture(boxing, replace(truth, body_of=swapped))
     assert dict(found.exchanged) == {"left_hand": "lhand", "right_hand": "rhand"}
     assert found.named == ()
-    assert "left_hand" not in {check.departure.station for check in found.checks}
+    assert "left_hand" not in {check.station for check in found.checks}
 
 
 def named_keys(found: Validation) -> set[tuple[str, str]]:
-    return {(check.departure.key, check.departure.station) for check in found.named}
+    return {(check.key, check.station) for check in found.named}
 
 
 def test_numbers_that_differ_from_a_unit_file_are_named(boxing: Path, truth: TruthMotion, found: Validation) -> None:

@@ -1,10 +1,16 @@
-"""What the page of `harness validate` shows: how a capture lies against its reference, in SI units."""
+"""The report on a validated capture: how it lies against its reference, in SI units."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from harness.core.arrays import Floats, freeze
-from harness.measure.measured import Measured
-from harness.report.lab.unit_content import CaptureSummary, DepartureCheck
+from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.measure.accuracy import StationAccuracy
+from harness.measure.departures import Departure
+from harness.measure.registration import Registration
+from harness.measure.unit_report import CaptureSummary
 
 ROOM = "room"
 """Name of the pose of the tracker's frame in the reference's; other poses are mounts of stations."""
@@ -18,8 +24,8 @@ class EstimatedPose:
     """`ROOM`, or the station."""
     body: str
     """Body of the reference that carries the station; "" for the room."""
-    position_m: tuple[Measured, Measured, Measured]
-    """Coordinates with their intervals [m]."""
+    position_m: tuple[Interval, ...]
+    """Three coordinates with their intervals [m]."""
     rotation: Floats
     """(4,) unit quaternion (w, x, y, z)."""
     angle_rad: float
@@ -27,35 +33,6 @@ class EstimatedPose:
 
     def __post_init__(self) -> None:
         freeze(self, rotation=(4,))
-
-
-@dataclass(frozen=True)
-class RegistrationNumber:
-    """A number of the registration, such as a time offset."""
-
-    key: str
-    """Name such as "time_offset_orientation_s"."""
-    measured: Measured
-    station: str = ""
-    """Station that it is of; "" is all together."""
-
-
-@dataclass(frozen=True)
-class StationAccuracy:
-    """Errors of one station against the reference, after the registration."""
-
-    station: str
-    position_rms_m: Measured
-    position_median_m: Measured
-    position_95_m: Measured
-    """95 % quantile [m]."""
-    orientation_rms_rad: Measured
-    orientation_median_rad: Measured
-    orientation_95_rad: Measured
-    readings: int
-    """Number of readings that were compared."""
-    lost_share: float
-    """Share of the readings without a position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,24 +51,12 @@ class ResidualSeries:
         freeze(self, time_s=("N",), position_m=("N",), angle_rad=("N",))
 
 
-@dataclass(frozen=True)
-class ReconstructionScore:
-    """One metric of one method on the capture."""
-
-    method: str
-    metric: str
-    value: float | None
-    """Mean over the frames, in the metric's unit; None if it was not measured."""
-
-
 @dataclass(frozen=True, eq=False)
 class ValidationReport:
-    """Everything that `harness validate` found out about a capture."""
+    """Everything that a reference shows of a capture."""
 
     name: str
     """Name of the capture, or of the unit."""
-    command: str
-    """The command line that made it."""
     capture: CaptureSummary
     truth: str
     """The reference in words: its file or clip, kind and length."""
@@ -99,26 +64,55 @@ class ValidationReport:
     expected_frames: int
     expected_from: str
     """Origin of the expected numbers, such as "the preset default"."""
-    numbers: tuple[RegistrationNumber, ...]
-    """Time offsets, clock ratio, scale and heading errors."""
+    numbers: Mapping[str, Interval]
+    """Time offsets, clock, scale, heading and latency, by key."""
     poses: tuple[EstimatedPose, ...]
     """The room first, then the mount of each station."""
-    accuracy: tuple[StationAccuracy, ...]
-    checks: tuple[DepartureCheck, ...] = ()
+    accuracy: Mapping[str, StationAccuracy]
+    """Station -> its errors after the registration."""
+    checks: tuple[Departure, ...] = ()
     """All checks, in their order; those that are named are the departures."""
     residuals: tuple[ResidualSeries, ...] = ()
-    scores: tuple[ReconstructionScore, ...] = ()
     exchanged: tuple[str, ...] = ()
     """Stations that are not where they are said to be, a sentence each."""
     notes: tuple[str, ...] = ()
     """What cannot be told from this capture and what to know about it, a sentence each."""
 
     @property
-    def departures(self) -> tuple[DepartureCheck, ...]:
-        """The checks that are named, in their order."""
-        return tuple(check for check in self.checks if check.is_named)
-
-    @property
     def matched_share(self) -> float:
         """Share of the expected frames that were matched; NaN without any."""
         return self.matched_frames / self.expected_frames if self.expected_frames else float("nan")
+
+
+def estimated_poses(registration: Registration) -> tuple[EstimatedPose, ...]:
+    """The room, then the mount of each station."""
+    origin = tuple(registration.values[f"tracker_origin_m.{axis}"] for axis in range(3))
+    room = registration.world_from_tracker, _half_width_rad(registration.room_covariance)
+    mounts = [
+        EstimatedPose(
+            station,
+            mount.body,
+            tuple(mount.position(axis) for axis in range(3)),
+            mount.body_from_station,
+            _half_width_rad(mount.covariance),
+        )
+        for station, mount in registration.mounts.items()
+    ]
+    return (EstimatedPose(ROOM, "", origin, *room), *mounts)
+
+
+def _half_width_rad(covariance: Floats) -> float:
+    """Half width of a rotation, whose covariance is the first three rows of (6, 6) [rad]."""
+    return NORMAL_QUANTILE * float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+
+
+def residual_series(registration: Registration) -> tuple[ResidualSeries, ...]:
+    """Sizes of the errors of each station over time."""
+    out = []
+    for station, errors in registration.errors.items():
+        position_m, angle_rad = (
+            np.where(errors.valid, np.linalg.norm(values, axis=1), np.nan)
+            for values in (errors.position_m, errors.rotation_rad)
+        )
+        out.append(ResidualSeries(station, errors.truth_s - errors.truth_s[0], position_m, angle_rad))
+    return tuple(out)
