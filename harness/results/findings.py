@@ -20,7 +20,7 @@ ClaimVerdict = Literal["reproduced", "same", "not reproduced", "cannot tell", "n
 
 *reproduced*: it lies on the published side; *same*: it lies within the margin of `compare.margins`, so the difference
 is too small to matter; *not reproduced*: it lies on the other side; *cannot tell*: it contains zero, there are too few
-clips, or the difference is not significant after Holm's correction; *not comparable*: absolute figures of other motion.
+units, or the difference is not significant after Holm's correction; *not comparable*: absolute figures of other motion.
 """
 ClaimKind = Literal["printed", "derived", "repeated", "speed"]
 """Kind of a claim.
@@ -46,9 +46,9 @@ class Claim:
     why: str = ""
     """Reason for a verdict other than *reproduced*: what differs, or what is missing."""
     clips: int = 0
-    """Number of clips on which both sides were measured."""
+    """Number of units on which both sides were measured: performers, or clips where the scenario says so."""
     difference: float | None = None
-    """Mean paired difference over clips, or our figure that the published one is compared with, in `unit`."""
+    """Mean paired difference over units, or our figure that the published one is compared with, in `unit`."""
     low: float | None = None
     high: float | None = None
     """Ends of the 95 % interval of `difference`."""
@@ -87,7 +87,7 @@ class BarChart:
     low: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     high: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     spread: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
-    """Standard deviations over clips, where the paper shows them."""
+    """Standard deviations over units, where the paper shows them."""
     published: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     """Figures that the paper prints, by series."""
     horizontal: bool = False

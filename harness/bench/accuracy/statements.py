@@ -80,9 +80,9 @@ def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> 
             for other in COMPARED_METHODS:
                 theirs = pool_clips(by_method.get(other, {}), noise, performer)
                 difference = compare_paired(theirs, ours)
-                if other == method or not difference.clips:
+                if other == method or not difference.units:
                     continue
-                error, other_error = (float(np.mean([of[clip] for clip in difference.clips])) for of in (ours, theirs))
+                error, other_error = (float(np.mean([of[clip] for clip in difference.units])) for of in (ours, theirs))
                 found.append(PairedStatement(performer, noise, method, other, error, other_error, difference))
     return found
 

@@ -96,7 +96,7 @@ def _statement_table(report: AccuracyReport) -> Table:
         means = [format_fixed(value, 2) for value in (s.mean_deg, s.other_mean_deg)]
         difference = format_fixed(s.difference.mean, 2, signed=True)
         verdict = s.verdict if s.difference.low is not None else s.difference.why
-        cells = [s.performer, s.noise, str(len(s.difference.clips)), means[0], s.other, means[1]]
+        cells = [s.performer, s.noise, str(len(s.difference.units)), means[0], s.other, means[1]]
         rows.append([*cells, difference, interval, verdict])
     return Table(head, rows, text_columns=2)
 
@@ -153,7 +153,7 @@ def report_content(report: AccuracyReport) -> dict[str, Any]:
                 "noise": s.noise,
                 "method": s.method,
                 "other": s.other,
-                "clips": list(s.difference.clips),
+                "clips": list(s.difference.units),
                 "mean_deg": s.mean_deg,
                 "other_mean_deg": s.other_mean_deg,
                 "difference_deg": s.difference.mean,

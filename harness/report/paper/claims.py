@@ -9,7 +9,7 @@ from harness.report.kit.verdict_badge import verdict_badge
 from harness.report.paper.verdicts import MARKS, format_difference, format_interval, format_kind, format_p
 from harness.results.findings import Claim, PaperExperiment, PaperFindings
 
-_HEAD = ("claim", "kind", "published", "measured", "difference", "clips", "verdict")
+_HEAD = ("claim", "kind", "published", "measured", "difference", "units", "verdict")
 
 
 def claims_table(findings: PaperFindings) -> Markup:
@@ -33,8 +33,9 @@ def claims_list(claims: Sequence[Claim]) -> Markup:
 def _table(groups: Sequence[Markup]) -> Markup:
     top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in _HEAD), role="row")
     text = (
-        "Difference: mean of the paired differences over clips and its 95 % interval; positive values agree with the "
-        "paper. p: by sign flips (by Welch's test where clips do not pair), after Holm's correction for all printed "
+        "Difference: mean of the paired differences over units (performers, or clips where a note says so) and its "
+        "95 % interval; positive values agree with the paper. p: by sign flips (by Welch's test where units do not "
+        "pair), after Holm's correction for all printed "
         "statements of the paper with the same version of the methods (as printed, ours). The text under a claim gives "
         "the reason for its verdict. Kind: the paper prints a printed statement; a derived one follows from those or "
         "is our interpretation of a word; a repeated one asks one more method; speed compares today's machines with "

@@ -54,7 +54,7 @@ def statements_table(statements: Sequence[PrintedStatement]) -> Markup:
     ]
     text = (
         "As printed: the equations of the paper, without additions. Ours: the methods of this project that extend "
-        "them. Errors are means over clips. The headline counts these verdicts. The next table adds differences, "
+        "them. Errors are means over units. The headline counts these verdicts. The next table adds differences, "
         "intervals and reasons."
     )
     table = tag(

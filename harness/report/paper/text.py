@@ -19,7 +19,7 @@ from harness.results.findings import Claim, PaperExperiment, PaperFindings
 
 WIDTH = 160
 """Most characters of a line."""
-_HEAD = ("claim", "kind", "published", "measured", "difference", "95 % interval", "p (Holm)", "clips", "verdict")
+_HEAD = ("claim", "kind", "published", "measured", "difference", "95 % interval", "p (Holm)", "units", "verdict")
 _SHRINKABLE = (0, 2, 3)
 """Columns that wrap where lines would be too long."""
 _INDENT = "  "

@@ -24,7 +24,7 @@ MEANINGS: Mapping[ClaimVerdict, str] = {
     "most 0.05; or a printed value is met (an error within 25 %)",
     "same": "the whole interval lies within the margin of a comparison: the difference is too small to matter",
     "not reproduced": "the interval lies on the other side; or a printed value is not met",
-    "cannot tell": "the interval contains zero, there are too few clips, or the difference is not significant among "
+    "cannot tell": "the interval contains zero, there are too few units, or the difference is not significant among "
     "the printed statements (Holm)",
     "not comparable": "the printed value is for other motion or conditions",
     "not run": "not measured here",

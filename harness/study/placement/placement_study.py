@@ -334,5 +334,5 @@ def _with_held_out_gain(result: PlacementSearch, held: Mapping[StationNames, Cos
     if result.mode != "refine" or first is None or last is None or first is last:
         return result
     gain = compare_paired(first, last)
-    clips = len(gain.clips)
+    clips = len(gain.units)
     return replace(result, held_out=gain.mean, held_out_low=gain.low, held_out_high=gain.high, held_out_clips=clips)

@@ -216,7 +216,7 @@ def _measured_costs(costs: Costs) -> Costs:
 def _make_worth(
     name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, gain: PairedDifference
 ) -> MarginalContribution:
-    return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.clips))
+    return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.units))
 
 
 def _shapley_worth(

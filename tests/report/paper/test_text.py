@@ -56,7 +56,7 @@ def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
 def test_columns_stand_under_their_titles() -> None:
     lines = text_tables(liu()).split("\n")
     top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("claim"))
-    for title in ("published", "measured", "difference", "95 % interval", "clips", "verdict"):
+    for title in ("published", "measured", "difference", "95 % interval", "units", "verdict"):
         at = lines[top].index(title)
         assert lines[top + 1][at - 2 : at] == "  "
         assert lines[top + 1][at] != " "
