@@ -57,7 +57,7 @@ def test_findings_hold_what_the_cells_say(finished: Path) -> None:
     assert np.mean(drawn) == pytest.approx(errors["mean_pose"]["performer p1"], rel=1e-4)
     assert lines.x[0] >= 1.0  # the warm-up is not drawn
     assert bouts.claims[0].clips == 1
-    assert walks.notes == ("4 cells",)
+    assert walks.notes == ("4 cells", "Units of the statistics: walks: 2 performers.")
 
 
 def test_the_study_says_what_it_rests_on(finished: Path) -> None:
