@@ -124,9 +124,9 @@ def _best(findings: PlacementFindings) -> Markup | None:
         ties = _text_cell(list_sets(best.ties) if best.ties else "none")
         rows.append([len(best.stations), _text_cell(name), _error(findings, tried), *held_out, rate, of, ties])
     caption = (
-        "The best set of each size and its mean error with the 95 % interval over clips. "
+        "The best set of each size and its mean error with the 95 % interval over units of statistics. "
         + ("Held out: the error on clips that did not take part in the choice. " if has_held_out else "")
-        + "Best of: the number of sets of this size, and in how many resamples of the clips the set stays best. "
+        + "Best of: the number of sets of this size, and in how many resamples of the units the set stays best. "
         f"Ties: other sets of this size that are as good. {TIE_NOTE}"
     )
     head = ["stations", _text_cell("best set"), "error", *(["held out"] if has_held_out else []), "rate", "best of"]
@@ -201,7 +201,7 @@ def _worth(findings: PlacementFindings) -> Markup | None:
         if any((place.name, label) in differences for label in labels)
     ]
     table = Table(["candidate", *map(_text_cell, labels)], rows)
-    caption = f"Error without the station minus error with it [{findings.unit}], with 95 % intervals over clips."
+    caption = f"Error without the station minus error with it [{findings.unit}], with 95 % intervals over units."
     return details("Numbers of these charts", html_table(table, caption, label="worth"))
 
 
@@ -227,7 +227,7 @@ def _conditions(findings: PlacementFindings) -> Markup:
     sizes = sorted({int(size) for condition in findings.conditions for size in condition.best})
     rows = [
         [
-            join(c.name, tag("small", f"{c.kind}, {c.clips} clips{_stability_note(c)}")),
+            join(c.name, tag("small", f"{c.kind}, {count_noun(c.clips, 'unit')}{_stability_note(c)}")),
             *(_text_cell(set_name(c.best[str(size)])) if str(size) in c.best else "" for size in sizes),
         ]
         for c in findings.conditions

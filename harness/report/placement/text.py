@@ -48,7 +48,7 @@ def _setup(findings: PlacementFindings) -> list[str]:
     return [
         textwrap.fill(f"{what}, {findings.motion}, noise {findings.noise}, seed {findings.seed}{link}", WIDTH),
         f"{len(original_candidates(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
-        f"{len(findings.failures)} failed; mean over clips with 95 % interval",
+        f"{len(findings.failures)} failed; mean over units with 95 % interval",
         textwrap.fill(TIE_NOTE, WIDTH),
         *([textwrap.fill(" ".join(power_sentences(findings.power)), WIDTH)] if findings.power else []),
     ]
@@ -125,7 +125,7 @@ def _stability(findings: PlacementFindings) -> list[str]:
     if not findings.conditions:
         return []
     sizes = sorted({int(size) for condition in findings.conditions for size in condition.best})
-    head = ["condition", *(f"best of {size}" for size in sizes), "clips", "stays best"]
+    head = ["condition", *(f"best of {size}" for size in sizes), "units", "stays best"]
     rows = [
         [
             f"{c.kind}: {c.name}",

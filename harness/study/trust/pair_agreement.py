@@ -5,24 +5,22 @@ comparison, and the order is judged on these motions alone. The noise of a simul
 That of the device is read off the scatter, clip by clip, of device minus simulation. The scatter is a little too large:
 it also holds the simulation's noise, and whatever the simulation gets wrong from clip to clip.
 
-Two arms agree or contradict only where both sides show a difference in the direction of their means. The p of a pair is
-the larger of two one-sided p values, and Holm's method corrects it for the number of pairs. Where a contradiction is
-false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
+Two arms agree or contradict only where both sides show a difference (see `compare.rank_correlation`), so that at most
+the share `level` of the plans has a false contradiction.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy import special
 
 from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.rank_correlation import tau_b
+from harness.compare.rank_correlation import decide_pairs, side_difference, tau_b, tau_interval
 from harness.compare.ranking import shared_clips
-from harness.compare.significance import holm
+from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.trust_findings import PairAgreement, PairVerdict, RankCorrelation, SideDifference
+from harness.results.trust_findings import PairAgreement, RankCorrelation, SideDifference
 
 ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
 """Arm -> clip -> errors: one for each capture of the device, or for each seed of the simulation; None: not measured."""
@@ -41,43 +39,6 @@ def judge_pairs(
     """
     chosen = list(combinations(device, 2)) if pairs is None else list(pairs)
     return decide_pairs(chosen, [_compare_sides(device, simulated, pair, level) for pair in chosen], level)
-
-
-def decide_pairs(
-    pairs: Sequence[tuple[str, str]],
-    compared: Sequence[tuple[int, tuple[SideDifference, SideDifference]]],
-    level: float,
-    *,
-    sides: tuple[str, str] = ("device", "simulation"),
-    unit: str = "clips",
-) -> list[PairAgreement]:
-    """Decide on pairs that are tested together, from their numbers of units and the differences of both sides.
-
-    `sides` and `unit` name the two sides and what was counted in the reasons.
-    """
-    tested = [at for at, (_, found) in enumerate(compared) if all(side.p is not None for side in found)]
-    p = {at: max(side.p or 0.0 for side in compared[at][1]) for at in tested}
-    corrected = dict(zip(tested, holm([p[at] for at in tested]), strict=True))
-    judged = []
-    for at, ((a, b), (count, found)) in enumerate(zip(pairs, compared, strict=True)):
-        if at in corrected:
-            verdict, why = _verdict(dict(zip(sides, found, strict=True)), corrected[at], level, len(tested))
-        else:
-            verdict, why = "cannot tell", f"too few {unit}: {count}, of at least {MIN_UNITS}"
-        judged.append(PairAgreement(a, b, count, *found, p.get(at), corrected.get(at), verdict, why))
-    return judged
-
-
-def _verdict(sides: Mapping[str, SideDifference], p_holm: float, level: float, pairs: int) -> tuple[PairVerdict, str]:
-    first, second = (np.sign(side.mean or 0.0) for side in sides.values())
-    if p_holm <= level:
-        if first == second:
-            return "agree", "both sides show the same order"
-        return "contradict", "each side shows the other order"
-    weak = [name for name, side in sides.items() if side.p is not None and side.p > level]
-    if weak:
-        return "cannot tell", f"no significant difference on the {' and the '.join(weak)}"
-    return "cannot tell", f"not significant among {pairs} pairs"
 
 
 def _compare_sides(
@@ -113,21 +74,12 @@ def clip_means(errors: Mapping[str, Sequence[float | None]]) -> dict[str, float]
     return {clip: sum(values) / len(values) for clip, values in known.items() if values}
 
 
-def side_difference(values: Floats, variance: float, free: int, level: float) -> SideDifference:
-    """The mean of (n,) differences, whose noise has this variance, known with `free` degrees of freedom."""
-    mean, deviation = float(values.mean()), float(np.sqrt(variance / len(values)))
-    half = float(special.stdtrit(free, 1.0 - level)) * deviation
-    p = 0.0 if mean else 1.0
-    if deviation > 0.0:
-        p = float(special.stdtr(free, -abs(mean) / deviation))
-    return SideDifference(mean, mean - half, mean + half, p)
-
-
 def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrelation, RankCorrelation]:
     """Kendall's tau-b and the sim-to-real correlation of the arms' mean errors.
 
-    The second is Pearson's correlation of performance in simulation and reality (SRCC, Kadian et al. 2020). Intervals
-    are percentiles of 95 % over clips that are drawn again; resamples without a value are left out.
+    The second is Pearson's correlation of performance in simulation and reality (SRCC, Kadian et al. 2020). The 95 %
+    interval of tau is what the decided pairs of arms leave. That of the correlation has percentiles over clips that are
+    drawn again; resamples without a value are left out.
     """
     names = ("Kendall's tau-b", "sim-to-real correlation")
     means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
@@ -139,17 +91,21 @@ def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrel
         return first, second
     sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]
     drawn = generator(0, "rank correlation").integers(0, len(clips), (RESAMPLES, len(clips)))
+    resampled = np.array([_pearson(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
+    finite = resampled[np.isfinite(resampled)]
+    low, high = np.quantile(finite, (0.025, 0.975)) if len(finite) else (np.nan, np.nan)
+    intervals = (
+        tau_interval(judge_pairs(device, simulated, SIGNIFICANCE, list(combinations(arms, 2)))),
+        (float(low), float(high)),
+    )
     measures: tuple[Callable[[Floats, Floats], Floats | float], ...] = (tau_b, _pearson)
     found = []
-    for name, measure in zip(names, measures, strict=True):
+    for name, measure, ends in zip(names, measures, intervals, strict=True):
         value = float(measure(sides[0].mean(axis=1), sides[1].mean(axis=1)))
-        resampled = np.array([measure(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
-        finite = resampled[np.isfinite(resampled)]
-        if not np.isfinite(value) or not len(finite):
+        if np.isfinite(value):
+            found.append(RankCorrelation(name, value, *ends))
+        else:
             found.append(RankCorrelation(name, None, None, None, "all arms have the same error on one side"))
-            continue
-        low, high = np.quantile(finite, (0.025, 0.975))
-        found.append(RankCorrelation(name, value, float(low), float(high)))
     return found[0], found[1]
 
 
