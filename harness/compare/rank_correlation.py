@@ -67,7 +67,7 @@ def decide_pairs(
     level: float,
     *,
     sides: tuple[str, str] = ("device", "simulation"),
-    unit: str = "clips",
+    unit: str = "units",
 ) -> list[PairAgreement]:
     """Decide on pairs that are tested together, from their numbers of units and the differences of both sides.
 

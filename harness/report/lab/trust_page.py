@@ -115,7 +115,7 @@ def _pairs(found: TrustFindings, drawn: Mapping[str, Chart]) -> Markup:
         row[1] = stacked_cell(verdict_badge(pair.verdict, PAIR_MARKS[pair.verdict]), pair.why, "why")
     table = Table(plain.head[:-1], rows)
     caption = (
-        f"Error of the first method minus that of the second in {metric_title(found.ranked_metric)}, over clips. p is "
+        f"Error of the first method minus that of the second in {metric_title(found.ranked_metric)}, over units. p is "
         "the larger one of the two sides, after Holm's correction for the number of pairs."
     )
     chart = chart_figure(drawn["pairs"]) if "pairs" in drawn else None

@@ -40,7 +40,7 @@ def pairs_table(findings: TrustFindings) -> Table:
         for pair in sort_pairs(findings.pairs)
     ]
     interval = interval_title(findings)
-    head = ["pair", "verdict", "device", interval, "simulation", interval, "p (Holm)", "clips", "because"]
+    head = ["pair", "verdict", "device", interval, "simulation", interval, "p (Holm)", "units", "because"]
     return Table(head, rows, 2)
 
 
@@ -71,7 +71,7 @@ def equivalence_table(findings: TrustFindings) -> Table:
         "difference",
         interval_title(findings),
         "margin",
-        "clips",
+        "units",
     ]
     return Table(head, rows, 3)
 

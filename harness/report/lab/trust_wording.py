@@ -28,7 +28,7 @@ PAIR_MARKS: Mapping[PairVerdict, str] = {"contradict": "✗", "cannot tell": "?"
 """Verdict on a pair -> its mark, in the order of importance to the reader."""
 PAIR_MEANINGS: Mapping[PairVerdict, str] = {
     "contradict": "both sides show a difference, in opposite directions",
-    "cannot tell": "at least one side shows no difference, or there are too few clips",
+    "cannot tell": "at least one side shows no difference, or there are too few units",
     "agree": "both sides show a difference in the same direction",
 }
 EQUIVALENCE_MARKS: Mapping[EquivalenceVerdict, str] = {
@@ -44,6 +44,8 @@ def verdict_sentence(findings: TrustFindings) -> str:
     """The verdict in one sentence."""
     pairs = count_pairs(findings.pairs)
     counted = f"{count_noun(len(findings.pairs), 'pair')} of methods on {count_noun(len(clips(findings)), 'clip')}"
+    if (units := max((pair.clips for pair in findings.pairs), default=0)) < len(clips(findings)):
+        counted += f" ({count_noun(units, 'unit')} of statistics)"
     match findings.outcome:
         case Outcome.PASS:
             return f"The simulation ranks methods as the device does: of {counted}, none contradicts."
