@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import special
 
+from harness.compare.units import Sampling, average_units
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
@@ -62,14 +63,21 @@ class PairedDifference:
         )
 
 
-def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> PairedDifference:
+def compare_paired(
+    a: Mapping[str, float | None], b: Mapping[str, float | None], sampling: Sampling | None = None
+) -> PairedDifference:
     """Compare errors by unit; a unit that either side lacks (or has None for) is left out.
+
+    With `sampling` the errors are by clip, and the differences of the clips of a unit are averaged.
 
     All units must be of one kind: never put known and new performers, or two splits, into one mapping. BadInput for a
     number that is not finite.
     """
     units = tuple(sorted(unit for unit in a if a[unit] is not None and b.get(unit) is not None))
     difference = np.array([a[unit] for unit in units], float) - np.array([b[unit] for unit in units], float)
+    if sampling is not None:
+        averaged = average_units(dict(zip(units, difference.tolist(), strict=True)), sampling)
+        units, difference = tuple(averaged), np.array(list(averaged.values()))
     if not np.isfinite(difference).all():
         wrong = units[int(np.flatnonzero(~np.isfinite(difference))[0])]
         raise BadInput(f"The errors on {wrong} are not finite.", "Use None for what was not measured.")
