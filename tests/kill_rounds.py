@@ -162,7 +162,7 @@ def prepared_work(folder: Path, *, device: bool = False) -> Iterator[Work]:
     if not device:
         yield work
         return
-    command = [sys.executable, "-m", "harness", "emulate", "short.toml", "--tcp", "127.0.0.1:0", "--no-faults"]
+    command = [sys.executable, "-m", "harness", "emulate", "short.toml", "--tcp", "127.0.0.1:0"]
     with _environment() as environment:
         program = subprocess.Popen(
             command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

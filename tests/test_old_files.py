@@ -179,7 +179,7 @@ def test_a_constellation(old: Path) -> None:
 
 
 def test_a_paper(old: Path) -> None:
-    assert read_findings(Path("paper/findings.json")).experiments[0].claims[0].difference == -1.114648837550544
+    assert read_findings(Path("paper/findings.json")).experiments[0].claims[0].value == -1.114648837550544
     errors = {cell.method: cell.metrics["mpjpe_mm"] for cell in load_results("paper/bouts").cells}
     assert errors == {
         "mean_pose": pytest.approx(94.265458, abs=1e-5),

@@ -212,7 +212,7 @@ def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
 
 
 def test_the_results_format_names_every_column(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "results-format.md").read_text(encoding="utf-8")
+    text = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("results-format.md", "metrics.md"))
     out = tmp_path / "run"
     assert (
         main(["run", str(short_demo(tmp_path / "demo")), "--methods", "mean_pose", "--no-report", "--out", str(out)])

@@ -1,5 +1,6 @@
-"""Draw the moving picture of README.md from a run: python docs/first_minute/render.py results/demo
+"""Draw the moving picture of README.md from a run: python docs/first_minute/render.py RUN
 
+The clip must last eight seconds: set `longest_s = 8.0` in a copy of scenarios/demo.toml and run it with `--methods ik`.
 Eight seconds of one clip: the stations alone, then the true body, then the estimate of a method, coloured by its error.
 """
 
@@ -36,7 +37,7 @@ CAPTIONS = (
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("run", help="folder of a run on the motion generator, such as results/demo")
+    parser.add_argument("run", help="folder of a run on the motion generator with clips of 8 s")
     parser.add_argument("--method", default="ik")
     parser.add_argument("--clip", default="boxing", help="first clip whose name begins so")
     parser.add_argument("--from", dest="start_s", type=float, default=0.0)

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special, stats
 
-from harness.bench.rows import BenchmarkRow
 from harness.compare.paired_statistics import CONFIDENCE_LEVEL, mean_interval
 from harness.compare.significance import SIGNIFICANCE, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
 UNITS = (6, 8, 12, 15, 24, 32)
 STUDIES = 400
@@ -119,24 +119,23 @@ def earlier_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[f
     return float(found.low), float(found.high)
 
 
-def coverage_rows(seed: int, studies: int = STUDIES, units: Iterable[int] = UNITS) -> list[BenchmarkRow]:
+def coverage_rows(seed: int, studies: int = STUDIES, units: Iterable[int] = UNITS) -> list[BenchmarkStatement]:
     """For each world and number of units: coverage, answers, false alarms, and false claims of equivalence."""
     rows = []
     for world in WORLDS:
         for count in units:
             ours = measure_coverage(world, count, studies, seed, mean_interval)
             earlier = measure_coverage(world, count, studies, seed, earlier_interval)
-            targets = ("", "", "", "")
-            if count >= ENOUGH:
-                targets = (">= 92", ">= 95" if world.bound(count) > 0.95 else "", "<= 5", "")
-            shares = [
-                ("intervals that contain the mean", ours.contained, earlier.contained),
-                ("studies that answer", ours.answered, earlier.answered),
-                ("called worse, equal sides", ours.alarms, earlier.alarms),
-                ("called equivalent at the margin", ours.equivalent, earlier.equivalent),
+            answers = (95.0, None) if world.bound(count) > 0.95 else (None, None)
+            shares: list[tuple[str, float, float, tuple[float | None, float | None]]] = [
+                ("intervals that contain the mean", ours.contained, earlier.contained, (92.0, None)),
+                ("studies that answer", ours.answered, earlier.answered, answers),
+                ("called worse, equal sides", ours.alarms, earlier.alarms, (None, 5.0)),
+                ("called equivalent at the margin", ours.equivalent, earlier.equivalent, (None, None)),
             ]
-            for (name, share, before), target in zip(shares, targets, strict=True):
+            for name, share, before, limit in shares:
                 bound = f"; at most {world.bound(count):.1%} of samples differ" if world.bound(count) < 0.999 else ""
                 reference = f"earlier version {before:.1%}; {studies} studies{bound}"
-                rows.append(BenchmarkRow(f"{world.name}, {count} units: {name}", 100.0 * share, "%", reference, target))
+                title, held = f"{world.name}, {count} units: {name}", limit if count >= ENOUGH else (None, None)
+                rows.append(hold_to_limit(title, 100.0 * share, "%", least=held[0], most=held[1], reference=reference))
     return rows

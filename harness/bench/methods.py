@@ -6,8 +6,8 @@ of its own for each method (`peak_memory`).
 """
 
 import hashlib
+import math
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from harness.bench import neighbour_search
+from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
 from harness.bench.peak_memory import NO_METHOD, measure_peak_bytes
-from harness.bench.rows import BenchmarkRow
 from harness.body import humanoid
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -46,10 +46,11 @@ from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.expert_map import FEATURES, ExpertMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.frame import TrackerFrame
 
-TARGET_FPS = {"expert_map": 2000, "dynamic_map": 2000, "local_pca": 2000, "kernel_cca": 4000, "weighted_blend": 5000}
-"""Frames per second on one core that each method must reach, including its final inverse kinematics."""
+MIN_SPEED_RATIO = {"expert_map": 0.1, "dynamic_map": 0.1, "local_pca": 0.1, "kernel_cca": 0.2, "weighted_blend": 0.25}
+"""Least speed of each method with its final inverse kinematics, relative to that of `ik` in the same turns."""
 UNTARGETED_METHODS = ("kernel_ridge", "ik")
 FRAMES, LARGE_FRAMES = 66_000, 1_000_000
 CLIP_S = 9.0
@@ -57,15 +58,17 @@ CLIP_S = 9.0
 MINK = "mink"
 WORKERS = 2
 MAX_P99_RATIO, MAX_MEMORY_RATIO, MAX_LARGE_RATIO = 3.0, 1.5, 1.3
-MAX_LEARNING_S = 60.0
+MAX_LEARNING_UNITS = 400.0
+"""Most CPU time to learn from a million frames (see `cpu_time`)."""
+MIN_RECALL = 0.95
 _COST_KEYS = ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio", "large_learning_s")
 """Keys of the rows of a method's other costs in the JSON output, in their order."""
 
 
-def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkRow]:
+def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkStatement]:
     """Rows of each method; with `large`, also with a database of a million frames."""
-    costs: dict[str, list[BenchmarkRow]] = {name: [] for name in (*TARGET_FPS, *UNTARGETED_METHODS)}
-    recalls: list[BenchmarkRow] = []
+    costs: dict[str, list[BenchmarkStatement]] = {name: [] for name in (*MIN_SPEED_RATIO, *UNTARGETED_METHODS)}
+    recalls: list[BenchmarkStatement] = []
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
         small_path, large_path = Path(folder) / "small", Path(folder) / "large"
         small = _build_database(small_path, FRAMES, seed)
@@ -74,13 +77,13 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkRow]:
             speeds = measure_speed(tuple(costs), small, clips, seed, references={MINK: _mink_contender}, progress=bar)
         baseline_bytes = measure_peak_bytes(NO_METHOD, small_path, seed)
         with ProgressBar("methods") as bar:
-            for done, name in enumerate(TARGET_FPS):
-                bar(name, done, len(TARGET_FPS))
+            for done, name in enumerate(MIN_SPEED_RATIO):
+                bar(name, done, len(MIN_SPEED_RATIO))
                 peak_bytes = measure_peak_bytes(name, small_path, seed)
                 costs[name].append(memory_row(name, baseline_bytes, peak_bytes, len(small)))
         if large:
             many = _build_database(large_path, LARGE_FRAMES, seed)
-            for name in TARGET_FPS:
+            for name in MIN_SPEED_RATIO:
                 with ProgressBar(name) as bar:
                     costs[name].append(large_database_row(name, small, many, seed, bar))
                 peak_bytes = measure_peak_bytes(name, large_path, seed)
@@ -97,10 +100,10 @@ def _build_database(folder: Path, frames: int, seed: int) -> MotionDatabase:
         return benchmark_clips.build_database(folder, takes, workers=WORKERS, progress=bar)
 
 
-def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[BenchmarkRow]:
+def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkStatement]) -> list[BenchmarkStatement]:
     """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
     name, options = speed.method, config_hash(registry.resolve(speed.method))
-    target, to_ik, to_mink = TARGET_FPS.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
+    target, to_ik, to_mink = MIN_SPEED_RATIO.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
     more: dict[str, str | float] = {
         "method": name,
         "fps": speed.fps,
@@ -112,17 +115,20 @@ def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[Bench
         "ratio_to_mink": to_mink,
     }
     for cost, key in zip(costs, _COST_KEYS, strict=False):
-        more[key] = cost.value
-    reference = f"error {speed.error_deg:.2f} deg, options {options}; ik x {to_ik:.2f}, mink x {to_mink:.1f}"
-    rows = [BenchmarkRow(name, speed.fps, "frames/s", reference, f">= {target}" if target else "", more)]
+        more[key] = math.nan if cost.value is None else cost.value
+    reference = f"error {speed.error_deg:.2f} deg, options {options}; mink x {to_mink:.1f}"
+    rows = [hold_to_limit(name, speed.fps, "frames/s", reference=reference, more=more)]
     if target:
         text = f"p50 {speed.p50_ms:.3f} ms, p99 {speed.p99_ms:.3f} ms"
-        ratio = speed.p99_ms / speed.p50_ms
-        rows.append(BenchmarkRow(f"{name}, p99 / p50", ratio, "x", text, f"<= {MAX_P99_RATIO:g}"))
+        ratio, doubt = speed.p99_ms / speed.p50_ms, overbooked()
+        rows += [
+            hold_to_limit(f"{name}, speed / ik", to_ik, "x", least=target, reference="the same frames"),
+            hold_to_limit(f"{name}, p99 / p50", ratio, "x", most=MAX_P99_RATIO, reference=text, doubt=doubt),
+        ]
     return rows
 
 
-def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> BenchmarkRow:
+def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> BenchmarkStatement:
     """Memory above that of a process without a method, relative to one float32 copy of poses and query vectors.
 
     The tables of `expert_map` are counted apart.
@@ -133,12 +139,13 @@ def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> 
     text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
     if tables:
         text += f"; beside them {tables / 1e6:.0f} MB of tables"
-    return BenchmarkRow(f"{name}, peak memory, {frames:,} frames", used / needed, "x", text, f"<= {MAX_MEMORY_RATIO:g}")
+    label = f"{name}, peak memory, {frames:,} frames"
+    return hold_to_limit(label, used / needed, "x", most=MAX_MEMORY_RATIO, reference=text)
 
 
 def large_database_row(
     name: str, small: MotionDatabase, large: MotionDatabase, seed: int, progress: ProgressCallback
-) -> BenchmarkRow:
+) -> BenchmarkStatement:
     """Slowdown by a larger database: the method takes turns with itself."""
     contenders = {
         size: time_method(benchmark_clips.fit_named_method(name, database, seed))
@@ -150,19 +157,16 @@ def large_database_row(
         f"{len(large):,} against {len(small):,} frames"
     )
     ratio = timings["small"].speed_ratio(timings["large"])
-    return BenchmarkRow(f"{name}, larger / smaller database", ratio, "x", text, f"<= {MAX_LARGE_RATIO:g}")
+    return hold_to_limit(f"{name}, larger / smaller database", ratio, "x", most=MAX_LARGE_RATIO, reference=text)
 
 
-def learning_row(name: str, database: MotionDatabase, seed: int) -> BenchmarkRow:
-    """Time to learn from a database that lies on the disk."""
-    start_s, start_cpu_s = time.perf_counter(), time.process_time()
-    benchmark_clips.fit_named_method(name, database, seed)
-    wall_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s
-    label = f"{name}, learning from {len(database):,} frames"
-    return BenchmarkRow(label, wall_s, "s", f"{cpu_s:.1f} s CPU", f"<= {MAX_LEARNING_S:g}")
+def learning_row(name: str, database: MotionDatabase, seed: int) -> BenchmarkStatement:
+    """CPU time to learn from a database that lies on the disk."""
+    cpu_s = time_cpu(lambda: benchmark_clips.fit_named_method(name, database, seed))
+    return hold_cpu_to_limit(f"{name}, learning from {len(database):,} frames", cpu_s, MAX_LEARNING_UNITS)
 
 
-def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[BenchmarkRow]:
+def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[BenchmarkStatement]:
     """Share of the true neighbours that each method's index finds, measured on every `every`th query."""
     held_out = benchmark_clips.generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
     rows = []
@@ -177,7 +181,7 @@ def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[Ben
             true, approximate = (set(i.nearest(query, search.count)[0].tolist()) for i in (exact, index))
             shares.append(len(true & approximate) / len(true))
         label = f"recall@{search.count}, {search.name}, {len(search.vectors):,} frames"
-        rows.append(BenchmarkRow(label, float(np.mean(shares)), "", "exact search", ">= 0.95"))
+        rows.append(hold_to_limit(label, float(np.mean(shares)), least=MIN_RECALL, reference="exact search"))
     return rows
 
 

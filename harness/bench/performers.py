@@ -17,7 +17,6 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
-from harness.bench.rows import BenchmarkRow
 from harness.body.retargeting import retarget_to_common_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
@@ -37,6 +36,7 @@ from harness.mocap.sources import (
     open_motion_source,
 )
 from harness.reconstruct import registry
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
 METHOD = "local_pca"
 BLOCK_S, MOST_BLOCKS, MOST_TAKES = 2.0, 6, 3
@@ -96,7 +96,7 @@ class Spread:
         return f"{middle:.1f} ({low:.1f} to {high:.1f}) between, {np.exp(self.within):.1f} within"
 
 
-def bench_performers(seed: int = 1, performers: Sequence[str] = STYLED) -> list[BenchmarkRow]:
+def bench_performers(seed: int = 1, performers: Sequence[str] = STYLED) -> list[BenchmarkStatement]:
     """Spreads of built-in performers relative to CMU's; NoLibrary without a library of real motion."""
     if not folders_of_environment():
         raise NoLibrary(
@@ -115,7 +115,7 @@ def bench_performers(seed: int = 1, performers: Sequence[str] = STYLED) -> list[
             if alike := [side for side, found in (("built-in", own), ("CMU's", cmu)) if found.is_lost]:
                 within = f"{np.exp(own.within):.1f} and {np.exp(cmu.within):.1f} deg within"
                 text = f"{' and '.join(alike)} performers differ by less than their own blocks show; {within}"
-                rows.append(BenchmarkRow(f"{behaviour}, {name}, not measurable", 0.0, "", text, ""))
+                rows.append(hold_to_limit(f"{behaviour}, {name}, built-in / CMU", np.nan, reference=text))
                 continue
             width = float(special.stdtrit(cmu.count - 1, 0.975)) * np.hypot(own.error, cmu.error)
             ratio, low, high = np.exp(own.between - cmu.between + np.array([0.0, -width, width]))
@@ -123,14 +123,14 @@ def bench_performers(seed: int = 1, performers: Sequence[str] = STYLED) -> list[
                 f"{low:.2f} to {high:.2f}; {own.count} performers: {own.text()}; {cmu.count} of CMU: {cmu.text()}; "
                 f"p1 to p8: {np.exp(reference.between):.1f} between"
             )
-            rows.append(BenchmarkRow(f"{behaviour}, {name}, built-in / CMU", float(ratio), "", found, ""))
+            rows.append(hold_to_limit(f"{behaviour}, {name}, built-in / CMU", float(ratio), reference=found))
         groups = [list(styled)[at : at + len(real)] for at in range(0, len(styled) - len(real) + 1, len(real))]
         ours = [_new_to_known(built_in, {who: styled[who] for who in group}, behaviour, seed) for group in groups[:2]]
         for title, logs in (("built-in", np.concatenate(ours)), ("CMU", _new_to_known(library, real, behaviour, seed))):
             width = float(special.stdtrit(len(logs) - 1, 0.975)) * float(np.std(logs, ddof=1)) / np.sqrt(len(logs))
             middle, low, high = np.exp(logs.mean() + np.array([0.0, -width, width]))
             found = f"{low:.2f} to {high:.2f}, {len(logs)} performers, {METHOD}"
-            rows.append(BenchmarkRow(f"{behaviour}, error if new / if known, {title}", float(middle), "", found, ""))
+            rows.append(hold_to_limit(f"{behaviour}, error if new / if known, {title}", float(middle), reference=found))
     return rows
 
 

@@ -15,12 +15,12 @@ from scipy import special
 
 from harness.bench.interval_coverage import coverage_rows, earlier_interval
 from harness.bench.null_errors import METRICS, ErrorPopulation, load_population
-from harness.bench.rows import BenchmarkRow
 from harness.compare.margins import margin_of
 from harness.compare.paired_statistics import CONFIDENCE_LEVEL, mean_interval
 from harness.compare.significance import SIGNIFICANCE, decide_verdicts, holm, sign_flip_p
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
 COMPARISONS, CHANGED_COMPARISONS, COVERAGE_COMPARISONS = 1000, 200, 100
 RELATIVE_CHANGE = 0.03
@@ -140,7 +140,7 @@ def lower_confidence_rate(count: int, of: int) -> float:
     return 1.0 - upper_confidence_rate(of - count, of)
 
 
-def bench_regression_gate(seed: int = 1) -> list[BenchmarkRow]:
+def bench_regression_gate(seed: int = 1) -> list[BenchmarkStatement]:
     """Rates of false alarms and detections, and the coverage of the intervals."""
     settings, draws = load_population("settings"), load_population("draws")
     rows = [
@@ -157,31 +157,28 @@ def bench_regression_gate(seed: int = 1) -> list[BenchmarkRow]:
     ]
     for clips in (24, 12):
         share = 100.0 * share_called_same(settings, clips, COVERAGE_COMPARISONS, seed)
-        reference = f"{COVERAGE_COMPARISONS} studies"
-        rows.append(BenchmarkRow(f"equally good sides called the same, {clips} clips", share, "%", reference, ""))
+        name, reference = f"equally good sides called the same, {clips} clips", f"{COVERAGE_COMPARISONS} studies"
+        rows.append(hold_to_limit(name, share, "%", reference=reference))
     for clips in (24, 12, 8):
         share = 100.0 * interval_coverage(settings, clips, COVERAGE_COMPARISONS, seed)
         reference = f"nominally 95; {COVERAGE_COMPARISONS} studies of {len(METRICS) * len(settings.methods)} lines"
-        rows.append(
-            BenchmarkRow(
-                f"intervals that contain the mean of all stored clips, {clips} clips", share, "%", reference, ""
-            )
-        )
+        name = f"intervals that contain the mean of all stored clips, {clips} clips"
+        rows.append(hold_to_limit(name, share, "%", reference=reference))
     return [*rows, *coverage_rows(seed)]
 
 
 def _false_alarm_row(
     name: str, population: ErrorPopulation, clips: int, seed: int, draw: Resampler = exchanged, margin: float = 1.0
-) -> BenchmarkRow:
+) -> BenchmarkStatement:
     count = count_false_alarms(population, clips, COMPARISONS, seed, draw, margin)
     limit = 100.0 * upper_confidence_rate(count, COMPARISONS)
     reference = f"{count} of {COMPARISONS} studies, at most {limit:.1f} % with 95 % confidence"
-    return BenchmarkRow(name, 100.0 * count / COMPARISONS, "%", reference, "<= 5")
+    return hold_to_limit(name, 100.0 * count / COMPARISONS, "%", most=5.0, reference=reference)
 
 
 def _detection_row(
     name: str, population: ErrorPopulation, clips: int, seed: int, *, gated: bool = False
-) -> BenchmarkRow:
+) -> BenchmarkStatement:
     detected = detect_changes(population, clips, CHANGED_COMPARISONS, seed)
     earlier = detect_changes(population, clips, CHANGED_COMPARISONS, seed, interval=earlier_interval)
     share_by_metric = {metric: float(detected[k :: len(METRICS)].mean()) for k, metric in enumerate(METRICS)}
@@ -190,4 +187,5 @@ def _detection_row(
     limit = 100.0 * lower_confidence_rate(count, CHANGED_COMPARISONS)
     reference = f"{count} of {CHANGED_COMPARISONS} studies, at least {limit:.0f} % with 95 % confidence; {by_metric}; "
     reference += f"earlier version {earlier.mean():.1%}"
-    return BenchmarkRow(name, 100.0 * count / CHANGED_COMPARISONS, "%", reference, ">= 90" if gated else "")
+    share, least = 100.0 * count / CHANGED_COMPARISONS, 90.0 if gated else None
+    return hold_to_limit(name, share, "%", least=least, reference=reference)

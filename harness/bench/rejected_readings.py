@@ -4,15 +4,16 @@ All methods learn from one database and follow held-out takes, under the conditi
 an outlier there, so every rejection is an error.
 """
 
+import math
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from harness.bench.rows import BenchmarkRow
 from harness.core.calibration import Calibration
 from harness.experiment import benchmark_clips
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.reconstruct.solver.outlier_gate import OutlierGate
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.frame import TrackerFrame
 
 GATED_METHODS = (
@@ -24,7 +25,7 @@ FRAMES, CLIP_S = 16_000, 20.0
 """Frames of the database, and length of every held-out take [s]."""
 
 
-def bench_rejected_readings(seed: int = 1, frames: int = FRAMES, clip_s: float = CLIP_S) -> list[BenchmarkRow]:
+def bench_rejected_readings(seed: int = 1, frames: int = FRAMES, clip_s: float = CLIP_S) -> list[BenchmarkStatement]:
     """The share of rejected positions of each method."""
     rows = []
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
@@ -35,9 +36,9 @@ def bench_rejected_readings(seed: int = 1, frames: int = FRAMES, clip_s: float =
             fitted = benchmark_clips.fit_named_method(name, database, seed)
             counts = [count_rejected(fitted, clip.simulation.calibration, clip.simulation.frames) for clip in clips]
             readings, rejected = (sum(column) for column in zip(*counts, strict=True))
-            target = f"< {MAX_REJECTED_SHARE:g}"
+            name, share = f"{name}, rejected true readings", rejected / readings if readings else math.nan
             found = f"{rejected} of {readings} true readings"
-            rows.append(BenchmarkRow(f"{name}, rejected true readings", rejected / readings, "", found, target))
+            rows.append(hold_to_limit(name, share, most=MAX_REJECTED_SHARE, reference=found))
     return rows
 
 

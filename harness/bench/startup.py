@@ -7,7 +7,7 @@ NUMBA_CACHE_DIR names, which is empty for the cold run here and filled for the w
 import os
 import subprocess
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,13 +15,18 @@ from threading import Thread
 
 import numpy as np
 
-from harness.bench.rows import BenchmarkRow
+from harness.bench.cpu_time import hold_cpu_to_limit, process_times
 from harness.core.python_process import python_command, python_environment
 from harness.errors import HarnessError
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
 _POLL_INTERVAL_S = 0.05
-_FIRST_LINE_S, _FIRST_RESULT_S, _REPORT_S = 2.0, 20.0, 60.0
-"""Targets of the cold demo [s]."""
+MAX_HELP_RATIO = 15.0
+"""Most CPU time of the help, relative to that of an interpreter that does nothing."""
+MAX_COLD_RATIO = 2.0
+"""Most CPU time of the demo that compiles, relative to one that finds the machine code."""
+MAX_LINE_RATIO, MAX_RESULT_SHARE = 6.0, 1.0 / 3.0
+"""Most time until the first line, relative to the help, and until the first result, relative to the report."""
 
 
 @dataclass(frozen=True)
@@ -38,30 +43,39 @@ class DemoTimes:
     """CPU time of the command and its workers."""
 
 
-def bench_startup(repeats: int = 7) -> list[BenchmarkRow]:
+def bench_startup(repeats: int = 7) -> list[BenchmarkStatement]:
     """The help beside a bare interpreter, in medians of interleaved runs, and one cold and one warm demo."""
     bare = python_command("-c", "pass")
     help_text = python_command("-m", "harness.cli", "--help")
-    seconds = np.array([[_time_command(bare), _time_command(help_text)] for _ in range(repeats)])
-    bare_s, help_s = np.median(seconds, axis=0)
-    rows = [
-        BenchmarkRow("harness --help", float(help_s), "s", f"bare interpreter {bare_s:.3f} s", "< 0.3"),
-        BenchmarkRow("harness --help / bare interpreter", float(help_s / bare_s), "x", "the same runs", ""),
-    ]
+    times = np.array([[_time_command(bare), _time_command(help_text)] for _ in range(repeats)])
+    (bare_s, bare_cpu_s), (help_s, help_cpu_s) = np.median(times, axis=0).tolist()
+    reference = f"bare interpreter {bare_s:.3f} s"
+    rows = [hold_to_limit("harness --help", help_s, "s", reference=reference)]
+    reference = f"{help_cpu_s:.3f} and {bare_cpu_s:.3f} s"
+    name = "harness --help / bare interpreter: CPU time"
+    rows.append(hold_to_limit(name, help_cpu_s / bare_cpu_s, "x", most=MAX_HELP_RATIO, reference=reference))
     with TemporaryDirectory(prefix="harness-startup-") as folder:
         cold, warm = (time_demo(Path(folder) / name, Path(folder) / "machine code") for name in ("cold", "warm"))
-    for name, target, read in _QUANTITIES:
-        limit = f"<= {target:g}" if target else ""
-        rows.append(BenchmarkRow(f"demo, cold: {name}", read(cold), "s", f"warm {read(warm):.1f} s", limit))
-    return rows
+    return [*rows, *demo_rows(cold, warm, help_s)]
 
 
-_QUANTITIES: tuple[tuple[str, float, Callable[[DemoTimes], float]], ...] = (
-    ("first line", _FIRST_LINE_S, lambda times: times.first_line_s),
-    ("first result", _FIRST_RESULT_S, lambda times: times.first_result_s),
-    ("report", _REPORT_S, lambda times: times.report_s),
-    ("CPU time of all processes", 0.0, lambda times: times.cpu_s),
-)
+def demo_rows(cold: DemoTimes, warm: DemoTimes, help_s: float) -> list[BenchmarkStatement]:
+    """The rows of a demo that compiles and of one after it, beside the time of the help [s]."""
+    steps = {
+        "first line": (cold.first_line_s, warm.first_line_s),
+        "first result": (cold.first_result_s, warm.first_result_s),
+        "report": (cold.report_s, warm.report_s),
+    }
+    wall = [hold_to_limit(f"demo, cold: {name}", a, "s", reference=f"warm {b:.1f} s") for name, (a, b) in steps.items()]
+    limits = [
+        ("demo, cold: first line / harness --help", cold.first_line_s, help_s, MAX_LINE_RATIO),
+        ("demo, cold: first result / report", cold.first_result_s, cold.report_s, MAX_RESULT_SHARE),
+        ("demo, cold / warm: CPU time of all processes", cold.cpu_s, warm.cpu_s, MAX_COLD_RATIO),
+    ]
+    ratios = [
+        hold_to_limit(name, a / b, "x", most=most, reference=f"{a:.1f} and {b:.1f} s") for name, a, b, most in limits
+    ]
+    return [*wall, *ratios, hold_cpu_to_limit("demo, warm, all processes", warm.cpu_s, None)]
 
 
 def time_demo(out: Path, machine_code: Path, *options: str) -> DemoTimes:
@@ -99,7 +113,8 @@ def time_demo(out: Path, machine_code: Path, *options: str) -> DemoTimes:
     return DemoTimes(line_s, result_s, time.perf_counter() - start, used.ru_utime + used.ru_stime)
 
 
-def _time_command(command: list[str]) -> float:
-    start = time.perf_counter()
+def _time_command(command: list[str]) -> list[float]:
+    """Wall time and CPU time of a command [s]."""
+    start = process_times()
     subprocess.run(command, env=python_environment(), check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start
+    return list((process_times() - start).tolist())

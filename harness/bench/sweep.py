@@ -8,10 +8,8 @@ each with a folder of links to the files of a real cell.
 import csv
 import json
 import os
-import resource
 import shutil
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.bench.rows import BenchmarkRow
+from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, process_times
 from harness.core.arrays import Floats
 from harness.core.child_process import run_python
 from harness.core.split import ClipPart
@@ -27,12 +25,17 @@ from harness.experiment.cells import ClipTask, evaluate_cell, open_scenario_moti
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.reconstruct import registry
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.results.index import CellIndex
 from harness.results.table import TIME_COLUMNS, compute_group_statistics, write_table
 
 MANY_CELLS = 100_000
 SMALL_SWEEP, TINY_SWEEP = 200, 20
 """Cells of the two sweeps whose difference gives the overhead; both write a report page."""
+MAX_OVERHEAD_UNITS, MAX_FOLDER_UNITS = 0.07, 70.0
+"""Most CPU time of a cell beside its evaluation, and of a look at the large folder (see `cpu_time`)."""
+MIN_GAIN = 1.8
+"""Least speed-up by a second job."""
 REPEATS = 3
 """Number of repeats; the shortest time counts, since other load only adds to it."""
 CLIPS = ("walking_p1_01", "boxing_p11_01", "jumping_p14_01", "golf_p16_01")
@@ -48,7 +51,7 @@ components.echo.share = {[0.01 * n for n in range(16)]}
 """The sweep for one and two workers: two minutes for one, so that start-up and report page hardly count."""
 
 
-def bench_sweep(seed: int = 1, *, cells: int = SMALL_SWEEP, many: int = MANY_CELLS) -> list[BenchmarkRow]:
+def bench_sweep(seed: int = 1, *, cells: int = SMALL_SWEEP, many: int = MANY_CELLS) -> list[BenchmarkStatement]:
     """Measure overhead, parallel speed-up and the reading of large folders."""
     with tempfile.TemporaryDirectory(prefix="harness-sweep-") as folder:
         return [
@@ -58,7 +61,7 @@ def bench_sweep(seed: int = 1, *, cells: int = SMALL_SWEEP, many: int = MANY_CEL
         ]
 
 
-def _overhead_rows(folder: Path, seed: int, cells: int) -> list[BenchmarkRow]:
+def _overhead_rows(folder: Path, seed: int, cells: int) -> list[BenchmarkStatement]:
     """Overhead of a cell: difference of a large and a small sweep, minus the evaluation itself."""
     small, large = _write_sweep(folder, TINY_SWEEP), _write_sweep(folder, cells)
     scenario = replace(_small_scenario(cells), seed=seed)
@@ -73,12 +76,12 @@ def _overhead_rows(folder: Path, seed: int, cells: int) -> list[BenchmarkRow]:
     each_ms = 1e3 * ((shortest["all"] - shortest["few"]) / extra - shortest["evaluated"])
     again_ms = 1e3 * (_time_sweep(large, folder / "all-0", seed) - shortest["again"]) / extra
     evaluated_ms, (few_s, _) = 1e3 * shortest["evaluated"][0], shortest["few"]
-    reference = (
-        f"{each_ms[1]:.1f} ms of it CPU; {evaluated_ms:.0f} ms to evaluate a cell, {few_s:.1f} s for {TINY_SWEEP} cells"
-    )
+    reference = f"{evaluated_ms:.0f} ms to evaluate a cell, {few_s:.1f} s for {TINY_SWEEP} cells"
+    name = "overhead of a sweep, for each cell"
     return [
-        BenchmarkRow("overhead of a sweep, for each cell", float(each_ms[0]), "ms", reference, "<= 10"),
-        BenchmarkRow("resuming a sweep, for each finished cell", float(again_ms[0]), "ms", f"{cells} cells", ""),
+        hold_to_limit(name, float(each_ms[0]), "ms", reference=reference),
+        hold_cpu_to_limit(name, 1e-3 * float(each_ms[1]), MAX_OVERHEAD_UNITS),
+        hold_to_limit("resuming a sweep, for each finished cell", float(again_ms[0]), "ms", reference=f"{cells} cells"),
     ]
 
 
@@ -106,7 +109,7 @@ def _small_scenario(cells: int) -> Scenario:
 def _time_scoring(scenario: Scenario) -> Floats:
     """Time to evaluate all cells but the first, which also makes what they share; as in `_time_call`."""
     task = ClipTask(scenario, ClipPart.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
-    method, evaluation, start = registry.resolve(scenario.methods[0]), None, _process_times()
+    method, evaluation, start = registry.resolve(scenario.methods[0]), None, process_times()
     for index, cell in enumerate(task.cells()):
         if evaluation is None:
             source = open_scenario_motion(cell.scenario.motion, None, scenario.seed)
@@ -114,21 +117,23 @@ def _time_scoring(scenario: Scenario) -> Floats:
         evaluation = evaluation.with_conditions(cell.scenario) or evaluation
         evaluate_cell(evaluation, method, cell, "key", "")
         if index == 0:
-            start = _process_times()
-    return _process_times() - start
+            start = process_times()
+    taken: Floats = process_times() - start
+    return taken
 
 
-def _parallel_rows(folder: Path, seed: int) -> list[BenchmarkRow]:
+def _parallel_rows(folder: Path, seed: int) -> list[BenchmarkStatement]:
     """Run the same sweep with one and two workers."""
     sweep = folder / "shared.toml"
     sweep.write_text(PARALLEL_SWEEP)
     one, two = (float(_time_sweep(sweep, folder / f"jobs-{jobs}", seed, jobs)[0]) for jobs in (1, 2))
     differing = _count_differing_lines(folder / "jobs-1" / "summary.csv", folder / "jobs-2" / "summary.csv")
+    reference = f"{one:.1f} s with one, on {os.cpu_count()} cores"
+    doubt = "there is one core only" if os.cpu_count() == 1 else overbooked()
+    name = "lines of the table that differ between them"
     return [
-        BenchmarkRow(
-            "speed-up by a second job", one / two, "x", f"{one:.1f} s with one, on {os.cpu_count()} cores", ">= 1.8"
-        ),
-        BenchmarkRow("lines of the table that differ between them", float(differing), "", "without times", "0"),
+        hold_to_limit("speed-up by a second job", one / two, "x", least=MIN_GAIN, reference=reference, doubt=doubt),
+        hold_to_limit(name, float(differing), most=0.0, reference="without times"),
     ]
 
 
@@ -143,7 +148,7 @@ def _untimed_lines(table: Path) -> Iterator[Mapping[str, str]]:
             yield {name: text for name, text in line.items() if name not in TIME_COLUMNS}
 
 
-def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
+def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkStatement]:
     """Time for status, table with summary, and report page of a folder with many cells."""
     out = folder / "many"
     _fabricate_cells(folder / "jobs-1", out, count)
@@ -155,8 +160,8 @@ def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
     rows = []
     for name, call in work.items():
         wall_s, cpu_s = _time_call(call).tolist()
-        reference = f"{cpu_s:.1f} s CPU; rows of a real sweep, each with a folder of linked files"
-        rows.append(BenchmarkRow(f"{count:,} finished cells: {name}", wall_s, "s", reference, "<= 10"))
+        reference = f"{wall_s:.1f} s; rows of a real sweep, each with a folder of linked files"
+        rows.append(hold_cpu_to_limit(f"{count:,} finished cells: {name}", cpu_s, MAX_FOLDER_UNITS, reference))
     return rows
 
 
@@ -201,11 +206,7 @@ def _time_sweep(sweep: Path, out: Path, seed: int, jobs: int = 1) -> Floats:
 
 def _time_call(work: Callable[[], Any]) -> Floats:
     """(2,) wall time, and CPU time of this process and its finished children [s]."""
-    start = _process_times()
+    start = process_times()
     work()
-    return _process_times() - start
-
-
-def _process_times() -> Floats:
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return np.array([time.perf_counter(), time.process_time() + children.ru_utime + children.ru_stime])
+    taken: Floats = process_times() - start
+    return taken

@@ -58,23 +58,15 @@ class CalibrationFile:
 
     def select(self, stations: Sequence[str]) -> "CalibrationFile":
         """A copy with these stations only, in this order; BadInput names the first that is missing."""
-        calibration = self.calibration
+        known = self.calibration.stations
         for name in stations:
-            if name not in calibration.stations:
+            if name not in known:
                 raise BadInput(
-                    f"Station {name!r} is not in the calibration, which has {', '.join(calibration.stations)}; "
+                    f"Station {name!r} is not in the calibration, which has {', '.join(known)}; "
                     f"worn are {', '.join(stations)}.",
                     "Wear the calibrated stations, use the names they had then, or calibrate again.",
                 )
-        rows = [calibration.stations.index(name) for name in stations]
-        chosen = replace(
-            calibration,
-            stations=tuple(stations),
-            bones=tuple(calibration.bones[row] for row in rows),
-            mount_m=calibration.mount_m[rows],
-            bone_from_station=calibration.bone_from_station[rows],
-        )
-        return replace(self, calibration=chosen)
+        return replace(self, calibration=self.calibration.of_stations(stations))
 
 
 @dataclass(frozen=True)

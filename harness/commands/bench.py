@@ -2,9 +2,10 @@
 
 import argparse
 import sys
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
     Verbs,
@@ -17,6 +18,9 @@ from harness.commands.common import (
 )
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.results.benchmark_statement import BenchmarkStatement
 
 ACCURACY = "accuracy"
 """Name of the benchmark of accuracy, which runs alone."""
@@ -31,13 +35,13 @@ def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
     text = (
-        "methods, ik, index, wire, serve, view, stream, physics, lab, load, gate, sweep, startup, performers "
+        "methods, ik, index, outliers, wire, stream, physics, lab, gate, sweep, startup, performers "
         "(default: all); accuracy; or ranking: do methods and places rank alike on built-in and real motion?"
     )
     verb.add_argument("what", nargs="*", help=text)
     text = "methods: also a database of a million frames; wire: ten minutes per line"
     verb.add_argument("--large", action="store_true", help=text)
-    verb.add_argument("--runs", type=positive_int, metavar="N", help="wire, serve, view: number of runs (default 1)")
+    verb.add_argument("--runs", type=positive_int, metavar="N", help="wire: number of runs (default 1)")
     text = (
         "instead of speed: physics holds the simulated errors to published figures and writes a page; lab looks for "
         "planted faults in captures, and goes on after a stop"
@@ -55,7 +59,7 @@ def add_bench(verbs: Verbs) -> None:
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
     verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")
-    text = "accuracy: one seed, three clips, no verdict; ranking: two performers, three methods and sets"
+    text = "accuracy: one seed, three clips, no verdict (exit code 3); ranking: two performers, three methods and sets"
     verb.add_argument("--quick", action="store_true", default=None, help=text)
 
 
@@ -68,32 +72,48 @@ def run_bench(args: argparse.Namespace) -> Outcome:
         return _bench_ranking(args)
     if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
         raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
-    if args.runs and args.what and not {"wire", "serve", "view"} & set(args.what):
-        raise BadInput("--runs is for wire, serve and view alone.", "Name it: harness bench wire --runs 10.")
+    if args.runs and args.what and "wire" not in args.what:
+        raise BadInput("--runs is for wire alone.", "Name it: harness bench wire --runs 10.")
     return _bench_speed(args)
 
 
 def _bench_speed(args: argparse.Namespace) -> Outcome:
     from harness.bench.benchmarks import run_benchmarks
-    from harness.bench.rows import format_rows
 
     with ProgressBar("benchmarks") as progress:
         seed = args.seed if args.seed is not None else 1
         names, runs = tuple(args.what), args.runs or 1
         rows, left_out = run_benchmarks(names, seed=seed, large=args.large, runs=runs, progress=progress)
-    content = {"rows": [row.as_dict() for row in rows], "left_out": left_out}
-    return print_result(
-        args, content, format_rows(rows), *left_out, outcome=Outcome.INCOMPLETE if left_out else Outcome.PASS
-    )
+    return _print_statements(args, rows, {"left_out": left_out}, left_out)
+
+
+def _print_statements(
+    args: argparse.Namespace,
+    rows: "Sequence[BenchmarkStatement]",
+    content: Mapping[str, Any],
+    lines: Sequence[str] = (),
+    reference: str = "reference, in the same run",
+) -> Outcome:
+    """Print the table of statements, then other lines, then the number of missed targets.
+
+    The outcome is REGRESSED where a target is missed. Where none is, it is INCOMPLETE where benchmarks were left out.
+    """
+    from harness.report.kit.statement_lines import statement_lines
+    from harness.results.benchmark_statement import count_missed, outcome_of
+
+    content, outcome = {"rows": [row.as_dict() for row in rows], **content}, outcome_of(rows)
+    if content.get("left_out") and outcome is not Outcome.REGRESSED:
+        outcome = Outcome.INCOMPLETE
+    table = statement_lines(rows, reference=reference) if rows else []
+    return print_result(args, content, *table, *lines, count_missed(rows), outcome=outcome)
 
 
 def _bench_truth(args: argparse.Namespace) -> Outcome:
-    """Print the truth table of the physics and write its page; a row that is missed is no error."""
+    """Print the truth table of the physics and write its page."""
     from harness.bench.physics.comparison import compare_error_models
     from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
     from harness.bench.physics.truth import SEEDS, truth_rows
     from harness.report.physics.error_comparison import ErrorModelComparison
-    from harness.report.physics.truth_table import result_sentence, truth_lines
     from harness.report.physics.writer import write_physics_page
 
     if args.what != ["physics"]:
@@ -105,22 +125,18 @@ def _bench_truth(args: argparse.Namespace) -> Outcome:
     comparison = ErrorModelComparison(models, tuple(rows), this_command(), LIMIT_M, MERGE_S, SEGMENT_S)
     with show_steps("parts of the report"):
         page = write_physics_page(out / "report.html", comparison)
-    content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "page": str(page)}
-    lines = [*truth_lines(rows), result_sentence("the physical simulation", rows), f"report: {page}"]
-    return print_result(args, content, *lines)
+    return _print_statements(args, rows, {"seeds": len(seeds), "page": str(page)}, [f"report: {page}"], "published")
 
 
 def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
-    """Print the truth table of the lab's verbs; a row that is missed is no error."""
+    """Print the truth table of the lab's verbs."""
     from harness.bench.lab.truth import SEEDS, lab_truth_rows
     from harness.experiment.executors import process_executor
-    from harness.report.physics.truth_table import result_sentence, truth_lines
 
     seeds, out = _truth_flags(args, SEEDS, "seeds", "out", "jobs"), args.out or Path("results") / LAB
     with progress_note(out), ProgressBar("captures") as progress, process_executor(args.jobs or 1) as executor:
         rows = lab_truth_rows(seeds, out, executor, progress)
-    content = {"rows": [asdict(row) for row in rows], "seeds": len(seeds), "captures": str(out / "captures")}
-    return print_result(args, content, *truth_lines(rows), result_sentence("the lab", rows))
+    return _print_statements(args, rows, {"seeds": len(seeds), "captures": str(out / "captures")})
 
 
 def _truth_flags(args: argparse.Namespace, seeds: tuple[int, ...], *allowed: str) -> tuple[int, ...]:

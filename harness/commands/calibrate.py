@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from harness.calibrate.guided_calibration import PoseDisplay
     from harness.experiment.calibration_session import CalibrationOutcome
 
-_SOURCES = ("recording", "live", "simulate", "sheet")
+_SOURCES = ("recording", "port", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
 _FLAGS_BY_SOURCE = {
     "recording": _SESSION_FLAGS,
-    "live": (*_SESSION_FLAGS, "port", "rate", *LINE_FLAGS, "view", "pictures"),
+    "port": (*_SESSION_FLAGS, "rate", *LINE_FLAGS, "view", "pictures"),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
@@ -46,13 +46,11 @@ def add_calibrate(verbs: Verbs) -> None:
     text = "recording of a performer who holds the poses (see `harness record`)"
     verb.add_argument("recording", nargs="?", type=Path, metavar="RECORDING", help=text)
     verb.add_argument(
-        "--live", action="store_true", help="use the tracker at --port, and show the poses to the performer"
-    )
-    verb.add_argument(
         "--simulate", type=positive_int, metavar="N", help="calibrate N simulated performers and print the errors"
     )
     verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files in DIR")
-    verb.add_argument("--port", help="as --port of `harness live`")
+    text = "tracker, as for `harness live`; the poses are shown to the performer"
+    verb.add_argument("--port", help=text)
     text = "scenario with the stations and their nominal mounts (see `harness list`)"
     verb.add_argument("--scenario", metavar="NAME", help=text)
     text = DEVICE_STATIONS_HELP.replace("4)", "4; a recording's own)")
@@ -79,7 +77,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
     given = [name for name in _SOURCES if getattr(args, name)]
     if len(given) != 1:
         problem = "No source of poses" if not given else f"{len(given)} sources: {', '.join(given)}"
-        raise BadInput(f"{problem}.", "Give one: RECORDING, --live, --simulate N or --sheet DIR.")
+        raise BadInput(f"{problem}.", "Give one: RECORDING, --port PORT, --simulate N or --sheet DIR.")
     for name in sorted(
         {name for names in _FLAGS_BY_SOURCE.values() for name in names} - set(_FLAGS_BY_SOURCE[given[0]])
     ):
@@ -104,12 +102,12 @@ def _draw_sheet(args: argparse.Namespace) -> Outcome:
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
     lines = [f"{number}  {pose.name}: {pose.instruction}" for number, pose in enumerate(POSES, 1)]
     content = {"poses": poses, "pictures": [str(path) for path in paths]}
-    guide = "`harness calibrate --live --port PORT --scenario NAME --out FILE` guides a performer through them"
+    guide = "`harness calibrate --port PORT --scenario NAME --out FILE` guides a performer through them"
     return print_result(args, content, *lines, f"drawn in {args.sheet}; {guide}")
 
 
 def _measure_accuracy(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.calibration_accuracy import measure_calibration_accuracy
+    from harness.bench.calibration_accuracy import measure_calibration_accuracy
     from harness.simulate.noise import noise_preset
 
     given = {"noise": args.noise, "seed": args.seed}
@@ -134,7 +132,7 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     if args.pictures is not None and args.view != "frames":
         raise BadInput("--pictures without --view frames.", "Give both, or neither.")
     require_writable(args.out, EXPECTED, force=args.force)
-    found, use = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
+    found, use = _calibrate_from_device(args) if args.port else _calibrate_from_recording(args)
     write_calibration(args.out, found.file, force=args.force)
     following = [*use, *repeat_flags(args, "clip", "mocap"), "--calibration", args.out]
     content = {"file": str(args.out), **found.file.diagnostics}
@@ -150,9 +148,8 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
     from harness.live.viewer import ViewerOutput
     from harness.stream.driver import DriverConfig, open_tracker
 
-    for name in ("port", "scenario"):
-        if getattr(args, name) is None:
-            raise BadInput(f"--live without --{name}.", "Give --port and --scenario.")
+    if args.scenario is None:
+        raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
     stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args, device=True)))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
@@ -180,7 +177,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
 def _calibrate_from_recording(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
     """The calibration, and the command that uses it."""
     from harness.experiment.calibration_session import CalibrationSession
-    from harness.experiment.score_recording import name_recorded_stations
+    from harness.experiment.recorded_take import name_recorded_stations
     from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(args.recording)

@@ -20,12 +20,18 @@ from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS
 from harness.study.placement.config import load_placement_study, shipped_placements
 
+TUNING_PREFIXES = ("tune_", "validate_")
+"""Beginnings of the names of scenarios that only choose or check constants (docs/notes/constants.toml)."""
 
-def build_catalogue() -> dict[str, dict[str, str]]:
-    """Title -> name -> one line."""
+
+def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
+    """Title -> name -> one line. `every`: also the scenarios that only choose or check constants."""
+    scenarios = [path.stem for path in shipped_scenarios()]
     return {
         "methods": {name: _describe_method(name) for name in registry.methods()},
-        "scenarios": {path.stem: _describe_scenario(path.stem) for path in shipped_scenarios()},
+        "scenarios": {
+            name: _describe_scenario(name) for name in scenarios if every or not name.startswith(TUNING_PREFIXES)
+        },
         "placement studies": {path.stem: load_placement_study(path).title for path in shipped_placements()},
         "sweeps": {path.stem: _describe_sweep(path) for path in shipped_sweeps()},
         f"motion of the {synthetic.SOURCE}": {

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
 """Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
-_PORT_FLAGS = ("stations", "rate", "minutes", "capture", "yes", *LINE_FLAGS)
+_PORT_FLAGS = ("stations", "rate", "minutes", "yes", *LINE_FLAGS)
 
 
 def add_characterize(verbs: Verbs) -> None:
@@ -38,15 +38,12 @@ def add_characterize(verbs: Verbs) -> None:
     verb.add_argument("source", help="a recording, or a port as for `harness record`: a guided capture is then made")
     verb.add_argument("--out", type=Path, metavar="FILE", help="unit file to write; the page is written beside it")
     verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
-    verb.add_argument("--name", metavar="NAME", help="name of the unit in tables (default: that of the capture)")
     text = "earlier unit file to compare with (default: the noise preset `default`)"
     verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
     text = "two stations on one bar: they show errors in motion without a reference"
     verb.add_argument("--rigid", metavar="A,B", help=text)
     text = f"port: minutes at rest (default {_DEFAULT_STATIC_MIN:g})"
     verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
-    text = "port: the recording to write; it is continued if it exists (default: as --out, with the suffix .rec)"
-    verb.add_argument("--capture", type=Path, metavar="FILE", help=text)
     verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
     verb.add_argument("--stations", metavar="A,B|A=3,B=1", help="port: names of the stations, as for `harness record`")
     text = "port: frames per second, for a device that does not report its rate"
@@ -69,7 +66,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     pair = _parse_pair(args.rigid)
     capture = _capture_of(args)
     with ProgressBar("parts") as progress:
-        found = characterize_capture(capture, name=args.name or "", expected=expected, rigid=pair, progress=progress)
+        found = characterize_capture(capture, expected=expected, rigid=pair, progress=progress)
     report = unit_report(found, capture, this_command(), args.out)
     lines = [format_unit(report)]
     content = {
@@ -122,8 +119,8 @@ def _capture_of(args: argparse.Namespace) -> Path:
                     f"--{name.replace('_', '-')} with the recording {args.source}.", "It is for a port: leave it out."
                 )
         return Path(args.source)
-    if args.out is None and args.capture is None:
-        raise BadInput("A port without --out and --capture.", "Name the unit file: --out unit.toml.")
+    if args.out is None:
+        raise BadInput("A port without --out.", "Name the unit file: --out unit.toml.")
     return _record_stretches(args)
 
 
@@ -133,7 +130,7 @@ def _record_stretches(args: argparse.Namespace) -> Path:
     from harness.stream.driver import DriverConfig
     from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
 
-    path: Path = args.capture or args.out.with_suffix(".rec")
+    path: Path = args.out.with_suffix(".rec")
     minutes = args.minutes or _DEFAULT_STATIC_MIN
     print_status(
         f"A rate known to 20 % takes {events_for_precision(0.2)} events: 17 minutes at rest of six stations with one "

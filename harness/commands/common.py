@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.commands.ending import print_data
+from harness.commands.removed_flags import refuse_removed_flags
 from harness.core.interrupts import refuse_interrupts
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -22,7 +23,7 @@ DEFAULT_STATION_COUNT = 4
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
 STATION_CHARACTERS = "123456789ABC"
-"""Characters of the stations that a device may have (docs/is900.md 1)."""
+"""Characters of the stations that a device may have (docs/is900.md 5)."""
 DEVICE_STATIONS_HELP = (
     "number of the scenario's stations, or their names, in the order of the device's active stations; or names with "
     "stations of the device: head=3,torso=1 (default: the first 4)"
@@ -44,6 +45,7 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
     if "mocap" in flags:
         add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
+    refuse_removed_flags(name, verb)
     return verb
 
 

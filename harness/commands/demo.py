@@ -12,7 +12,7 @@ def add_demo(verbs: Verbs) -> None:
     verb = add_verb(verbs, "demo", text, run_demo, "seed", "out", "jobs")
     add_methods_flag(verb)
     add_all_flag(verb)
-    verb.set_defaults(scenario="demo", mocap=None, movie=False, report=True, jobs=2)
+    verb.set_defaults(scenario="demo", mocap=None, report=True, jobs=2)
     verb.set_defaults(isolate=False, time_limit=None, memory_limit=None)
 
 

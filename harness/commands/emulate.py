@@ -59,17 +59,11 @@ def add_emulate(verbs: Verbs) -> None:
     text = "bits per second of the line, which pace the data (default 115200)"
     verb.add_argument("--baud", type=positive_int, help=text)
     verb.add_argument("--unpaced", action="store_true", help="send without pacing, as over Ethernet")
-    text = "allow more data than the line carries; records are dropped"
-    verb.add_argument("--overload", action="store_true", help=text)
     text = "pty: garble the data while the client has set another rate"
     verb.add_argument("--check-baud", action="store_true", help=text)
     verb.add_argument("--firmware", metavar="VERSION", help="firmware version (default 4.2301; 4.1105 has no item 40)")
-    verb.add_argument("--restart", type=float, metavar="S", help="seconds of silence after a restart (default 0.25)")
-    text = "buttons and joystick: cycle moves all of them in turn, still none (default cycle)"
-    verb.add_argument("--controls", choices=["cycle", "still"], help=text)
     text = "length of item 16 (default 1, as in the manuals; InterSense's library and VRPN expect 2)"
     verb.add_argument("--stylus-bytes", type=int, choices=[1, 2], help=text)
-    verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave the scenario's faults out")
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
@@ -99,7 +93,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     samples = playback.samples  # before the port opens: clients expect an open port to answer
     items = args.items or tracker.items
     check_range(args.items or (), playback.reach_m)
-    if not (args.unpaced or args.overload or tracker.overload):
+    if not (args.unpaced or tracker.overload):
         check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     with ExitStack() as opened:
         with defer_interrupts():
@@ -126,7 +120,7 @@ def _following(args: argparse.Namespace, port: str, *, quality: bool) -> list[st
 
     `quality`: records can report it, which needs an item that older firmware does not have.
     """
-    verb, use = (["calibrate", "--live"], ["--out", "me.toml"]) if args.poses else (["live"], ["--view", "browser"])
+    verb, use = (["calibrate"], ["--out", "me.toml"]) if args.poses else (["live"], ["--view", "browser"])
     flags = repeat_flags(args, "stations", "clip", "rate", "items", "mocap", *([] if args.poses else ["seed"]))
     flags += [] if quality else ["--quality", "mp"]
     return ["harness", *verb, "--port", str(args.pty or port), "--scenario", args.scenario, *flags, *use]
@@ -135,8 +129,8 @@ def _following(args: argparse.Namespace, port: str, *, quality: bool) -> list[st
 def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None) -> "EmulatorConfig":
     from harness.stream.emulator.config import EmulatorConfig
 
-    options = {"firmware": args.firmware, "restart_s": args.restart, "controls": args.controls, "udp_port": udp_port}
-    options |= {"characters": parse_characters(args.stations), "stylus_bytes": args.stylus_bytes}
+    options = {"firmware": args.firmware, "stylus_bytes": args.stylus_bytes, "udp_port": udp_port}
+    options |= {"characters": parse_characters(args.stations)}
     return EmulatorConfig(
         **{name: value for name, value in options.items() if value is not None},
         baud=args.baud or scenario.tracker.baud,
@@ -144,7 +138,7 @@ def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None
         udp=udp_port is not None,
         queue_records=scenario.tracker.queue_records,
         check_baud=args.check_baud,
-        faults=scenario.fault if args.faults else (),
+        faults=scenario.fault,
         seed=scenario.seed,
     )
 

@@ -13,12 +13,13 @@ def add_list(verbs: Verbs) -> None:
     )
     verb = add_verb(verbs, "list", text, run_list)
     verb.add_argument("kind", nargs="?", help="list one kind alone, such as methods, places, hinges or metrics")
+    verb.add_argument("--all", action="store_true", help="also scenarios that only choose or check constants")
 
 
 def run_list(args: argparse.Namespace) -> Outcome:
     from harness.commands.catalogue import build_catalogue
 
-    content = build_catalogue()
+    content = build_catalogue(every=args.all)
     following = ["demo"]
     if args.kind is not None:
         titles = {title.split()[0]: title for title in content}  # "motion" for "motion of the built-in performer"

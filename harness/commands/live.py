@@ -75,7 +75,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
     verb.add_argument("--lsl", metavar="NAME", help=text)
-    verb.add_argument("--lsl-network", action="store_true", help="announce these streams to other computers too")
+    verb.add_argument("--anywhere", action="store_true", help="announce the streams of --lsl to other computers too")
     verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion to a BVH file")
     verb.add_argument("--poses", type=Path, metavar="FILE", help="write a CSV table of poses and frame times")
     verb.add_argument("--force", action="store_true", help="overwrite files that exist")
@@ -204,13 +204,13 @@ def _open_outputs(
         raise BadInput("--out without --view frames or browser.", "Give both, or neither.")
     if args.no_browser and args.view != "browser":
         raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
-    if args.lsl_network and args.lsl is None:
-        raise BadInput("--lsl-network without --lsl.", "Name the streams with --lsl.")
+    if args.anywhere and args.lsl is None:
+        raise BadInput("--anywhere without --lsl.", "Name the streams with --lsl.")
     skeleton, rate_hz = playback.performer_calibration.body.skeleton, playback.tracker.rate_hz
     stations = tuple(playback.scenario.stations)
     config: dict[str, Any] = {
         "vmc": lambda: VmcOutput(args.vmc, skeleton),
-        "lsl": lambda: LslOutput(args.lsl, skeleton, rate_hz, network=args.lsl_network),
+        "lsl": lambda: LslOutput(args.lsl, skeleton, rate_hz, network=args.anywhere),
         "bvh": lambda: BvhOutput(args.bvh, skeleton, rate_hz, force=args.force),
         "poses": lambda: PoseTableOutput(args.poses, skeleton, stations, force=args.force),
         "view": lambda: (

@@ -17,8 +17,6 @@ def add_plot(verbs: Verbs) -> None:
         "what to draw: ranking, time, joints, cdf (of a run) or placement (default: ranking, or placement of a study)"
     )
     verb.add_argument("--kind", default="", metavar="KIND", help=text)
-    text = "pdf, svg or png (default: the suffix of --out, or pdf)"
-    verb.add_argument("--format", default="", metavar="FORMAT", help=text)
     text = "width in print [mm]: 85, a column, or 170, a page (default 85, of time and placement 170)"
     verb.add_argument("--width", type=positive_int, metavar="MM", help=text)
     verb.add_argument("--metric", metavar="NAME", help="metric to draw (default joint_angle_mean_deg)")
@@ -29,7 +27,7 @@ def add_plot(verbs: Verbs) -> None:
     verb.add_argument("--clip", default="", metavar="NAME", help=text)
     text = "method that time and joints show next to the leader (default: ik)"
     verb.add_argument("--control", default="", metavar="METHOD", help=text)
-    text = "file to write (default: figures/NAME.FORMAT in the folder of the run)"
+    text = "file to write with the suffix .pdf, .svg or .png (default: figures/NAME.pdf in the folder of the run)"
     verb.add_argument("--out", type=Path, metavar="FILE", help=text)
     verb.add_argument("--force", action="store_true", help="replace a file that exists")
 
@@ -46,9 +44,7 @@ def run_plot(args: argparse.Namespace) -> Outcome:
         clip=args.clip,
         control=args.control,
     )
-    figure = write_figure(
-        args.run, args.kind, selection, fmt=args.format, width_mm=args.width, out=args.out, force=args.force
-    )
+    figure = write_figure(args.run, args.kind, selection, width_mm=args.width, out=args.out, force=args.force)
     content = {**vars(figure), "path": str(figure.path)}
     following: list[object] = []
     if figure.kind != "placement":

@@ -118,7 +118,8 @@ def _format_counts(stream: "RecordingStream") -> str:
 def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
     from harness.core.options import expand_alternatives, split_outside_brackets
-    from harness.experiment import score_recording
+    from harness.experiment.evaluation import check_methods, evaluate_each, format_score_table
+    from harness.experiment.recorded_take import find_playback, has_station_names, recorded_take
 
     options = {
         "scenario": args.scenario,
@@ -128,11 +129,11 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
         "noise": args.noise,
         "seed": args.seed,
     }
-    playback = score_recording.find_playback(stream, **options, folder=args.mocap)
+    playback = find_playback(stream, **options, folder=args.mocap)
     if args.calibration is not None:
         kept = read_calibration(args.calibration)
         print_caveat(args.calibration, kept.caveat)
-        named = args.stations is not None or score_recording.has_station_names(stream, playback.scenario)
+        named = args.stations is not None or has_station_names(stream, playback.scenario)
         playback = playback.with_calibration(kept, named=named, say=print_status)
     methods = playback.scenario.methods
     if args.methods is not None:
@@ -140,13 +141,12 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
             name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)
         )
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        scores = score_recording.score_methods(stream, playback, methods, bar)
+        check_methods(methods)
+        scores = evaluate_each(methods, recorded_take(stream, playback), progress=bar)
     played = f"{playback.scenario.name}, {playback.clip_evaluation.part}"
     content = {"scenario": playback.scenario.name, "clip": str(playback.clip_evaluation.part), **stream.counts}
     content |= {"lost": stream.recording.damage, "methods": [score.as_dict() for score in scores]}
     measured = any(score.metrics["joint_angle_mean_deg"] is not None for score in scores)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
     outcome = Outcome.INCOMPLETE if any(score.failure for score in scores) else outcome
-    return print_result(
-        args, content, f"played from {played}", "", score_recording.format_score_table(scores), outcome=outcome
-    )
+    return print_result(args, content, f"played from {played}", "", format_score_table(scores), outcome=outcome)

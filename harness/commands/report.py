@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
-from harness.core.progress import ProgressBar, show_steps
+from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
 
@@ -14,9 +14,6 @@ def add_report(verbs: Verbs) -> None:
         verbs, "report", "write the report page of a finished run, sweep, placement study or paper again", run_report
     )
     verb.add_argument("run", type=Path, help="folder written by `harness run`, `sweep`, `placement` or `paper`")
-    verb.add_argument(
-        "--movie", action="store_true", help="also write an mp4 of the worst cell of each method of a run"
-    )
     text = "also replace the table of this run, or the tables of this paper, in a page such as README.md"
     verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
     verb.add_argument("--methods", metavar="A,B", help="methods in the table of a run that --readme writes")
@@ -30,14 +27,14 @@ def run_report(args: argparse.Namespace) -> Outcome:
         require_kind(args.run, "run", "paper")
     if args.methods and not args.readme:
         raise BadInput("--methods without --readme.", "The page has all methods; name the file of the table.")
-    if args.movie or args.methods:
+    if args.methods:
         require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
     from harness.report.run.writer import write_run_page
 
-    with show_steps("parts of the report"), ProgressBar("movies") as bar:
-        page = write_run_page(args.run, movie=args.movie, progress=bar)
+    with show_steps("parts of the report"):
+        page = write_run_page(args.run)
     if args.readme:
         from harness.core.options import split_outside_brackets
         from harness.report.figures.performer_table import update_readme

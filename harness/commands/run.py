@@ -20,7 +20,6 @@ def add_run(verbs: Verbs) -> None:
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     add_methods_flag(verb)
     add_isolation_flags(verb)
-    verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     add_all_flag(verb)
     verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
 
@@ -71,8 +70,8 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         from harness.report.run.writer import write_run_page
 
         print("writing the report", file=sys.stderr)
-        with show_steps("parts of the report"), ProgressBar("movies") as bar:
-            page = write_run_page(out, movie=args.movie, progress=bar)
+        with show_steps("parts of the report"):
+            page = write_run_page(out)
     summary = read_summary(out)
     content = {**summary, "out": str(out), "report": page and str(page)}
     return print_result(

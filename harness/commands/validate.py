@@ -37,8 +37,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
     from harness.report.lab.validation_page import write_validation_page
     from harness.report.lab.validation_text import format_validation
-    from harness.study.trust.reconstruction_scores import score_registered
-    from harness.study.trust.validation import load_truth, session_unit, validate_capture
+    from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
 
     if args.out is not None:
         require_writable(args.out, UNIT_FILE, force=args.force)
@@ -52,7 +51,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         )
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
-        scores = score_registered(args.capture, found, methods, progress) if methods else []
+        scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
     report = validation_report(found, args.capture, this_command(), scores)
     content = {
         "truth": truth.title,
@@ -69,7 +68,11 @@ def run_validate(args: argparse.Namespace) -> Outcome:
             }
             for check in found.named
         ],
-        "scores": [{"method": one.method, "metric": one.metric, "value": one.value} for one in scores],
+        "scores": [
+            {"method": one.method, "metric": metric, "value": one.metrics[metric]}
+            for one in scores
+            for metric in one.names
+        ],
         "damage": list(found.reader.damage),
     }
     lines = [format_validation(report)]

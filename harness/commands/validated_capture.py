@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.experiment.evaluation import Evaluation
 from harness.measure.measured import NORMAL_QUANTILE, Measured
 from harness.report.lab.unit_content import CaptureSummary, DepartureCheck
 from harness.report.lab.validation_content import (
@@ -17,13 +18,10 @@ from harness.report.lab.validation_content import (
     StationAccuracy,
     ValidationReport,
 )
-from harness.study.trust.reconstruction_scores import RegisteredScore
 from harness.study.trust.validation import Validation
 
 
-def validation_report(
-    found: Validation, path: Path, command: str, scores: Sequence[RegisteredScore]
-) -> ValidationReport:
+def validation_report(found: Validation, path: Path, command: str, scores: Sequence[Evaluation]) -> ValidationReport:
     """The report on the capture at `path`."""
     registration, wire = found.registration, found.reader.wire
     expected = round(registration.overlap_s * wire.rate_hz)
@@ -55,7 +53,9 @@ def validation_report(
         ),
         checks=tuple(DepartureCheck(check.departure, check.p_holm) for check in found.checks),
         residuals=tuple(_residuals(found, station) for station in registration.errors),
-        scores=tuple(ReconstructionScore(one.method, one.metric, one.value) for one in scores),
+        scores=tuple(
+            ReconstructionScore(one.method, metric, one.metrics[metric]) for one in scores for metric in one.names
+        ),
         exchanged=tuple(
             f"{station} is on {body}, not on {found.truth.body_of[station]}: stations are exchanged."
             for station, body in found.exchanged.items()

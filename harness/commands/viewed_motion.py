@@ -40,7 +40,7 @@ def open_motion(
     """Open the motion that a text names: a folder, a file, or a clip.
 
     `methods` are those of a run or recording; None is all of a run and none of a recording. `rate_hz` is the rate of an
-    AMC file that no index names, `playback` the options of `score_recording.find_playback`. `progress` is called while
+    AMC file that no index names, `playback` the options of `recorded_take.find_playback`. `progress` is called while
     methods learn and run. Raises UnknownName, BadFile or BadInput for what cannot be shown.
     """
     path = Path(what)
@@ -133,7 +133,8 @@ def _view_recording(
     progress: ProgressCallback,
 ) -> ViewedMotion:
     """The readings of a recording, with the truth and the estimates where the played scenario is known."""
-    from harness.experiment.score_recording import find_playback, reconstruct_recording
+    from harness.experiment.evaluation import check_methods, evaluate_each
+    from harness.experiment.recorded_take import find_playback, recorded_take
     from harness.score.pair import compute_poses
     from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig
     from harness.stream.recording.replay import RecordingStream
@@ -152,28 +153,32 @@ def _view_recording(
         clip = PlayerClip(path.name, path.name, _times_s(frames), 0.0, None, (), stations)
         return ViewedMotion(path.name, standard_skeleton(), [path.name], lambda _: clip, " ".join([note, *lost]))
     playback = find_playback(stream, **playback_options, folder=mocap)
-    done = reconstruct_recording(stream, playback, methods, progress)
-    lost += [f"{name} failed: {text.strip().splitlines()[-1]}." for name, text in done.failures.items()]
-    methods = [name for name in methods if name in done.estimates]
-    count = len(done.frames)
+    check_methods(methods)
+    take = recorded_take(stream, playback)
+    evaluations = evaluate_each(methods, take, progress=progress)
+    lost += [f"{one.method} failed: {one.failure.strip().splitlines()[-1]}." for one in evaluations if one.failure]
+    evaluations = [one for one in evaluations if not one.failure]
+    count = len(take.frames)
     _require_frames(path, count)
-    truth = compute_poses(playback.body.skeleton, playback.simulation.truth_qpos[np.maximum(done.truth_row, 0)])
-    truth_states = np.where(done.truth_row < 0, NO_ESTIMATE, 0)
+    truth = take.truth.at(np.maximum(take.truth_row, 0))
+    truth_states = np.where(take.truth_row < 0, NO_ESTIMATE, 0)
     tracks = []
-    for name, (qpos, status) in done.estimates.items():
-        poses = compute_poses(playback.performer_calibration.body.skeleton, qpos)
+    for one in evaluations:
+        poses = compute_poses(playback.performer_calibration.body.skeleton, one.answers.qpos)
         joints_m = np.full((count, *poses.joints_m.shape[1:]), np.nan)
-        joints_m[: len(qpos)] = poses.joints_m
+        joints_m[: len(poses.joints_m)] = poses.joints_m
         states = np.full(count, NO_ESTIMATE)
-        states[: len(qpos)] = status
-        tracks.append(PlayerTrack(name, hold_last(joints_m), states))
+        states[: len(poses.joints_m)] = one.answers.status
+        tracks.append(PlayerTrack(one.method, hold_last(joints_m), states))
     room = playback.calibration
-    stations = _stations(stream.stations, done.frames, room.world_from_tracker, room.tracker_origin_m)
+    stations = _stations(stream.stations, take.frames, room.world_from_tracker, room.tracker_origin_m)
     heading_rad = rotations.mean_heading_rad(truth.world_from_root)
     true_track = PlayerTrack("truth", truth.joints_m, truth_states)
-    clip = PlayerClip(path.name, path.name, _times_s(done.frames), heading_rad, true_track, tracks, stations)
+    clip = PlayerClip(path.name, path.name, _times_s(take.frames), heading_rad, true_track, tracks, stations)
     title = f"{path.name}: {playback.scenario.name}, {playback.clip_evaluation.part}"
-    return ViewedMotion(title, standard_skeleton(), [path.name], lambda _: clip, " ".join(lost), methods)
+    return ViewedMotion(
+        title, standard_skeleton(), [path.name], lambda _: clip, " ".join(lost), [one.method for one in evaluations]
+    )
 
 
 def _require_frames(path: Path, count: int) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from harness.compare.margins import margin_of
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
-from harness.results.findings import Claim, ClaimKind, ClaimVerdict, Reading
+from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind, Verdict
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 Errors = Mapping[str, float]
@@ -26,31 +26,33 @@ def claim_lower_error(
     published: str = "order",
     unit: str = "deg",
     why: str = "",
-    kind: ClaimKind = "printed",
+    kind: StatementKind = "printed",
     reading: Reading = "",
-) -> Claim:
+) -> BenchmarkStatement:
     """Claim that `less` is below `more`, tested by the paired interval.
 
     An interval within the margin of joint angles is *same*. `why` explains a claim that is not reproduced.
     """
     difference = compare_paired(more, less)
     if difference.mean is None:
-        return Claim(text, published, "not measured", "not run", difference.why, unit=unit, kind=kind, reading=reading)
+        return BenchmarkStatement(
+            text, published, "not measured", "not run", difference.why, unit=unit, kind=kind, reading=reading
+        )
     means = [sum(side[unit] for unit in difference.units) / len(difference.units) for side in (less, more)]
     verdict, reason = difference.verdict, difference.why
     margin = margin_of(PRIMARY_METRIC).of(means[1])
     if unit == "deg" and difference.low is not None and -margin <= difference.low <= (difference.high or 0.0) <= margin:
         verdict, reason = "same", f"the whole interval lies within the margin, {margin:.2f} {unit}"
-    return Claim(
+    return BenchmarkStatement(
         text=text,
-        published=published,
-        ours=f"{means[0]:.2f} against {means[1]:.2f} {unit}",
+        target=published,
+        measured=f"{means[0]:.2f} against {means[1]:.2f} {unit}",
         verdict=verdict,
         kind=kind,
         reading=reading,
         why="" if verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
         clips=len(difference.units),
-        difference=difference.mean,
+        value=difference.mean,
         low=difference.low,
         high=difference.high,
         unit=unit,
@@ -65,9 +67,9 @@ def claim_noninferior(
     *,
     published: str = "order",
     why: str = "",
-    kind: ClaimKind = "printed",
+    kind: StatementKind = "printed",
     reading: Reading = "",
-) -> Claim:
+) -> BenchmarkStatement:
     """Claim that `errors` [deg] exceed `reference` by less than the margin of joint angles (non-inferiority).
 
     *Reproduced* when the 95 % interval of the excess ends below the margin, *not reproduced* when it begins above. The
@@ -76,7 +78,9 @@ def claim_noninferior(
     """
     excess = compare_paired(errors, reference)
     if excess.mean is None:
-        return Claim(text, published, "not measured", "not run", excess.why, unit="deg", kind=kind, reading=reading)
+        return BenchmarkStatement(
+            text, published, "not measured", "not run", excess.why, unit="deg", kind=kind, reading=reading
+        )
     means = [sum(side[unit] for unit in excess.units) / len(excess.units) for side in (errors, reference)]
     margin = margin_of(PRIMARY_METRIC).of(means[1])
     allowed = {name: reference[name] + margin for name in excess.units}
@@ -87,14 +91,14 @@ def claim_noninferior(
         "cannot tell": f"the interval of the excess contains the margin, {margin:.2f} deg",
     }[room.verdict]
     reason = room.why if room.low is None else reason
-    return Claim(
+    return BenchmarkStatement(
         text=text,
-        published=published,
-        ours=f"{means[0]:.2f} against {means[1]:.2f} deg, margin {margin:.2f}",
+        target=published,
+        measured=f"{means[0]:.2f} against {means[1]:.2f} deg, margin {margin:.2f}",
         verdict=room.verdict,
         why="" if room.verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
         clips=len(room.units),
-        difference=room.mean,
+        value=room.mean,
         low=room.low,
         high=room.high,
         unit="deg",
@@ -104,16 +108,16 @@ def claim_noninferior(
     )
 
 
-WORST_FIRST: tuple[ClaimVerdict, ...] = ("not run", "not reproduced", "cannot tell", "same", "reproduced")
+WORST_FIRST: tuple[Verdict, ...] = ("not run", "not reproduced", "cannot tell", "same", "reproduced")
 
 
-def claim_all(text: str, parts: Mapping[str, Claim]) -> Claim:
+def claim_all(text: str, parts: Mapping[str, BenchmarkStatement]) -> BenchmarkStatement:
     """One claim that holds when every part does (intersection-union test).
 
     The verdict and the figures are those of the worst part, and the reason names it. All parts must hold, so p is the
     largest. One part suffices to refute the claim; its own p is then multiplied by the number of parts (Bonferroni).
     """
-    name, worst = min(parts.items(), key=lambda part: (WORST_FIRST.index(part[1].verdict), part[1].difference or 0.0))
+    name, worst = min(parts.items(), key=lambda part: (WORST_FIRST.index(part[1].verdict), part[1].value or 0.0))
     found = [part.p for part in parts.values() if part.p is not None]
     p = max(found) if len(found) == len(parts) else None
     if worst.verdict == "not reproduced":
@@ -121,15 +125,15 @@ def claim_all(text: str, parts: Mapping[str, Claim]) -> Claim:
     return replace(
         worst,
         text=text,
-        ours="; ".join(f"{part.ours} ({name})" for name, part in parts.items()),
+        measured="; ".join(f"{part.measured} ({name})" for name, part in parts.items()),
         why=f"{name}: {worst.why}" if worst.why else "",
         p=p,
     )
 
 
 def claim_decreasing(
-    text: str, series: Mapping[str, Errors], what: str, *, kind: ClaimKind = "printed", reading: Reading = ""
-) -> Claim:
+    text: str, series: Mapping[str, Errors], what: str, *, kind: StatementKind = "printed", reading: Reading = ""
+) -> BenchmarkStatement:
     """Claim that errors decrease from each entry of `series` to the next; `what` names the entries in words.
 
     Every step must decrease; the difference of the claim is that of the worst step.
@@ -143,12 +147,12 @@ def claim_decreasing(
     }
     if not steps or any(step.verdict == "not run" for step in steps.values()):
         why = f"no unit has results for all {what}"
-        return Claim(text, "order", "not measured", "not run", why, unit="deg", kind=kind, reading=reading)
+        return BenchmarkStatement(text, "order", "not measured", "not run", why, unit="deg", kind=kind, reading=reading)
     means = ", ".join(f"{sum(errors.values()) / len(errors):.2f}" for errors in series.values())
-    return replace(claim_all(text, steps), ours=f"{means} deg with {', '.join(names)} {what}")
+    return replace(claim_all(text, steps), measured=f"{means} deg with {', '.join(names)} {what}")
 
 
-def correct_claims(claims: Sequence[Claim]) -> list[Claim]:
+def correct_claims(claims: Sequence[BenchmarkStatement]) -> list[BenchmarkStatement]:
     """Correct the p of a paper's printed statements for their number, by the method of Holm (1979).
 
     The statements of each reading are one family. A verdict by a difference that is not significant in its family
@@ -163,11 +167,11 @@ def correct_claims(claims: Sequence[Claim]) -> list[Claim]:
     return corrected
 
 
-def _is_tested(claim: Claim) -> bool:
+def _is_tested(claim: BenchmarkStatement) -> bool:
     return claim.kind == "printed" and claim.p is not None
 
 
-def _with_correction(claim: Claim, p: float, statements: int) -> Claim:
+def _with_correction(claim: BenchmarkStatement, p: float, statements: int) -> BenchmarkStatement:
     claim = replace(claim, p_holm=p)
     if p <= SIGNIFICANCE or claim.verdict not in ("reproduced", "not reproduced"):
         return claim
@@ -195,14 +199,14 @@ def claim_published_value(
     comparable: bool,
     why: str,
     unit: str = "deg",
-    kind: ClaimKind = "printed",
+    kind: StatementKind = "printed",
     reading: Reading = "",
-) -> Claim:
+) -> BenchmarkStatement:
     """Claim that the mean error is the published figure, within `TOLERANCE`; `why` says why it is not `comparable`.
 
     The means are compared directly, since figures from two motion libraries have no paired difference.
     """
-    claim = Claim(
+    claim = BenchmarkStatement(
         *(text, f"{published:g} {unit}", "not measured", "not run", "no unit was measured"),
         unit=unit,
         kind=kind,
@@ -211,7 +215,7 @@ def claim_published_value(
     if not errors:
         return claim
     mean = sum(errors.values()) / len(errors)
-    claim = replace(claim, ours=f"{mean:.2f} {unit}", clips=len(errors), difference=mean, why=why)
+    claim = replace(claim, measured=f"{mean:.2f} {unit}", clips=len(errors), value=mean, why=why)
     if not comparable:
         return replace(claim, verdict="not comparable")
     off = mean / published - 1.0

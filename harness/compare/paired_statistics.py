@@ -19,7 +19,7 @@ from harness.compare.units import Sampling, average_units
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.findings import ClaimVerdict
+from harness.results.benchmark_statement import Verdict
 
 MIN_UNITS = 6
 """Least number of units that can show a difference: with five, sign flips give a p of 2/32 or more."""
@@ -43,7 +43,7 @@ class PairedDifference:
     """Upper end."""
 
     @property
-    def verdict(self) -> ClaimVerdict:
+    def verdict(self) -> Verdict:
         """Verdict on the claim that a is greater than b."""
         if not self.units:
             return "not run"

@@ -1,6 +1,7 @@
 """Calibration of a tracker for one performer: the mount of each station, and the tracker's frame in the world."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from harness.core.arrays import Floats, freeze
 
@@ -28,3 +29,14 @@ class Calibration:
         stations = len(self.stations)
         freeze(self, mount_m=(stations, 3), bone_from_station=(stations, 4))
         freeze(self, world_from_tracker=(4,), tracker_origin_m=(3,))
+
+    def of_stations(self, names: Sequence[str]) -> "Calibration":
+        """The calibration of these stations, in this order; ValueError for one that it lacks."""
+        rows = [self.stations.index(name) for name in names]
+        return replace(
+            self,
+            stations=tuple(names),
+            bones=tuple(self.bones[row] for row in rows),
+            mount_m=self.mount_m[rows],
+            bone_from_station=self.bone_from_station[rows],
+        )

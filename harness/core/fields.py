@@ -21,11 +21,14 @@ NONE = "none"
 def build(kind: type[T], content: Any, where: str) -> T:
     """Build a dataclass from a mapping by its annotations.
 
-    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values, and
-    ValueError for numbers outside the range of their field (`core.ranges`).
+    `where` names the place in messages. `kind.STORED_NAMES` has keys of earlier versions -> fields. Raises UnknownName
+    and RenamedKey for keys, TypeError for values, and ValueError for numbers outside the range of their field
+    (`core.ranges`).
     """
     if not isinstance(content, Mapping):
         raise TypeError(f"{where}: expected a table, found {shorten(repr(content), 60)}")
+    stored: Mapping[str, str] = getattr(kind, "STORED_NAMES", {})
+    content = {stored.get(key, key): value for key, value in content.items()}
     hints = get_type_hints(kind, include_extras=True)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _refuse_unknown_keys(kind, content, fields, where)

@@ -59,3 +59,8 @@ class BodyMotion:
 
     def __len__(self) -> int:
         return len(self.qpos)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first frame to the last one [s]."""
+        return (len(self) - 1) / self.rate_hz

@@ -21,7 +21,7 @@ _MOST_SHARE = 0.05
 """Most of a core's time that the polls of a large folder take."""
 
 
-class CellCount:
+class ProgressCount:
     """The number of cells that ended in this run, from the outcomes of tasks and from the folder, each counted once."""
 
     def __init__(self, out: Path, report: Callable[[str, int], None]) -> None:

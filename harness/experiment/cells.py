@@ -8,7 +8,7 @@ stopped at any moment and resumed.
 import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from platform import node
@@ -23,17 +23,20 @@ from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
+from harness.experiment.evaluation import evaluate
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
 from harness.experiment.method_run import describe_failure
-from harness.experiment.remote_method import close_methods, resolve_method, run_over_frames, start_methods
+from harness.experiment.observed_take import simulated_take
+from harness.experiment.remote_method import close_methods, resolve_method, start_methods
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct.contract import Method
 from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row, varied_text
-from harness.score.score import COVERAGE_FLOOR, score_estimate
+from harness.score.loops import COVERAGE_FLOOR
+from harness.score.score import score_estimate
 from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.room import check_emitters
 from harness.stream.codec.items import record_size
@@ -41,6 +44,9 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
 
 VariedValues = Mapping[str, Any]
+_ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
+_READINGS = ("quality", "position_valid", "orientation_valid", "suspect")
+"""Fields of a method's answers and of frames that a cell has under the same names."""
 
 
 @dataclass(frozen=True)
@@ -182,19 +188,16 @@ def evaluate_cell(
     the conditions, because its errors and those of a causal method are not comparable. Nothing is measured where the
     line drops too many records and the scenario does not allow the overload.
     """
-    scenario, simulation = evaluation.scenario, evaluation.simulation
-    inputs = make_inputs(planned.inputs, simulation.stations)
-    calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
-    shown = [inputs.mask(replace(frame)) for frame in calibration.map_stream(simulation).frames]
-    answers, lag = run_over_frames(fitted, replace(calibration.calibration), shown).by_frame()
-    rows = np.flatnonzero(simulation.frame_index[: len(answers.qpos)] >= 0)
-    answers, frame_index = answers.at(rows), simulation.frame_index[rows]
-    frames, health = [simulation.frames[row] for row in rows], simulation.health
+    scenario, simulation, calibration = evaluation.scenario, evaluation.simulation, evaluation.performer_calibration
+    found = evaluate(method, planned.method, simulated_take(evaluation, planned.inputs))
+    (loop,), lag = found.take.loops, found.lag
+    kept = loop.rows < len(found.answers.qpos)
+    rows, frame_index = loop.rows[kept], loop.index[kept]
+    answers, frames, health = found.answers.at(rows), [simulation.frames[row] for row in rows], simulation.health
     too_slow = excess_loss(health, allowed=scenario.tracker.overload) > 0.0
     if too_slow:
         health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
-    position_valid = np.array([f.position_valid for f in frames])
-    orientation_valid = np.array([f.orientation_valid for f in frames])
+    readings = {name: np.array([getattr(frame, name) for frame in frames]) for name in _READINGS}
     scores = score_estimate(
         evaluation.body.skeleton,
         scenario.tracker.rate_hz,
@@ -204,7 +207,7 @@ def evaluate_cell(
         answers.status,
         answers.step_ms,
         origin=answers.origin,
-        complete=(position_valid & orientation_valid).all(axis=1),
+        complete=(readings["position_valid"] & readings["orientation_valid"]).all(axis=1),
         cpu_ms=(answers.step_cpu_ms, answers.reference_cpu_ms),
         angle_sigma_rad=answers.angle_sigma_rad,
         estimate_skeleton=calibration.body.skeleton,
@@ -239,17 +242,9 @@ def evaluate_cell(
         time_s=simulation.truth_s[frame_index],
         truth_qpos=simulation.truth_qpos[frame_index],
         estimate_qpos=answers.qpos,
-        angle_sigma_rad=answers.angle_sigma_rad,
         frame_index=frame_index,
-        status=answers.status,
-        origin=answers.origin,
-        step_ms=answers.step_ms,
-        step_cpu_ms=answers.step_cpu_ms,
-        reference_cpu_ms=answers.reference_cpu_ms,
-        quality=np.array([f.quality for f in frames]),
-        position_valid=position_valid,
-        orientation_valid=orientation_valid,
-        suspect=np.array([f.suspect for f in frames]),
+        **{name: getattr(answers, name) for name in _ANSWERS},
+        **readings,
     )
 
 

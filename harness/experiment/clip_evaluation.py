@@ -40,8 +40,8 @@ from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.results import manifest, storage
+from harness.score.loops import WARM_UP_S
 from harness.score.metrics import VERSIONS
-from harness.score.score import WARM_UP_S
 from harness.simulate import noise as noises
 from harness.simulate.mounting import perturb_mounts
 from harness.simulate.noise import Noise

@@ -22,7 +22,7 @@ from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.core.training_data import declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
-from harness.experiment.cell_watcher import CellCount
+from harness.experiment.cell_watcher import ProgressCount
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
@@ -49,7 +49,7 @@ _CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault", 
 
 
 @dataclass(frozen=True)
-class CellResults:
+class BatchResults:
     """Results of the cells that `run_cells` was asked for."""
 
     rows: tuple[Mapping[str, Any], ...]
@@ -127,7 +127,7 @@ def run_cells(
     command: str,
     progress: ProgressCallback = lambda cell, done, planned: None,
     workers: int | None = None,
-) -> CellResults:
+) -> BatchResults:
     """Run the cells of scenarios that the existing folder `out` does not have yet, and return the results of all.
 
     A search calls this again and again in one folder, whose lock it holds; cells of earlier calls stay in the index.
@@ -141,7 +141,7 @@ def run_cells(
         keys = [outcomes[name].key for name in names if name in outcomes and not outcomes[name].failure]
         failures = {name: outcomes[name].failure for name in names if name in outcomes and outcomes[name].failure}
         index.write_digest({})
-        return CellResults(tuple(index.rows_of(keys)), failures, len(names))
+        return BatchResults(tuple(index.rows_of(keys)), failures, len(names))
 
 
 def _run_folder(
@@ -248,7 +248,7 @@ def _run_tasks(
     sources, failed = _source_hash(tasks), index.failures()
     index.reset(names if index.facts().get("sources") != sources else [name for name in names if name in failed])
     index.note(sources=sources, started_s=time.time(), made=0)
-    count = CellCount(out, lambda last, ended: progress(last, ended, len(names)))
+    count = ProgressCount(out, lambda last, ended: progress(last, ended, len(names)))
     progress("", 0, len(names))  # a bar is there while the first cells compile
     stop, outcomes, made = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, CellOutcome](), 0
 

@@ -77,16 +77,11 @@ def run_method(reconstructor: Reconstructor, calibration: Calibration, frames: S
         reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
     times_ms = np.array([step_ms, cpu_ms, reference_ms])
     times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
-    return stack_estimates(estimates, *times_ms)
+    return stack_estimates(estimates, times_ms)
 
 
-def stack_estimates(
-    estimates: Sequence[Estimate],
-    step_ms: Floats | Sequence[float],
-    step_cpu_ms: Floats | None = None,
-    reference_cpu_ms: Floats | None = None,
-) -> MethodAnswers:
-    """The answers of a session from its F estimates and the times (F,) of its steps; NaN for times that are not given.
+def stack_estimates(estimates: Sequence[Estimate], times_ms: Floats) -> MethodAnswers:
+    """The answers of a session from its F estimates and the times (3, F) of its steps, in the order of the fields.
 
     ValueError for a lag that changes after the first frames, and for standard deviations in some frames only.
     """
@@ -95,18 +90,21 @@ def stack_estimates(
         raise ValueError(f"the method gave standard deviations in {len(sigma_rad)} of {len(estimates)} frames")
     lags = [estimate.lag for estimate in estimates]
     session_lag(lags)
-    missing, measured = np.full(len(estimates), np.nan), (step_ms, step_cpu_ms, reference_cpu_ms)
-    times = [immutable(missing if each is None else each) for each in measured]
+    step_ms, step_cpu_ms, reference_cpu_ms = map(immutable, times_ms)
     return MethodAnswers(
         immutable(np.array([estimate.qpos for estimate in estimates]).reshape(-1, QPOS_SIZE)),
         immutable([estimate.status for estimate in estimates], np.int64),
         immutable([estimate.origin for estimate in estimates], np.int64),
-        times[0],
-        times[1],
-        times[2],
+        step_ms,
+        step_cpu_ms,
+        reference_cpu_ms,
         lag=immutable(lags, np.int64),
         angle_sigma_rad=immutable(sigma_rad) if sigma_rad else None,
     )
+
+
+NO_ANSWERS = stack_estimates([], np.zeros((3, 0)))
+"""The answers of a method that failed."""
 
 
 def describe_failure(error: BaseException) -> str:

@@ -129,6 +129,7 @@ class Scenario:
     """Methods by name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
     seed: Annotated[int, Range(0, 2**63 - 1)] = 1
+    """Seed of all random draws."""
     inputs: tuple[MethodName, ...] = ("pos+ori",)
     """Which of position and orientation each station delivers; every method runs with each choice."""
     worn: tuple[Name, ...] = ()

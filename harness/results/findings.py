@@ -12,53 +12,10 @@ from typing import Any, Literal
 from harness.core.fields import build
 from harness.core.files import to_json_types
 from harness.errors import BadFile, UnknownName
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.digests import check_study, read_result_json, write_result_json
 
 SCHEMA = 1
-ClaimVerdict = Literal["reproduced", "same", "not reproduced", "cannot tell", "not comparable", "not run"]
-"""Verdict on a claim, by the paired 95 % interval of the difference.
-
-*reproduced*: it lies on the published side; *same*: it lies within the margin of `compare.margins`, so the difference
-is too small to matter; *not reproduced*: it lies on the other side; *cannot tell*: it contains zero, there are too few
-units, or the difference is not significant after Holm's correction; *not comparable*: absolute figures of other motion.
-"""
-ClaimKind = Literal["printed", "derived", "repeated", "speed"]
-"""Kind of a claim.
-
-*printed*: the paper prints the statement; *derived*: it follows from printed ones, or is our reading of a word;
-*repeated*: a printed statement asked of one more method; *speed*: today's speed against the paper's. Only printed
-statements count in the headline.
-"""
-Reading = Literal["", "as printed", "ours"]
-"""Methods of a claim: the paper's as printed, our best, or "" where the statement is not about a method."""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One published statement and our result."""
-
-    text: str
-    """The statement, such as "walking, position + orientation: dynamic_map errs less than ik"."""
-    published: str
-    """The figure as printed, such as "1.25 deg", or "order" where only bars are."""
-    ours: str
-    verdict: ClaimVerdict
-    why: str = ""
-    """Reason for a verdict other than *reproduced*: what differs, or what is missing."""
-    clips: int = 0
-    """Number of units on which both sides were measured: performers, or clips where the scenario says so."""
-    difference: float | None = None
-    """Mean paired difference over units, or our figure that the published one is compared with, in `unit`."""
-    low: float | None = None
-    high: float | None = None
-    """Ends of the 95 % interval of `difference`."""
-    unit: str = ""
-    kind: ClaimKind = "printed"
-    reading: Reading = ""
-    p: float | None = None
-    """Two-sided p of the difference; None where nothing was tested."""
-    p_holm: float | None = None
-    """`p` corrected for the number of printed statements of the paper with this reading (see `correct_claims`)."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +77,7 @@ class PaperExperiment:
     """What the paper asked and showed, for readers without the paper."""
     differences: tuple[str, ...]
     """Differences between this experiment and the paper's."""
-    claims: tuple[Claim, ...] = ()
+    claims: tuple[BenchmarkStatement, ...] = ()
     tables: tuple[FindingsTable, ...] = ()
     figures: tuple[BarChart | LineChart, ...] = ()
     runs: tuple[str, ...] = ()

@@ -13,8 +13,8 @@ from typing import Any, Literal
 from harness.core.fields import build
 from harness.core.files import to_json_types
 from harness.errors import BadFile, UnknownName
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.digests import check_study, read_result_json, write_result_json
-from harness.results.findings import Claim
 
 SCHEMA = 1
 PlacementMode = Literal["ablate", "add", "greedy", "exhaustive", "refine"]
@@ -282,7 +282,7 @@ class PlacementFindings:
     conditions: tuple[PlacementCondition, ...] = ()
     agreements: tuple[RankAgreement, ...] = ()
     """Agreement of each pair of conditions."""
-    claims: tuple[Claim, ...] = ()
+    claims: tuple[BenchmarkStatement, ...] = ()
     """Claims of papers and our results."""
     notes: tuple[str, ...] = ()
     """Notes for readers: negative results, and omissions with their reasons."""

@@ -12,8 +12,8 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
 from harness.results.cell import Cell, as_row, varied_text
+from harness.score.loops import pool_frames
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
-from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
 from harness.score.uncertainty import SigmaSums, score_sigma
 

@@ -9,17 +9,14 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import Origin, Status, has_pose
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, ShapeError
-from harness.score import angles, contact, positions, timing
-from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
+from harness.score import angles, positions, timing
+from harness.score.loops import COVERAGE_FLOOR, WARM_UP_S, LoopFrames, score_loops
+from harness.score.metrics import DEFINITIONS
 from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
 from harness.score.uncertainty import SigmaSums, score_sigma
 
-WARM_UP_S = 1.0
-"""Estimates in this first part of a take are not scored [s] (choice)."""
 UNDISTURBED_AFTER_S = 0.5
 """A frame is undisturbed when every station has reported for this long [s] (choice): time to find the body again."""
-COVERAGE_FLOOR = 0.5
-"""With a smaller share of matched frames, only coverage is measured (choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,49 +70,38 @@ def score_estimate(
     origin = np.full(len(estimate_qpos), Origin.MODEL) if origin is None else np.asarray(origin)
     complete = np.ones(len(estimate_qpos), bool) if complete is None else np.asarray(complete)
     frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
-    warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
-    finite = has_pose(estimate_qpos)
-    warm = frame_index >= warm_up
-    scored = finite & warm
-    expected = max(len(truth_qpos) - warm_up, 0)
-    coverage = scored.sum() / expected if expected else 0.0
-
-    truth = compute_poses(skeleton, truth_qpos)
-    ground_m = contact.ground_m(truth) if len(truth_qpos) else 0.0
-    matched = frame_index[finite]
-    estimate = compute_poses(estimate_skeleton or skeleton, estimate_qpos[finite])
-    pair = Pair(truth.at(matched), estimate, matched, rate_hz, ground_m)
-    per_frame = {name: np.full(len(frame_index), np.nan) for name in FRAME_METRICS}
-    for name, function in FRAME_METRICS.items():
-        if len(matched):
-            per_frame[name][finite] = function(pair)
-
-    measured: dict[str, float] = {
-        name: pool_frames(per_frame[name][scored], DEFINITIONS[name].pool) for name in FRAME_METRICS
-    }
-    scored_pair = pair.at(matched >= warm_up)
+    truth, rows = compute_poses(skeleton, truth_qpos), np.arange(len(frame_index))
+    found = score_loops(
+        truth,
+        rate_hz,
+        estimate_qpos,
+        [LoopFrames(rows, frame_index, range(len(truth_qpos)))],
+        estimate_skeleton=estimate_skeleton,
+        warm_up_s=warm_up_s,
+    )
+    (scored_pair,), measured, warm, scored = found.pairs, found.pooled(), found.warm, found.scored
     undisturbed = scored & undisturbed_frames(complete, frame_index, rate_hz)
     measured["fallback_share"] = _share(origin[undisturbed] == Origin.FALLBACK)
     measured["root_drift_mm_s"] = positions.root_drift_mm_s(scored_pair)
     measured["lag_ms"] = timing.lag_ms(
         truth.angles_rad, scored_pair.estimate.angles_rad, scored_pair.frame_index, rate_hz
     )
-    timed = warm & (np.arange(len(step_ms)) > 0)
+    timed = warm & (rows > 0)
     measured |= timing.step_times_ms(step_ms[timed])
     measured["step_relative"] = float("nan") if cpu_ms is None else timing.step_relative(cpu_ms[0][timed], cpu_ms[1])
     measured["first_step_ms"] = float(step_ms[0]) if len(step_ms) else float("nan")
     counts: dict[str, float] = {
-        "frames_matched": int(scored.sum()),
-        "frames_expected": expected,
-        "coverage": float(coverage),
+        "frames_matched": found.matched,
+        "frames_expected": found.expected,
+        "coverage": found.coverage,
         "frames_warm_up": int((~warm).sum()),
         "frames_held": int((status[scored] == Status.HELD).sum()),
         "frames_lost": int((status[scored] == Status.LOST).sum()),
         "frames_fallback": int((origin[scored] == Origin.FALLBACK).sum()),
         "frames_bridged": int((origin[scored] == Origin.BRIDGED).sum()),
-        "frames_not_finite": int((~finite).sum()),
+        "frames_not_finite": int((~has_pose(estimate_qpos)).sum()),
     }
-    enough = expected > 0 and coverage >= floor
+    enough = found.is_enough(floor)
     metrics = {
         name: counts[name] if name in counts else measured[name] if enough and np.isfinite(measured[name]) else None
         for name in DEFINITIONS
@@ -124,7 +110,7 @@ def score_estimate(
     if enough and angle_sigma_rad is not None:
         sums = score_sigma(truth_qpos[frame_index[scored]], estimate_qpos[scored], angle_sigma_rad[scored])
         sigma, per_joint = sums.scores(), per_joint | _sigma_per_joint(skeleton, sums)
-    return Scores(metrics, per_frame, per_joint, scored, sigma)
+    return Scores(metrics, found.per_frame, per_joint, scored, sigma)
 
 
 def undisturbed_frames(complete: Bools, frame_index: Ints, rate_hz: float) -> Bools:
@@ -145,14 +131,6 @@ def undisturbed_frames(complete: Bools, frame_index: Ints, rate_hz: float) -> Bo
 def _share(values: Bools) -> float:
     """Share of true values; NaN without values."""
     return float(values.mean()) if len(values) else float("nan")
-
-
-def pool_frames(values: Floats, pool: Pool) -> float:
-    """Pool per-frame values to one number; undefined values are left out; NaN without values."""
-    defined = values[np.isfinite(values)]
-    if not len(defined) or pool == "none":
-        return float("nan")
-    return float(np.sqrt(np.mean(defined**2))) if pool == "rms" else float(np.mean(defined))
 
 
 def _per_joint(pair: Pair) -> dict[str, dict[str, float]]:

@@ -25,11 +25,7 @@ class Disturbance:
     """A fault of limited duration; sizes and lengths are those of docs/metrics.md ("recovery")."""
 
     kind: Kind = "none"
-    """Kind of fault.
-
-    `one_lost`, `all_lost`: one station or all are lost. `one_off`: one station has a constant position error.
-    `all_turned`: all orientations are rotated. `start_off`: all positions are offset at the start.
-    """
+    """Kind of fault; docs/metrics.md describes each."""
     station: str = ""
     """Station of `one_lost` and `one_off`; "" is the first."""
     from_s: Annotated[float, Range(0.0, 1e6)] = 3.0

@@ -65,7 +65,7 @@ class Trajectory:
         if len(take) < 2:
             raise BadInput(f"{take.name} has {len(take)} frame(s).", "A trajectory needs at least two.")
         self.body = body
-        self.duration_s = (len(take) - 1) / take.rate_hz
+        self.duration_s = take.duration_s
         knots = np.array(take.qpos)
         knots[:, 3:7] = rotations.continuous(knots[:, 3:7])
         self._take: PPoly = CubicSpline(np.arange(len(take)) / take.rate_hz, knots)

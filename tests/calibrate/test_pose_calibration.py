@@ -74,7 +74,7 @@ def test_clean_poses_give_the_truth(number: int, own_directions: bool) -> None:
 )
 def test_poses_that_are_missed(miss_deg: float, mount_mm: float, mount_deg: float, length_mm: float) -> None:
     """Root mean squares over two performers: the miss is found, and everything is nearer than the mean
-    skeleton. Of twenty: tests/experiment/test_calibration_accuracy.py."""
+    skeleton. Of twenty: tests/bench/test_calibration_accuracy.py."""
     lengths, mean, mounts, turns, misses = [], [], [], [], []
     for seed in range(2):
         model = Model(somebody(seed), SIX, float(np.deg2rad(miss_deg)), 0.0015, 0.006, beside_m=0.01, seed=seed)

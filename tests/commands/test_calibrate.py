@@ -127,19 +127,19 @@ def test_poses_that_are_missing_are_told_and_nothing_is_written(
     ("words", "says"),
     [
         ([], "No source of poses"),
-        (["--live", "--simulate", "3"], "2 sources: live, simulate"),
-        (["a.rec", "--live"], "2 sources: recording, live"),
+        (["--port", "x", "--simulate", "3"], "2 sources: port, simulate"),
+        (["a.rec", "--port", "x"], "2 sources: recording, port"),
         (["a.rec"], "--out is missing"),
-        (["a.rec", "--out", "me.toml", "--port", "/dev/null"], "--port with recording. It applies to live"),
-        (["--simulate", "3", "--out", "me.toml"], "--out with simulate. It applies to recording or live"),
-        (["--simulate", "3", "--kind", "tpose"], "--kind with simulate. It applies to recording or live"),
+        (["a.rec", "--out", "me.toml", "--rate", "40"], "--rate with recording. It applies to port"),
+        (["--simulate", "3", "--out", "me.toml"], "--out with simulate. It applies to recording or port"),
+        (["--simulate", "3", "--kind", "tpose"], "--kind with simulate. It applies to recording or port"),
         (["--simulate", "3", "--miss", "90"], "--miss 90"),
         (["--simulate", "3", "--noise", "loud"], "loud"),
         (["--simulate", "0"], "not a positive whole number"),
-        (["--live", "--out", "me.toml", "--scenario", "demo"], "--live without --port"),
-        (["--live", "--out", "me.toml", "--port", "x"], "--live without --scenario"),
-        (["--live", "--out", "me.toml", "--port", "x", "--pictures", "there"], "--pictures without --view frames"),
-        (["--live", "--out", "me.toml", "--port", "no_such_port", "--scenario", "demo"], "no such port"),
+        (["--out", "me.toml", "--scenario", "demo"], "No source of poses"),
+        (["--out", "me.toml", "--port", "x"], "--port without --scenario"),
+        (["--out", "me.toml", "--port", "x", "--pictures", "there"], "--pictures without --view frames"),
+        (["--out", "me.toml", "--port", "no_such_port", "--scenario", "demo"], "no such port"),
         (["no_such.rec", "--out", "me.toml", "--scenario", "demo"], "no_such.rec"),
         (["a.rec", "--out", "no/such/me.toml"], "folder does not exist"),
         (["a.rec", "--kind", "npose"], "invalid choice"),
@@ -175,7 +175,7 @@ def test_stations_without_names_are_told_by_the_user(recording: Path, tmp_path: 
 def test_a_tpose_of_a_tracker_that_streams(model: Playback, tmp_path: Path) -> None:
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose"]
-        assert main(["calibrate", "--live", *words, "--out", str(tmp_path / "me.toml")]) == 0
+        assert main(["calibrate", *words, "--out", str(tmp_path / "me.toml")]) == 0
         assert not device.emulator.device.streaming
     kept, truth = read_calibration(tmp_path / "me.toml"), model.calibration
     assert kept.calibration.stations == STATIONS
@@ -190,7 +190,7 @@ def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, capsys: 
     model, out = prepare_playback("demo", clip=CLIP, stations=6, posing=True), tmp_path / "my calibration.toml"
     with serve_emulator(model.samples, pty=tmp_path / "a port") as device:
         words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose", "--stations", "6"]
-        assert main(["calibrate", "--live", *words, "--out", str(out)]) == 0
+        assert main(["calibrate", *words, "--out", str(out)]) == 0
         (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("next: ")]
         program, *following = shlex.split(line.removeprefix("next: "))
         assert program == "harness"
@@ -208,7 +208,7 @@ def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, capsys: 
 def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
-        command = [sys.executable, "-m", "harness.cli", "calibrate", "--live", *words]
+        command = [sys.executable, "-m", "harness.cli", "calibrate", *words]
         with subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
         ) as program:
@@ -244,7 +244,7 @@ def test_eight_poses_of_a_tracker_that_streams(model: Playback, recording: Path,
     with serve_emulator(model.samples, pty=tmp_path / "tracker") as device:
         words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
         pictures = ["--view", "frames", "--pictures", str(tmp_path / "pictures")]
-        assert main(["calibrate", "--live", *words, *pictures]) == 0
+        assert main(["calibrate", *words, *pictures]) == 0
     assert len(list((tmp_path / "pictures").glob("0000000[1-8].png"))) == 8
     kept, truth = read_calibration(tmp_path / "me.toml"), model.calibration
     assert np.linalg.norm(kept.calibration.mount_m - truth.mount_m, axis=1).max() < 0.025

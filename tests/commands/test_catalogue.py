@@ -60,6 +60,16 @@ def test_a_scenario_says_what_it_varies() -> None:
     assert "noise default" in build_catalogue()["scenarios"]["demo"]
 
 
+def test_scenarios_that_only_choose_constants_come_with_all(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "scenarios", "--json"]) == 0
+    users = json.loads(capsys.readouterr().out)["scenarios"]
+    assert main(["list", "scenarios", "--all", "--json"]) == 0
+    every = json.loads(capsys.readouterr().out)["scenarios"]
+    hidden = every.keys() - users.keys()
+    assert {"demo", "boxing", "lab"} <= users.keys() < every.keys()
+    assert {name.partition("_")[0] for name in hidden} == {"tune", "validate"}
+
+
 def test_one_kind_is_listed_alone(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "places"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -37,22 +37,22 @@ def walking(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_capture_gives_a_unit_file_and_a_page(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before, unit = rig.read_bytes(), tmp_path / "unit.toml"
-    code, out, _ = run(capsys, "characterize", rig, "--out", unit, "--name", "unit 7", "--rigid", "left_hand,torso")
+    code, out, _ = run(capsys, "characterize", rig, "--out", unit, "--rigid", "left_hand,torso")
     assert (code, out.splitlines()[-1]) == (0, "pass")
-    assert "unit 7 " in out.splitlines()[0]
+    assert "rig " in out.splitlines()[0]
     for words in ("error model", "clock and records", "static", "slow", "covered", "stations on a bar", "how long"):
         assert words in out
     assert rig.read_bytes() == before
     assert "Allan deviation" in unit.with_suffix(".html").read_text(encoding="utf-8")
     content = read_unit_file(unit)
-    assert content.name == "unit 7"
+    assert content.name == "rig"
     assert content.measured["components.white.position_m"].contains(0.00075)
     assert "components.session.scale" in content.not_measured
     written = unit.read_bytes()
     code, _, err = run(capsys, "characterize", rig, "--out", unit)
     assert (code, "--force" in err) == (2, True)
     assert unit.read_bytes() == written
-    again = ("characterize", rig, "--out", unit, "--name", "unit 7", "--rigid", "left_hand,torso", "--force")
+    again = ("characterize", rig, "--out", unit, "--rigid", "left_hand,torso", "--force")
     assert run(capsys, *again)[0] == 0
     assert unit.read_bytes() == written
     code, out, _ = run(capsys, "characterize", rig, "--expect", unit, "--json")

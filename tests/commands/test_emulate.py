@@ -67,8 +67,6 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
         (["no_such_scenario"], "no scenario called"),
         (["builtin_walking", "--firmware", "new"], "such as 4.2301"),
         (["builtin_walking", "--baud", "115201"], "An IS-900 supports 300"),
-        (["builtin_walking", "--restart", "-1"], "restart_s = -1 is not possible. Give a number from 0 to 3600."),
-        (["builtin_walking", "--restart", "nan"], "restart_s = nan"),
         (["builtin_walking", "--rate", "1000000"], "rate_hz = 1000000.0. Give a number from 1 to 1000."),
         (["builtin_walking", "--anywhere"], "--anywhere with --pty"),
         (["builtin_walking", "--baud", "9600"], "a line of 9600 baud carries 960. Try --rate 6;"),

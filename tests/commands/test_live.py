@@ -140,7 +140,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--bvh", "/no/such/folder/x.bvh"], "cannot be written"),
         (["--lsl", ""], "The argument after '--lsl' is empty"),
         (["--out", "there"], "--out without --view frames"),
-        (["--lsl-network"], "--lsl-network without --lsl"),
+        (["--anywhere"], "--anywhere without --lsl"),
         (["--seconds", "soon"], "not a positive number"),
         (["--items", "40;2"], "not a list such as"),
         (["--items", "2,11,21,1"], "(--quality mp)"),

@@ -99,7 +99,7 @@ def test_flags_are_repeated_as_they_were_given(words: list[str]) -> None:
         ),
         (
             ["emulate", "demo", "--tcp", "127.0.0.1:0", "--stations", "6", "--poses"],
-            ["calibrate", "--live", "--port", "PORT", "--scenario", "demo", "--stations", "6", "--out", "me.toml"],
+            ["calibrate", "--port", "PORT", "--scenario", "demo", "--stations", "6", "--out", "me.toml"],
         ),
         (
             ["emulate", "demo", "--tcp", "127.0.0.1:0", "--firmware", "4.1105"],  # which has no item 40

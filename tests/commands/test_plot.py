@@ -36,7 +36,6 @@ def test_it_names_the_file_its_size_and_a_caption(
     ("words", "said"),
     [
         ("--kind rankin", "Did you mean 'ranking'?"),
-        ("--format pfd", "Did you mean 'pdf'?"),
         ("--metric mpjpe_m", "Did you mean 'mpjpe_mm'?"),
         ("--methods ikk", "Did you mean 'ik'?"),
         ("--kind time --clip walk_1", "Did you mean 'walk_"),

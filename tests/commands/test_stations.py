@@ -46,7 +46,7 @@ def test_wrong_maps_are_refused_before_a_port_is_opened(
     commands = {
         "record": ["record", "tcp://127.0.0.1:1", str(tmp_path / "x.rec")],
         "live": LIVE,
-        "calibrate": ["calibrate", "--live", "--port", "tcp://127.0.0.1:1", "--scenario", "demo", "--out"],
+        "calibrate": ["calibrate", "--port", "tcp://127.0.0.1:1", "--scenario", "demo", "--out"],
     }
     commands["calibrate"].append(str(tmp_path / "me.toml"))
     assert main([*commands[verb], "--stations", text]) == 2

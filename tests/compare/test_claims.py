@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from harness.compare.claims import claim_all, claim_decreasing, claim_lower_error, claim_noninferior, correct_claims
-from harness.results.findings import Claim, ClaimVerdict
+from harness.results.benchmark_statement import BenchmarkStatement, Verdict
 
 
 def by_clip(values: np.ndarray) -> dict[str, float]:
     return {f"clip_{at}": float(value) for at, value in enumerate(values)}
 
 
-def order(clips: int, gain: float = 1.0) -> Claim:
+def order(clips: int, gain: float = 1.0) -> BenchmarkStatement:
     """A claim whose differences all have the sign of `gain`."""
     more = np.linspace(5.0, 6.0, clips)
     return claim_lower_error("a < b", by_clip(more - gain * np.linspace(0.9, 1.1, clips)), by_clip(more))
@@ -29,7 +29,7 @@ def order(clips: int, gain: float = 1.0) -> Claim:
     ],
 )
 def test_noninferior_is_an_excess_whose_interval_ends_below_the_margin(
-    excess: float, spread: float, verdict: ClaimVerdict, rng: np.random.Generator
+    excess: float, spread: float, verdict: Verdict, rng: np.random.Generator
 ) -> None:
     reference = rng.uniform(8.0, 12.0, 12)
     reference += 10.0 - reference.mean()
@@ -37,8 +37,8 @@ def test_noninferior_is_an_excess_whose_interval_ends_below_the_margin(
     errors = reference + excess + spread * (noise - noise.mean())
     claim = claim_noninferior("suitable", by_clip(errors), by_clip(reference))
     assert claim.verdict == verdict
-    assert claim.difference == pytest.approx(0.2 - excess)
-    assert (claim.low or 0.0) < (claim.difference or 0.0) < (claim.high or 0.0)
+    assert claim.value == pytest.approx(0.2 - excess)
+    assert (claim.low or 0.0) < (claim.value or 0.0) < (claim.high or 0.0)
     assert (claim.why == "") == (verdict == "reproduced")
 
 
@@ -52,7 +52,7 @@ def test_five_clips_are_too_few_for_noninferiority() -> None:
 def test_a_claim_of_several_parts_is_as_good_as_its_worst() -> None:
     good, bad = order(8), order(8, -1.0)
     whole = claim_all("both", {"first": good, "second": bad})
-    assert (whole.verdict, whole.difference, whole.text) == ("not reproduced", bad.difference, "both")
+    assert (whole.verdict, whole.value, whole.text) == ("not reproduced", bad.value, "both")
     assert whole.why.startswith("second: ")
     assert claim_all("both", {"first": good, "second": replace(good, p=0.9)}).p == 0.9
 
@@ -63,7 +63,7 @@ def test_one_part_that_is_refuted_refutes_the_claim() -> None:
     series = {"1": by_clip(3.0 + noise), "2": by_clip(3.0 + 0.1 * noise), "3": by_clip(4.5 + 0.1 * noise)}
     (claim,) = correct_claims([claim_decreasing("more is better", series, "%")])
     assert claim.verdict == "not reproduced"
-    assert claim.difference == pytest.approx(-1.5, abs=0.01)
+    assert claim.value == pytest.approx(-1.5, abs=0.01)
     assert claim.p == pytest.approx(2 * 2.0**-11)  # both steps count
 
 
@@ -71,14 +71,14 @@ def test_one_part_that_is_refuted_refutes_the_claim() -> None:
     ("means", "verdict", "step"),
     [((3.0, 2.0, 1.0), "reproduced", ""), ((3.0, 1.0, 2.0), "not reproduced", "from 10 to 100 %")],
 )
-def test_errors_decrease_at_every_step(means: tuple[float, ...], verdict: ClaimVerdict, step: str) -> None:
+def test_errors_decrease_at_every_step(means: tuple[float, ...], verdict: Verdict, step: str) -> None:
     series = {
         name: by_clip(np.linspace(mean, mean + 0.1, 8)) for name, mean in zip(("1", "10", "100"), means, strict=True)
     }
     claim = claim_decreasing("more is better", series, "%")
     assert claim.verdict == verdict
     assert step in claim.why
-    assert "with 1, 10, 100 %" in claim.ours
+    assert "with 1, 10, 100 %" in claim.measured
     assert claim_decreasing("more is better", {**series, "100": {}}, "%").verdict == "not run"
 
 

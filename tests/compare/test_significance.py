@@ -145,7 +145,7 @@ def test_few_clips_are_seldom_called_the_same_when_the_true_difference_is_the_ma
 def test_how_often_few_clips_are_called_the_same_at_the_margin(
     name: str, least: float, most: float, count: int
 ) -> None:
-    """The table of docs/studies.md; the standard deviation is a tenth of the margin."""
+    """The table of docs/notes/statistics.md; the standard deviation is a tenth of the margin."""
     rng, shape = generator(1, "at the margin", name, count), (20_000, count)
     draws = {
         "normal": rng.normal(size=shape),

@@ -7,7 +7,7 @@ from threading import Event
 import pytest
 
 from harness.core.files import TEMPORARY
-from harness.experiment.cell_watcher import CellCount
+from harness.experiment.cell_watcher import ProgressCount
 from tests.report.fabricate import Plan, fabricate
 
 
@@ -22,7 +22,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_cell_is_counted_once(tmp_path: Path, finished: Path) -> None:
     (tmp_path / "cells" / "of-before").mkdir(parents=True)
     said: list[tuple[str, int]] = []
-    count = CellCount(tmp_path, lambda last, ended: said.append((last, ended)))
+    count = ProgressCount(tmp_path, lambda last, ended: said.append((last, ended)))
     (tmp_path / "cells" / f"{TEMPORARY}half").mkdir()
     count.look()
     assert said == []
@@ -48,7 +48,7 @@ def test_a_thread_counts_while_tasks_run(tmp_path: Path, finished: Path) -> None
         said.append(ended)
         counted.set()
 
-    count = CellCount(tmp_path, hear)
+    count = ProgressCount(tmp_path, hear)
     with count.watching():
         shutil.copytree(finished, tmp_path / "cells" / "whole")
         assert counted.wait(20.0)

@@ -12,11 +12,12 @@ from harness.compare.comparison import compare_results
 from harness.core.messages import MessageError
 from harness.errors import Outcome, ShapeError
 from harness.experiment import engine
+from harness.experiment.evaluation import evaluate_each, format_score_table
 from harness.experiment.method_messages import decode_answers, encode_answers
 from harness.experiment.method_run import MethodAnswers, run_method
 from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment.recorded_take import recorded_take
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
-from harness.experiment.score_recording import format_score_table, score_methods
 from harness.report.run.data import read_run
 from harness.report.run.ranking import describe_rankings
 from harness.report.run.text import run_table
@@ -128,9 +129,9 @@ def played() -> Playback:
 def test_a_recording_is_scored_at_the_frames_that_are_answered(tmp_path: Path, played: Playback) -> None:
     simulation = played.simulation
     record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {})
-    late, prompt = score_methods(RecordingStream(tmp_path / "a.rec"), played, (LATE, PROMPT))
+    late, prompt = evaluate_each((LATE, PROMPT), recorded_take(RecordingStream(tmp_path / "a.rec"), played))
     assert (late.lag, prompt.lag) == (2, 0)
-    assert late.frames_expected == prompt.frames_expected == prompt.frames_matched == late.frames_matched + 2
+    assert late.scores.expected == prompt.scores.expected == prompt.scores.matched == late.scores.matched + 2
     for name in ("joint_angle_mean_deg", "mpjpe_mm"):
         assert late.metrics[name] == pytest.approx(prompt.metrics[name], rel=0.05)
     assert late.sigma_scores == pytest.approx(prompt.sigma_scores, rel=0.05)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from harness.bench.calibration_accuracy import simulate_pose_holds
 from harness.body.humanoid import build_body
 from harness.calibrate.liu2011_calibration import Liu2011Constants, PrintedObjective
 from harness.calibrate.pose_calibration import measure_poses, pose_bundle
 from harness.calibrate.skeleton_prior import fit_skeleton_prior
-from harness.experiment.calibration_accuracy import simulate_pose_holds
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.scenario import load_scenario
 from harness.experiment.simulated_calibration import TrackerSession

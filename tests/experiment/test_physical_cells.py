@@ -11,15 +11,15 @@ from harness.core.split import ClipPart
 from harness.experiment import engine
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.method_run import run_method
+from harness.experiment.evaluation import evaluate_each
+from harness.experiment.observed_take import simulated_take
 from harness.experiment.playback import prepare_playback
+from harness.experiment.recorded_take import recorded_take
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
-from harness.experiment.score_recording import score_methods
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
 from harness.results.cell import Cell, read_cell
 from harness.results.storage import read_summary
-from harness.score.score import score_estimate
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sound import Sound
@@ -127,12 +127,11 @@ def test_a_recording_of_a_physical_tracker_is_scored_as_its_simulation(tmp_path:
     playback = prepare_playback(path)
     simulation = playback.simulation
     record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {"scenario": str(path)})
-    (score,) = score_methods(RecordingStream(tmp_path / "a.rec"), playback, ["ik:previous"])
-    method = playback.clip_evaluation.fit_method(registry.resolve("ik:previous"), "ik:previous")
-    qpos, status, _, step_ms, *_ = run_method(method, simulation.calibration, simulation.frames)
-    truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
-    whole = score_estimate(playback.body.skeleton, playback.tracker.rate_hz, *truth)
-    assert score.frames_matched == score.frames_expected == whole.metrics["frames_matched"]
+    takes = (
+        recorded_take(RecordingStream(tmp_path / "a.rec"), playback),
+        simulated_take(playback.clip_evaluation, "pos+ori"),
+    )
+    recorded, whole = (evaluate_each(["ik:previous"], take)[0] for take in takes)
+    assert recorded.scores.matched == recorded.scores.expected == whole.scores.matched
     for name in ("joint_angle_mean_deg", "mpjpe_mm"):
-        assert score.metrics[name] == whole.metrics[name]
-        assert score.metrics[name] is not None
+        assert recorded.metrics[name] == whole.metrics[name] is not None

@@ -10,8 +10,9 @@ import pytest
 
 from harness.errors import Outcome
 from harness.experiment import engine
+from harness.experiment.evaluation import evaluate_each, format_score_table
 from harness.experiment.playback import prepare_playback
-from harness.experiment.score_recording import format_score_table, reconstruct_recording, score_methods
+from harness.experiment.recorded_take import recorded_take
 from harness.results.storage import read_cells, read_summary
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.replay import RecordingStream
@@ -63,12 +64,13 @@ def test_a_method_that_fails_on_a_recording_stops_no_other(tmp_path: Path) -> No
     simulation, path = played.simulation, tmp_path / "a.rec"
     record_capture(path, simulation.wire_format, simulation.wire, {})
     names = (method_name(Diverges), "mean_pose")
-    bad, good = score_methods(RecordingStream(path), played, names)
-    (alone,) = score_methods(RecordingStream(path), played, names[1:])
+    take = recorded_take(RecordingStream(path), played)
+    bad, good = evaluate_each(names, take)
+    (alone,) = evaluate_each(names[1:], take)
     assert "1e+17 at place 10" in bad.failure
     assert bad.metrics["mpjpe_mm"] is None
     assert good.metrics["mpjpe_mm"] == alone.metrics["mpjpe_mm"] is not None
     text = format_score_table([bad, good])
     assert re.search(rf"^failed: {names[0]}: .*1e\+17", text, re.MULTILINE)
-    done = reconstruct_recording(RecordingStream(path), played, names)
-    assert (set(done.estimates), set(done.failures)) == ({"mean_pose"}, {names[0]})
+    assert (len(bad.answers.qpos), len(good.answers.qpos)) == (0, len(take.frames))
+    assert bad.as_dict()["frames_matched"] == 0

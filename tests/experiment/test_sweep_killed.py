@@ -24,7 +24,7 @@ from harness.core.files import TEMPORARY
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import ClipTask, run_task
-from harness.experiment.engine import CellResults, run_cells
+from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from harness.experiment.scenario import Scenario
 from tests.study.papers.tiny import WALKS
@@ -36,7 +36,7 @@ TIMED = ("step_", "reference_cpu_ms", "first_step_ms", "fps", "seconds")
 """How names begin of what no two runs have alike."""
 
 
-def told(cells: CellResults) -> list[str]:
+def told(cells: BatchResults) -> list[str]:
     """The table: all that each row says but for times."""
     return [json.dumps({k: v for k, v in row.items() if not k.startswith(TIMED)}) for row in cells.rows]
 
@@ -60,7 +60,7 @@ def kept(out: Path) -> dict[str, str]:
     return digests
 
 
-def ran(out: Path, executor: TaskExecutor, scenario: Scenario = NOISY, workers: int = 2) -> CellResults:
+def ran(out: Path, executor: TaskExecutor, scenario: Scenario = NOISY, workers: int = 2) -> BatchResults:
     out.mkdir(exist_ok=True)
     return run_cells([scenario], out, folder=None, executor=executor, command="harness sweep it", workers=workers)
 

@@ -21,8 +21,8 @@ from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
 from harness.experiment.planning import cell_names
 from harness.experiment.playback import prepare_playback
+from harness.experiment.recorded_take import find_playback
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
-from harness.experiment.score_recording import find_playback
 from harness.experiment.status import read_status
 from harness.experiment.sweep_config import expand_sweep, load_sweep
 from harness.mocap.file_inspection import inspect_file

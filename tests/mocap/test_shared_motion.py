@@ -46,7 +46,7 @@ FOUND = (
     *("mirrored", "reversed", "50 Hz", "moved and turned", "3 % slower", "pieces of 0.8 s in another order"),
     *("0.05 of another take", "jitter of a frame", "filtered with 0.05 s"),
 )
-"""Edits that are found in every one of `TAKES`; docs/trust.md says the same."""
+"""Edits that are found in every one of `TAKES`; docs/notes/copies.md says the same."""
 NOT_FOUND = (
     *("4 deg of noise of 0.4 s", "rounded to 4 deg", "0.7 of the amplitude", "20 deg added to the arms"),
     *("half of another take", "0.9 of the amplitude, rounded to 1 deg, 60 Hz, mirrored"),

@@ -6,15 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from harness.core.seeds import generator
-from harness.results.findings import (
-    BarChart,
-    Claim,
-    FindingsTable,
-    LineChart,
-    PaperExperiment,
-    PaperFindings,
-    write_findings,
-)
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings, write_findings
 
 METHODS: Mapping[str, float] = {"dynamic_map": 1.0, "local_pca": 1.6, "ik": 2.4}
 """Method -> size of its errors [deg], in the order that the paper expects."""
@@ -44,11 +37,17 @@ def liu() -> PaperFindings:
     errors = {name: _errors(name, size) for name, size in METHODS.items()}
     orders = [_order(n, *pair, errors) for n in range(len(BEHAVIOURS)) for pair in pairwise(METHODS)]
     figures = [
-        Claim(f"boxing, {name}", f"{theirs} deg", f"{theirs + 0.4:.2f} deg", "not comparable", "built-in motion", 2)
+        BenchmarkStatement(
+            f"boxing, {name}", f"{theirs} deg", f"{theirs + 0.4:.2f} deg", "not comparable", "built-in motion", 2
+        )
         for name, theirs in INPUTS.items()
     ]
-    modes = Claim("five modes keep about 99 %", "99 %", "91.2 %", "not reproduced", "fewer skeletons, more noise")
-    speed = Claim("35 frames a second with 65,922 frames", "35 frames/s", "", "not run", "there was no time")
+    modes = BenchmarkStatement(
+        "five modes keep about 99 %", "99 %", "91.2 %", "not reproduced", "fewer skeletons, more noise"
+    )
+    speed = BenchmarkStatement(
+        "35 frames a second with 65,922 frames", "35 frames/s", "", "not run", "there was no time"
+    )
     question = "Is the paper's order the order here? The paper shows bars of mean and standard deviation (Fig. 6)."
     return PaperFindings(
         paper="liu2011",
@@ -81,7 +80,9 @@ def liu() -> PaperFindings:
 def kim() -> PaperFindings:
     """Findings with 31 horizontal bars and a sparse database."""
     differences = ("All 31 sets of the five trackers were run.",)
-    best = Claim("boxing: RH+LH+PEL errs least", "called suitable", "1st of 10", "cannot tell", "5 clips, of 6", 5)
+    best = BenchmarkStatement(
+        "boxing: RH+LH+PEL errs least", "called suitable", "1st of 10", "cannot tell", "5 clips, of 6", 5
+    )
     figures = tuple(sets(behaviour) for behaviour in ("walking", "boxing"))
     return PaperFindings(
         paper="kim2012",
@@ -133,18 +134,18 @@ def _errors(name: str, size: float) -> tuple[float, ...]:
     return tuple(float(x) for x in rng.uniform(size, 1.4 * size, len(BEHAVIOURS)))
 
 
-def _order(n: int, less: str, more: str, errors: Mapping[str, tuple[float, ...]]) -> Claim:
+def _order(n: int, less: str, more: str, errors: Mapping[str, tuple[float, ...]]) -> BenchmarkStatement:
     """A claim about an order; golf has too few clips."""
     ours, theirs = errors[less][n], errors[more][n]
     few = BEHAVIOURS[n] == "golf"
-    return Claim(
+    return BenchmarkStatement(
         text=f"{BEHAVIOURS[n]}, positions and orientations: {less} errs less than {more}",
-        published="order",
-        ours=f"{ours:.2f} against {theirs:.2f} deg",
+        target="order",
+        measured=f"{ours:.2f} against {theirs:.2f} deg",
         verdict="cannot tell" if few else "reproduced",
         why="too few clips: 2, of at least 6" if few else "",
         clips=2 if few else 8,
-        difference=theirs - ours,
+        value=theirs - ours,
         low=None if few else theirs - ours - 0.1,
         high=None if few else theirs - ours + 0.2,
         unit="deg",

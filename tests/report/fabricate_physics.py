@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from harness.core.seeds import generator
-from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics, TruthRow
+from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics
+from harness.results.benchmark_statement import state_verdict
 
 ROWS = (
-    TruthRow("static, spread of 3-D position", "1.0 to 2.0 mm", "1.54 mm", True, "1.5 mm RMS"),
-    TruthRow(
+    state_verdict("static, spread of 3-D position", "1.0 to 2.0 mm", "1.54 mm", True, "1.5 mm RMS"),
+    state_verdict(
         "free motion in 1 m³",
         "excursions of 1 to 4 cm for 1 to 10 s in 18 of 20 seeds or more; none above 10 cm with quality above 0",
         "14 of 20 seeds; largest 6.2 cm",
@@ -17,7 +18,7 @@ ROWS = (
         "up to 3 cm for several seconds (Gilson et al. 2006)",
         "the gate lets fewer echoes in",
     ),
-    TruthRow("four speeds, rest to fast", "RMS rises at each step", "", None),
+    state_verdict("four speeds, rest to fast", "RMS rises at each step", "", None),
 )
 
 

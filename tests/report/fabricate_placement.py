@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import MIN_UNITS, PairedDifference
 from harness.core.seeds import generator
-from harness.results.findings import Claim
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.placement_findings import (
     BestSet,
     MarginalContribution,
@@ -98,18 +98,18 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
             RankAgreement("boxing", "default*", 0.31, len(sets)),
         ),
         claims=(
-            Claim(
+            BenchmarkStatement(
                 "walking: of all sets of 3 both ankles and the pelvis err least (against the best other, ...)",
                 "called suitable",
                 "1.90 against 2.20 deg",
                 "reproduced",
                 clips=len(clips),
-                difference=0.3,
+                value=0.3,
                 low=0.21,
                 high=0.38,
                 unit="deg",
             ),
-            Claim(
+            BenchmarkStatement(
                 "boxing: both hands and the pelvis err least", "called suitable", "", "not run", "walking alone was run"
             ),
         ),

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.digests import write_result_json
 from harness.results.findings import (
     BarChart,
-    Claim,
     FindingsTable,
     LineChart,
     PaperExperiment,
@@ -30,7 +30,9 @@ FINDINGS = PaperFindings(
             question="Which readings are needed?",
             differences=("other motion",),
             claims=(
-                Claim("a errs less than b", "order", "-0.4 deg", "reproduced", clips=6, difference=-0.4, unit="deg"),
+                BenchmarkStatement(
+                    "a errs less than b", "order", "-0.4 deg", "reproduced", clips=6, value=-0.4, unit="deg"
+                ),
             ),
             tables=(FindingsTable("errors", ("method", "deg"), (("ik", "2.0"),)),),
             figures=(

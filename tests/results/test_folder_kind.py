@@ -60,7 +60,7 @@ def test_what_is_no_run_is_refused_by_what_it_is(tmp_path: Path, kind: str) -> N
 def test_report_names_a_folder_that_it_cannot_show(tmp_path: Path, kind: str) -> None:
     folder = fill(tmp_path / "folder", kind)
     with pytest.raises(BadFile, match=SHOWN[kind]):
-        run_report(argparse.Namespace(run=folder, readme=None, movie=False))
+        run_report(argparse.Namespace(run=folder, readme=None))
 
 
 def test_the_index_tells_a_run_from_a_sweep(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Damage to a capture, and the fate of its records: for the tests of the codec and the table of docs/is900.md 5.6."""
+"""Damage to a capture, and the fate of its records: for tests of the codec and the table of docs/notes/damage.md."""
 
 from collections import Counter
 from dataclasses import dataclass

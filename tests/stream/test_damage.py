@@ -1,6 +1,6 @@
 """Damaged bytes in all formats: what they cost, what is marked, and that memory is bounded and nothing is invented.
 
-`make test-slow` tries a million. `test_many_fates` then prints the table of docs/is900.md 5.6.
+`make test-slow` tries a million. `test_many_fates` then prints the table of docs/notes/damage.md.
 """
 
 from collections import Counter

@@ -1,7 +1,7 @@
 """Run the cells of the accuracy benchmark, and collect their errors by method, condition, clip and seed."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +25,8 @@ from harness.bench.accuracy.conditions import (
     refuse_lag,
     with_lag,
 )
-from harness.bench.accuracy.statements import (
-    PairedStatement,
-    WorseClip,
-    compare_methods,
-    find_worse_clips,
-    rank_pooled,
-)
-from harness.bench.accuracy.targets import LAGGED_CONDITION, LagResult, TargetResult, evaluate_lag, evaluate_targets
+from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
+from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.compare.ranking import MethodRanking
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome, UnknownName
@@ -43,9 +37,12 @@ from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.remote_method import close_methods, resolve_method
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
+from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell
 from harness.results.manifest import current_circumstances
 from harness.study.papers.paper_study import open_study
+
+_QUICK = "the quick form has one seed and few clips"
 
 
 @dataclass(frozen=True)
@@ -62,26 +59,16 @@ class AccuracyReport:
     """The stored errors of the measured seeds."""
     by_method: Mapping[str, ErrorsByCondition] = field(default_factory=dict)
     """Method -> today's errors."""
-    targets: Sequence[TargetResult] = ()
-    lag: LagResult | None = None
+    statements: Sequence[BenchmarkStatement] = ()
+    """The targets, the comparisons with other methods, and the clips that are worse."""
     no_lag: str = ""
     """Why there are no cells with a lag; "" where there are."""
-    statements: Sequence[PairedStatement] = ()
     rankings: Mapping[tuple[str, str], MethodRanking] = field(default_factory=dict)
-    worse_clips: Sequence[WorseClip] = ()
 
     @property
     def outcome(self) -> Outcome:
-        """INCOMPLETE when a cell failed, REGRESSED when a target or a statement is not met, else PASS.
-
-        The quick form has too few clips for a verdict and passes.
-        """
-        if self.failures:
-            return Outcome.INCOMPLETE
-        met = [result.met != "no" for result in self.targets] + [statement.holds for statement in self.statements]
-        if self.lag is not None:
-            met += [self.lag.jitter_met != "no", self.lag.skate_met != "no"]
-        return Outcome.PASS if self.quick or (all(met) and not self.worse_clips) else Outcome.REGRESSED
+        """INCOMPLETE when a cell failed, else that of the statements."""
+        return Outcome.INCOMPLETE if self.failures else outcome_of(self.statements)
 
 
 def measure_accuracy(
@@ -130,20 +117,16 @@ def measure_accuracy(
     lag = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
     if quick:
         earlier = _same_clips(earlier, by_method[method])
-    return AccuracyReport(
-        method,
-        stored.title,
-        quick,
-        results.failures,
-        earlier,
-        by_method,
-        evaluate_targets(earlier, by_method[method]),
-        evaluate_lag(with_lag(method), lag) if lag else None,
-        no_lag,
-        compare_methods(method, by_method),
-        rank_pooled(by_method),
-        find_worse_clips(method, by_method, stored.title, earlier),
-    )
+    statements = [
+        *evaluate_targets(earlier, by_method[method]),
+        *(evaluate_lag(with_lag(method), lag, earlier.get(LAGGED_CONDITION, {})) if lag else ()),
+        *compare_methods(method, by_method),
+        *find_worse_clips(method, by_method, stored.title, earlier),
+    ]
+    if quick:
+        statements = [replace(statement, verdict="no verdict", why=_QUICK) for statement in statements]
+    rankings = rank_pooled(by_method)
+    return AccuracyReport(method, stored.title, quick, {}, earlier, by_method, statements, no_lag, rankings)
 
 
 def clean_commit() -> str:

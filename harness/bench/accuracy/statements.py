@@ -5,60 +5,20 @@ over the seeds. Differences are tested by `compare.paired_statistics`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from harness.bench.accuracy.clip_errors import ANGLE, SILENT_ANGLE, ErrorsByCondition
 from harness.bench.accuracy.conditions import COMPARED_METHODS, LIMITING_METHODS, PRESETS, TABLE_SCENARIOS
 from harness.bench.accuracy.targets import require_mean
-from harness.compare.paired_statistics import PairedDifference, compare_paired
+from harness.compare.paired_statistics import compare_paired
 from harness.compare.ranking import MethodRanking, rank_methods
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 
 LARGEST_RATIO = 1.05
 """Largest ratio of an error to that of a limiting method on one clip."""
 PERFORMERS = ("known", "new")
-
-
-@dataclass(frozen=True)
-class PairedStatement:
-    """One method against another one on the pooled clips of one kind of performers, with one noise preset."""
-
-    performer: str
-    noise: str
-    method: str
-    other: str
-    mean_deg: float
-    """Mean error of `method` over the clips [deg]."""
-    other_mean_deg: float
-    difference: PairedDifference
-    """Error of `other` minus that of `method` [deg]: above zero where `method` is better."""
-
-    @property
-    def verdict(self) -> str:
-        """Verdict on `method`: "better", "worse" or "cannot tell"."""
-        return {"reproduced": "better", "not reproduced": "worse"}.get(self.difference.verdict, "cannot tell")
-
-    @property
-    def holds(self) -> bool:
-        """Whether the statement holds: better for known performers, not worse for new ones."""
-        return self.verdict == "better" if self.performer == "known" else self.verdict != "worse"
-
-
-@dataclass(frozen=True)
-class WorseClip:
-    """A clip on which the method's error exceeds that of a limiting method by more than 5 %."""
-
-    condition: str
-    clip: str
-    other: str
-    error_deg: float
-    other_error_deg: float
-
-    @property
-    def ratio(self) -> float:
-        """The error relative to that of the other method."""
-        return self.error_deg / self.other_error_deg
 
 
 def pool_clips(errors: ErrorsByCondition, noise: str, performer: str) -> dict[str, float]:
@@ -71,8 +31,11 @@ def pool_clips(errors: ErrorsByCondition, noise: str, performer: str) -> dict[st
     }
 
 
-def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> list[PairedStatement]:
-    """Compare `method` with each of `COMPARED_METHODS` but itself, for every preset and kind of performers."""
+def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> list[BenchmarkStatement]:
+    """Compare `method` with each of `COMPARED_METHODS` but itself, for every preset and kind of performers.
+
+    It must be better for known performers, and not worse for new ones. Positive differences are in its favour.
+    """
     found = []
     for performer in PERFORMERS:
         for noise in PRESETS:
@@ -83,7 +46,22 @@ def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> 
                 if other == method or not difference.units:
                     continue
                 error, other_error = (float(np.mean([of[clip] for clip in difference.units])) for of in (ours, theirs))
-                found.append(PairedStatement(performer, noise, method, other, error, other_error, difference))
+                is_better, is_worse = (difference.verdict == word for word in ("reproduced", "not reproduced"))
+                found.append(
+                    state_verdict(
+                        f"{performer} performers, {noise}: {method} against {other}",
+                        "better" if performer == "known" else "not worse",
+                        f"{error:.2f} against {other_error:.2f} deg",
+                        None if difference.low is None else is_better if performer == "known" else not is_worse,
+                        why=difference.why if difference.low is None else "",
+                        clips=len(difference.units),
+                        value=difference.mean,
+                        low=difference.low,
+                        high=difference.high,
+                        unit="deg",
+                        more={"performers": performer, "noise": noise, "other": other},
+                    )
+                )
     return found
 
 
@@ -100,20 +78,35 @@ def rank_pooled(by_method: Mapping[str, ErrorsByCondition]) -> dict[tuple[str, s
 
 def find_worse_clips(
     method: str, by_method: Mapping[str, ErrorsByCondition], stored_title: str, stored: ErrorsByCondition
-) -> list[WorseClip]:
+) -> list[BenchmarkStatement]:
     """Clips on which `method` exceeds the stored errors, or those of `LIMITING_METHODS`, by more than 5 %.
 
-    All conditions count; where a station is silent, the errors meanwhile. The clips with the largest ratios come first.
+    All conditions count; where a station is silent, the errors meanwhile. There is a statement for each such clip, the
+    largest ratio first, and one for all where there is none.
     """
     others = {stored_title: stored} | {name: by_method[name] for name in LIMITING_METHODS}
-    found = []
+    found: list[BenchmarkStatement] = []
+    target = f"<= {LARGEST_RATIO:g}"
     for condition, by_clip in by_method[method].items():
         for clip, errors in by_clip.items():
             metric = SILENT_ANGLE if SILENT_ANGLE in errors.by_metric else ANGLE
             ours = require_mean(errors, metric, clip)
             for other, other_errors in others.items():
-                theirs = other_errors.get(condition, {}).get(clip)
-                worse = theirs and WorseClip(condition, clip, other, ours, require_mean(theirs, metric, clip))
-                if worse and worse.ratio > LARGEST_RATIO:
-                    found.append(worse)
-    return sorted(found, key=lambda worse: -worse.ratio)
+                if clip in (limits := other_errors.get(condition, {})):
+                    theirs = require_mean(limits[clip], metric, clip)
+                    found.append(
+                        state_verdict(
+                            f"{condition}, {clip}: {method} / {other}",
+                            target,
+                            f"{ours / theirs:.3f}",
+                            ours / theirs <= LARGEST_RATIO,
+                            f"{ours:.2f} and {theirs:.2f} deg",
+                            value=ours / theirs,
+                            more={"condition": condition, "clip": clip, "other": other},
+                        )
+                    )
+    if worse := [statement for statement in found if statement.verdict == "missed"]:
+        return sorted(worse, key=lambda statement: -(statement.value or 0.0))
+    largest = max(found, key=lambda statement: statement.value or 0.0)
+    name = f"{method} / {', '.join(others)}: the largest ratio on a clip"
+    return [replace(largest, text=name, reference=f"{largest.text}: {largest.reference}")]

@@ -15,7 +15,9 @@ from harness.bench.accuracy.clip_errors import (
     ClipErrors,
     ErrorsByCondition,
 )
+from harness.core.number_format import format_fixed
 from harness.errors import BadInput
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 
 
 @dataclass(frozen=True)
@@ -72,60 +74,13 @@ LEAST_SKATE_MM_S, GOAL_SKATE_MM_S = 180.0, 130.0
 """Largest foot skate of estimates with a lag [mm/s]."""
 
 
-@dataclass(frozen=True)
-class TargetResult:
-    """A target with both errors, means over the clips."""
-
-    target: Target
-    clips: tuple[str, ...]
-    stored: float
-    today: float
-
-    @property
-    def ratio(self) -> float:
-        """Today's error relative to the stored one."""
-        return self.today / self.stored
-
-    @property
-    def met(self) -> str:
-        """What is met: "goal", "at least" or "no"."""
-        return "goal" if self.ratio <= self.target.goal else "at least" if self.ratio <= self.target.least else "no"
-
-
-@dataclass(frozen=True)
-class LagResult:
-    """Jitter and foot skate of the cells with a fixed lag, means over the clips."""
-
-    method: str
-    clips: tuple[str, ...]
-    jitter_ratio: float
-    """Mean jitter relative to the truth's."""
-    skate_mm_s: float
-    true_skate_mm_s: float
-    angle_deg: float
-
-    @property
-    def jitter_met(self) -> str:
-        """What the jitter meets: "goal", "at least" or "no"."""
-        for word, (low, high) in (("goal", GOAL_JITTER), ("at least", LEAST_JITTER)):
-            if low <= self.jitter_ratio <= high:
-                return word
-        return "no"
-
-    @property
-    def skate_met(self) -> str:
-        """What the skate meets: "goal", "at least" or "no"."""
-        least = "at least" if self.skate_mm_s <= LEAST_SKATE_MM_S else "no"
-        return "goal" if self.skate_mm_s <= GOAL_SKATE_MM_S else least
-
-
-def evaluate_targets(stored: ErrorsByCondition, today: ErrorsByCondition) -> list[TargetResult]:
+def evaluate_targets(stored: ErrorsByCondition, today: ErrorsByCondition) -> list[BenchmarkStatement]:
     """Evaluate the targets whose condition was measured today; BadInput when the sides differ in clips or seeds."""
     return [evaluate_target(target, stored, today) for target in TARGETS if _select(target, today)]
 
 
-def evaluate_target(target: Target, stored: ErrorsByCondition, today: ErrorsByCondition) -> TargetResult:
-    """Evaluate one target; BadInput when a clip, a seed or a value is missing on either side."""
+def evaluate_target(target: Target, stored: ErrorsByCondition, today: ErrorsByCondition) -> BenchmarkStatement:
+    """Evaluate one target on means over its clips; BadInput when a clip, a seed or a value is missing on a side."""
     before, now = _select(target, stored), _select(target, today)
     if before.keys() != now.keys() or not now:
         sides = (("today", before.keys() - now.keys()), ("in the stored errors", now.keys() - before.keys()))
@@ -137,8 +92,27 @@ def evaluate_target(target: Target, stored: ErrorsByCondition, today: ErrorsByCo
     clips = tuple(sorted(now))
     for clip in clips:
         _check_seeds(target, clip, before[clip], now[clip])
-    means = [np.mean([require_mean(side[clip], target.metric, clip) for clip in clips]) for side in (before, now)]
-    return TargetResult(target, clips, float(means[0]), float(means[1]))
+    stored_deg, today_deg = (
+        float(np.mean([require_mean(side[clip], target.metric, clip) for clip in clips])) for side in (before, now)
+    )
+    ratio = today_deg / stored_deg
+    return state_verdict(
+        target.title,
+        f"<= {target.least:.2f} (goal {target.goal:.2f})",
+        format_fixed(ratio, 3) + _goal_note(ratio <= target.goal),
+        ratio <= target.least,
+        f"{format_fixed(today_deg, 2)} deg today, {format_fixed(stored_deg, 2)} stored",
+        clips=len(clips),
+        value=ratio,
+        more={
+            "condition": target.condition,
+            "clip_names": list(clips),
+            "stored_deg": stored_deg,
+            "today_deg": today_deg,
+            "at_least": target.least,
+            "goal": target.goal,
+        },
+    )
 
 
 def _select(target: Target, errors: ErrorsByCondition) -> dict[str, ClipErrors]:
@@ -164,11 +138,49 @@ def require_mean(errors: ClipErrors, metric: str, clip: str) -> float:
     return mean
 
 
-def evaluate_lag(method: str, by_clip: Mapping[str, ClipErrors]) -> LagResult:
-    """Evaluate the cells of `method`, whose name has the lag."""
-    clips = tuple(sorted(by_clip))
+def evaluate_lag(
+    method: str, by_clip: Mapping[str, ClipErrors], stored: Mapping[str, ClipErrors]
+) -> list[BenchmarkStatement]:
+    """Jitter and foot skate of the cells of `method`, whose name has the lag, beside the stored errors without one."""
+    clips = sorted(by_clip)
     jitter, true_jitter, skate, true_skate, angle = (
         float(np.mean([require_mean(by_clip[clip], metric, clip) for clip in clips]))
         for metric in (JITTER, TRUE_JITTER, SKATE, TRUE_SKATE, ANGLE)
     )
-    return LagResult(method, clips, jitter / true_jitter, skate, true_skate, angle)
+    before = {metric: mean_of(stored, metric) for metric in (JITTER, TRUE_JITTER, SKATE)}
+    ratio, title = jitter / true_jitter, f"{method}, {LAGGED_CONDITION}"
+    more = {"clip_names": clips, "angle_deg": angle, "true_skate_mm_s": true_skate}
+    ranges = [f"{low:g} to {high:g}" for low, high in (LEAST_JITTER, GOAL_JITTER)]
+    return [
+        state_verdict(
+            f"{title}: jitter over truth's",
+            f"{ranges[0]} (goal {ranges[1]})",
+            format_fixed(ratio, 2) + _goal_note(GOAL_JITTER[0] <= ratio <= GOAL_JITTER[1]),
+            LEAST_JITTER[0] <= ratio <= LEAST_JITTER[1],
+            f"{before[JITTER] / before[TRUE_JITTER]:.2f} stored; joint angle {angle:.2f} deg with the lag",
+            clips=len(clips),
+            value=ratio,
+            more=more,
+        ),
+        state_verdict(
+            f"{title}: foot skate",
+            f"<= {LEAST_SKATE_MM_S:g} (goal {GOAL_SKATE_MM_S:g})",
+            f"{skate:.0f} mm/s" + _goal_note(skate <= GOAL_SKATE_MM_S),
+            skate <= LEAST_SKATE_MM_S,
+            f"{before[SKATE]:.0f} mm/s stored, truth {true_skate:.0f}",
+            clips=len(clips),
+            value=skate,
+            unit="mm/s",
+            more=more,
+        ),
+    ]
+
+
+def _goal_note(is_met: bool) -> str:
+    return " (goal met)" if is_met else ""
+
+
+def mean_of(errors: Mapping[str, ClipErrors], metric: str) -> float:
+    """Mean of a metric over the clips on which it was measured; NaN without any."""
+    values = [value for clip in errors.values() if (value := clip.mean(metric)) is not None]
+    return float(np.mean(values)) if values else float("nan")

@@ -12,7 +12,7 @@ import numpy as np
 from harness.bench.lab.planted_errors import METRIC, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.report.physics.error_comparison import TruthRow
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.study.trust.equivalence import judge_equivalence
 from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_pairs
 
@@ -32,18 +32,18 @@ RELATED = ("dynamic_map", "local_pca")
 """The two different methods whose errors are nearest to each other."""
 
 
-def trust_rows(seeds: Sequence[int] = SEEDS) -> list[TruthRow]:
+def trust_rows(seeds: Sequence[int] = SEEDS) -> list[BenchmarkStatement]:
     """The rows of the truth table on trust, one plan for each seed."""
     return [same_profile_row(seeds), swapped_row(seeds), *further_swapped_rows(seeds), *equivalence_rows(seeds)]
 
 
-def same_profile_row(seeds: Sequence[int]) -> TruthRow:
+def same_profile_row(seeds: Sequence[int]) -> BenchmarkStatement:
     """Plans of five methods, whose errors have one distribution on both sides."""
     without = sum(
         all(pair.verdict != "contradict" for pair in judge_pairs(*draw_world(seed, METHODS), LEVEL)) for seed in seeds
     )
     needed = _share(0.95, seeds)
-    return TruthRow(
+    return state_verdict(
         "trust, same profile on both sides: no pair contradicts",
         f"in {needed} of {len(seeds)} plans or more",
         f"in {without}",
@@ -53,7 +53,7 @@ def same_profile_row(seeds: Sequence[int]) -> TruthRow:
     )
 
 
-def swapped_row(seeds: Sequence[int]) -> TruthRow:
+def swapped_row(seeds: Sequence[int]) -> BenchmarkStatement:
     """Two different methods, which each plan draws anew, swapped by 5 %."""
     pairs = list(combinations(METHODS, 2))
     found = sum(
@@ -64,7 +64,7 @@ def swapped_row(seeds: Sequence[int]) -> TruthRow:
         f"the difference of two methods scatters by {scatter:.0%} of the error from one draw of the tracker's noise to "
         f"the next, and {CLIPS} captures leave {scatter / np.sqrt(CLIPS):.1%}"
     )
-    return TruthRow(
+    return state_verdict(
         "trust, two methods swapped by 5 %: the pair contradicts",
         f"in {needed} of {len(seeds)} plans or more",
         f"in {found}",
@@ -84,7 +84,7 @@ def typical_scatter() -> float:
     return float(np.median(found))
 
 
-def further_swapped_rows(seeds: Sequence[int]) -> list[TruthRow]:
+def further_swapped_rows(seeds: Sequence[int]) -> list[BenchmarkStatement]:
     """The rows of two swapped methods for pairs of given likeness and two captures of each clip, without a verdict."""
     cases = [
         ("the same method with one constant changed", CHANGED, 1),
@@ -95,18 +95,18 @@ def further_swapped_rows(seeds: Sequence[int]) -> list[TruthRow]:
     for name, pair, captures in cases:
         found = sum(finds_swap(seed, pair, captures) for seed in seeds)
         title = f"the same, {name}"
-        rows.append(TruthRow(title, "", f"in {found} of {len(seeds)}", None, "", " and ".join(pair)))
+        rows.append(state_verdict(title, "", f"in {found} of {len(seeds)}", None, "", " and ".join(pair)))
     return rows
 
 
-def equivalence_rows(seeds: Sequence[int]) -> list[TruthRow]:
+def equivalence_rows(seeds: Sequence[int]) -> list[BenchmarkStatement]:
     """Equivalence where the true difference is the margin, and where it is zero."""
     declared = {
         shift: sum(declares_equivalence(seed, shift * (-1.0) ** seed) for seed in seeds) for shift in (1.0, 0.0)
     }
     most = len(seeds) // 10
     return [
-        TruthRow(
+        state_verdict(
             "trust, true difference at the margin's edge: equivalence declared",
             f"in {most} of {len(seeds)} plans or fewer",
             f"in {declared[1.0]}",
@@ -114,7 +114,7 @@ def equivalence_rows(seeds: Sequence[int]) -> list[TruthRow]:
             "",
             f"{RELATED[0]}, margin {MARGIN:.0%} of its mean error",
         ),
-        TruthRow("the same, no true difference", "", f"in {declared[0.0]} of {len(seeds)}", None),
+        state_verdict("the same, no true difference", "", f"in {declared[0.0]} of {len(seeds)}", None),
     ]
 
 

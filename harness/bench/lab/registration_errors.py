@@ -8,7 +8,7 @@ import numpy as np
 from harness.bench.lab.captures import planted_scenario, station_offset_m
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.report.physics.error_comparison import TruthRow
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.simulate.components.clock import Clock
 from harness.simulate.components.speed_error import SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER
@@ -63,7 +63,7 @@ def registration_errors(found: Validation, seed: int) -> dict[str, float]:
     }
 
 
-def registration_rows(errors: Sequence[Mapping[str, float]], captures: int) -> list[TruthRow]:
+def registration_rows(errors: Sequence[Mapping[str, float]], captures: int) -> list[BenchmarkStatement]:
     """The row of each promise, over the captures that were registered; others count as missed."""
     rows = []
     for key, (name, most, unit) in PROMISES.items():
@@ -71,7 +71,7 @@ def registration_rows(errors: Sequence[Mapping[str, float]], captures: int) -> l
         within, needed, scale = int(np.sum(values <= most)), ceil(WANTED * captures - 1e-9), _PER_UNIT[unit]
         note = f"largest {scale * values.max():.2g} {unit}" if len(values) else ""
         held_to = f"within {scale * most:.2g} {unit} in {needed} of {captures}"
-        rows.append(TruthRow(f"validate, 1 min, {name}", held_to, f"in {within}", within >= needed, "", note))
+        rows.append(state_verdict(f"validate, 1 min, {name}", held_to, f"in {within}", within >= needed, "", note))
     return rows
 
 

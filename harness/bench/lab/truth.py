@@ -20,7 +20,7 @@ from harness.bench.lab.planted_worlds import trust_rows
 from harness.bench.lab.registration_errors import registration_rows
 from harness.core.progress import ProgressCallback
 from harness.experiment.executors import TaskExecutor
-from harness.report.physics.error_comparison import TruthRow
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 
 SEEDS = tuple(range(1, 101))
 """Seeds of the captures. Constants of the estimators were chosen on captures with seeds from 1001 on."""
@@ -34,7 +34,7 @@ KINDS = tuple(kind for kind in PLANTED_FAULTS if kind != EARLIER)
 
 def lab_truth_rows(
     seeds: Sequence[int], out: Path, executor: TaskExecutor, progress: ProgressCallback
-) -> list[TruthRow]:
+) -> list[BenchmarkStatement]:
     """All rows: the planted faults, the coverage of the fitted parameters, and the planted worlds of trust.
 
     Outcomes of single captures are kept in `out` and used again. Coverage is over twice as many captures without a
@@ -58,27 +58,28 @@ def needed_captures(count: int) -> int:
     return ceil(WANTED * count - 1e-9)
 
 
-def fault_rows(seeds: Sequence[int], outcomes: Mapping[tuple[str, int], CaptureOutcome]) -> list[TruthRow]:
+def fault_rows(seeds: Sequence[int], outcomes: Mapping[tuple[str, int], CaptureOutcome]) -> list[BenchmarkStatement]:
     """One row for each kind of capture, over its captures of these seeds."""
     return [fault_row(kind, [outcomes[kind, seed] for seed in seeds]) for kind in KINDS]
 
 
-def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> TruthRow:
+def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> BenchmarkStatement:
     """The row of one kind of capture."""
     fault, count, needed = PLANTED_FAULTS[kind], len(outcomes), needed_captures(len(outcomes))
     minutes = min(planted_motion(kind, 1).duration_s, fault.seconds) / 60.0
     title, notes = f"{fault.verb}, {fault.title}, {minutes:.3g} min", _notes(kind, outcomes)
     if kind in NO_FAULTS:
         clean = sum(outcome.names_nothing for outcome in outcomes)
-        return TruthRow(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
+        return state_verdict(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
     named = [_is_named(outcome) for outcome in outcomes]
     sized = [_is_sized(outcome) for outcome in outcomes]
     both = sum(n and s for n, s in zip(named, sized, strict=True))
     if not fault.numbers:
-        return TruthRow(title, f"named in {needed} of {count}", f"in {sum(named)}", sum(named) >= needed, "", notes)
+        met = sum(named) >= needed
+        return state_verdict(title, f"named in {needed} of {count}", f"in {sum(named)}", met, "", notes)
     measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {both}"
     held_to = f"named with its size in {needed} of {count}"
-    return TruthRow(title, held_to, measured, both >= needed, "", notes)
+    return state_verdict(title, held_to, measured, both >= needed, "", notes)
 
 
 def is_sized(planted: PlantedNumber, check: StoredCheck) -> bool:

@@ -28,7 +28,7 @@ from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
-from harness.report.physics.error_comparison import TruthRow
+from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sound import speed_of_sound_m_s
 from harness.simulate.readings import GRAVITY_M_S2
@@ -52,9 +52,9 @@ _TURNED_RAD = float(np.deg2rad(100.0))
 
 def truth_rows(
     seeds: tuple[int, ...] = SEEDS, progress: ProgressCallback = lambda row, done, of: None
-) -> list[TruthRow]:
+) -> list[BenchmarkStatement]:
     """The rows of the table, each over all seeds."""
-    rows: list[Callable[[tuple[int, ...]], list[TruthRow]]] = [
+    rows: list[Callable[[tuple[int, ...]], list[BenchmarkStatement]]] = [
         rest_row,
         free_rows,
         speed_row,
@@ -63,7 +63,7 @@ def truth_rows(
         temperature_row,
         covered_row,
     ]
-    out: list[TruthRow] = []
+    out: list[BenchmarkStatement] = []
     for done, row in enumerate(rows):
         progress(row.__name__.removesuffix("_row").removesuffix("_rows"), done, len(rows))
         out += row(seeds)
@@ -71,13 +71,13 @@ def truth_rows(
     return out
 
 
-def rest_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def rest_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """Spread of the 3-D position at rest."""
     physics = Physics()
     spread_mm = np.array([1e3 * _spread_m(_rest(seed, physics)) for seed in seeds])
     middle = float(np.median(spread_mm))
     return [
-        TruthRow(
+        state_verdict(
             "static, spread of 3-D position",
             "1.0 to 2.0 mm",
             f"median {middle:.2f} mm, {spread_mm.min():.2f} to {spread_mm.max():.2f} mm",
@@ -88,7 +88,7 @@ def rest_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     ]
 
 
-def free_rows(seeds: tuple[int, ...]) -> list[TruthRow]:
+def free_rows(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """Excursions of free motion, with some shadow and without."""
     shaded = [_free(seed, with_furniture(Physics(), BOARD)) for seed in seeds]
     beside = sum(len(_excursions(_free(seed, with_furniture(Physics(), BYSTANDER)))) for seed in seeds)
@@ -101,7 +101,7 @@ def free_rows(seeds: tuple[int, ...]) -> list[TruthRow]:
     plain_mm = [1e3 * float(np.nanmax(errors.size_m)) for errors in plain]
     minutes = _FREE_S / 60.0
     return [
-        TruthRow(
+        state_verdict(
             "free motion in 1 m³, 10 minutes, some shadow: excursions of 1 to 4 cm for 1 to 10 s",
             f"in {needed} of {len(seeds)} seeds or more",
             f"in {with_one} seeds, {count / minutes / len(seeds):.2f} a minute",
@@ -110,13 +110,13 @@ def free_rows(seeds: tuple[int, ...]) -> list[TruthRow]:
             f"{_FREE_M_S:g} m/s in the mean below a board of 0.8 m, lost for {lost:.1%} of the time; with a person "
             f"beside the motion instead of the board {beside / minutes / len(seeds):.2f} a minute",
         ),
-        TruthRow(
+        state_verdict(
             "the same: error while the quality is above 0",
             "none above 10 cm",
             f"at most {max(largest_mm):.0f} mm; median of the seeds' largest {np.median(largest_mm):.0f} mm",
             max(largest_mm) <= 1e3 * _LARGEST_M,
         ),
-        TruthRow(
+        state_verdict(
             "the same without shadow and echoes",
             "none above 1 cm",
             f"at most {max(plain_mm):.1f} mm; {sum(mm <= 1e3 * EXCURSION_M for mm in plain_mm)} of {len(seeds)} seeds "
@@ -128,7 +128,7 @@ def free_rows(seeds: tuple[int, ...]) -> list[TruthRow]:
     ]
 
 
-def speed_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def speed_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """Root mean square of the error at four speeds along the same path."""
     rms_mm: dict[float, dict[str, float | None]] = {}
     for speed in SPEEDS_M_S:
@@ -136,18 +136,18 @@ def speed_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     steps = [compare_paired(rms_mm[fast], rms_mm[slow]) for slow, fast in pairwise(SPEEDS_M_S)]
     means = ", ".join(f"{np.mean(list(by_seed.values())):.2f}" for by_seed in rms_mm.values())
     return [
-        TruthRow(
+        state_verdict(
             "four speeds, rest to fast",
             "error rises at each step, paired 95 % interval above 0",
             f"{means} mm at {', '.join(f'{speed:g}' for speed in SPEEDS_M_S)} m/s; steps {_intervals(steps)} mm",
-            all(_is_above_zero(step) for step in steps),
+            _all_above_zero(steps),
             "error grows with speed (Gilson et al. 2006)",
             "root mean square; no shadow",
         )
     ]
 
 
-def turned_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def turned_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """A station that is turned away from the emitters, against one that faces them."""
     physics = Physics()
     facing, turned = (
@@ -156,7 +156,7 @@ def turned_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     return [_twin_row("turned away by 100 deg", turned, facing)]
 
 
-def hand_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def hand_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """A hand behind the back, against a hand in front of the body; a lost reading counts as an error of 1 m."""
     physics = Physics()
     behind, front = (
@@ -166,19 +166,19 @@ def hand_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     difference = compare_paired(dict(worse), dict(better))
     lost = [np.mean([np.mean(e.quality == 0.0) for e in errors.values()]) for errors in (behind, front)]
     return [
-        TruthRow(
+        state_verdict(
             "hand behind the back",
             "worse than its twin, paired 95 % interval above 0",
             f"lost for {lost[0]:.0%} of the time; in front of the body {lost[1]:.0%}, "
             f"{1e3 * np.mean([e.rms_m for e in front.values()]):.2f} mm",
-            _is_above_zero(difference),
+            _all_above_zero([difference]),
             "",
             "compared with a lost reading as an error of 1 m",
         )
     ]
 
 
-def temperature_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def temperature_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """The displacement by air that is 3 K warmer than assumed, against arithmetic."""
     physics = Physics()
     sound = replace(physics.sound, temperature_c=physics.sound.assumed_c + _WARMER_K, temperature_sd_c=0.0)
@@ -192,7 +192,7 @@ def temperature_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     along = np.array([shift @ expected_m / size_m for shift in shifts]) / size_m
     middle = float(np.median(along))
     return [
-        TruthRow(
+        state_verdict(
             "3 K wrong",
             "scale error of arithmetic within 20 %",
             f"{middle:.2f} times the {1e3 * size_m:.1f} mm of arithmetic, {along.min():.2f} to {along.max():.2f}",
@@ -203,7 +203,7 @@ def temperature_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     ]
 
 
-def covered_row(seeds: tuple[int, ...]) -> list[TruthRow]:
+def covered_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     """The error after all emitters have been covered for two seconds, against the leak of gravity by the tilt."""
     physics, until_s = Physics(), _COVERED_FROM_S + _COVERED_S
     ratios, silent, errors_mm = [], 0, []
@@ -221,14 +221,14 @@ def covered_row(seeds: tuple[int, ...]) -> list[TruthRow]:
         silent += errors.quality[last] == 0.0
     middle = float(np.median(ratios))
     return [
-        TruthRow(
+        state_verdict(
             "all emitters covered for 2 s: error",
             "median within a factor 2 of 0.5 g sin(own tilt) t²",
             f"median {middle:.2f} times; {np.median(errors_mm):.0f} mm",
             bool(0.5 <= middle <= 2.0),
             "3.4 cm at a tilt of 0.1 deg (arithmetic)",
         ),
-        TruthRow(
+        state_verdict(
             "the same: quality after 2 s",
             f"0 in {len(seeds)} of {len(seeds)} seeds",
             f"0 in {silent}",
@@ -237,14 +237,14 @@ def covered_row(seeds: tuple[int, ...]) -> list[TruthRow]:
     ]
 
 
-def _twin_row(name: str, worse: Mapping[str, float], better: Mapping[str, float]) -> TruthRow:
+def _twin_row(name: str, worse: Mapping[str, float], better: Mapping[str, float]) -> BenchmarkStatement:
     difference = compare_paired(dict(worse), dict(better))
     means = np.mean(list(worse.values())), np.mean(list(better.values()))
-    return TruthRow(
+    return state_verdict(
         name,
         "worse than its twin, paired 95 % interval above 0",
         f"{means[0]:.2f} and {means[1]:.2f} mm; difference {_intervals([difference])} mm",
-        _is_above_zero(difference),
+        _all_above_zero([difference]),
         "",
         "root mean square of the error",
     )
@@ -299,8 +299,10 @@ def _rms_with_losses_m(errors: StationErrors) -> float:
     return float(np.sqrt(np.mean(size_m**2)))
 
 
-def _is_above_zero(difference: PairedDifference) -> bool:
-    return bool(difference.low is not None and difference.low > 0.0)
+def _all_above_zero(differences: list[PairedDifference]) -> bool | None:
+    """Whether all intervals lie above zero; None with too few seeds for an interval."""
+    lows = [difference.low for difference in differences]
+    return None if None in lows else all(low > 0.0 for low in lows if low is not None)
 
 
 def _intervals(differences: list[PairedDifference]) -> str:

@@ -11,7 +11,7 @@ from harness.report.figures.kinds import KINDS, plan_figure
 from harness.report.figures.selection import FigureSelection
 from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_table
 from harness.report.figures.table_formats import format_table
-from harness.report.kit.print_figure import FORMATS, draw_figure
+from harness.report.kit.print_figure import draw_figure
 
 FOLDER = "figures"
 """Folder of figures inside that of the results."""
@@ -34,19 +34,18 @@ def write_figure(
     kind: str = "",
     selection: FigureSelection | None = None,
     *,
-    fmt: str = "",
     width_mm: int | None = None,
     out: Path | None = None,
     force: bool = False,
 ) -> WrittenFigure:
-    """Draw the results in `folder` as one of KINDS and write the figure to `out`, or FOLDER/figures/NAME.FORMAT.
+    """Draw the results in `folder` as one of KINDS and write the figure to `out`, or FOLDER/figures/NAME.pdf.
 
     The format is that of the suffix of `out`, otherwise PDF. The width is 85 or 170 mm, by default what suits the kind.
     UnknownName for a kind, format, metric, method, condition or clip that does not exist. BadInput for choices that do
     not fit each other or the folder, for a file that exists (unless `force`) and for one that cannot be written.
     BadFile for a folder without results, NothingMeasured for one without a measured cell.
     """
-    fmt = _choose_format(fmt, out)
+    fmt = (out.suffix.lower().removeprefix(".") if out else "") or "pdf"
     if out is not None:
         _check_output(out, force)
     kind, figure = plan_figure(folder, kind, selection or FigureSelection())
@@ -87,14 +86,6 @@ def write_results_table(
     if out is not None:
         _write_output(out, text.encode())
     return FormattedTable(table, text)
-
-
-def _choose_format(fmt: str, out: Path | None) -> str:
-    """The format that was named, or that of the file's suffix, or PDF; BadInput when name and suffix differ."""
-    suffix = out.suffix.lower().removeprefix(".") if out else ""
-    if {fmt, suffix} <= set(FORMATS) and fmt != suffix:
-        raise BadInput(f"--format {fmt} with --out {out}.", "Give one of them, or the same format in both.")
-    return fmt or suffix or "pdf"
 
 
 def _check_output(path: Path, force: bool) -> None:

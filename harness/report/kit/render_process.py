@@ -15,7 +15,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.core.files import TEMPORARY
-from harness.core.progress import ProgressCallback, report_step
+from harness.core.progress import report_step
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
@@ -29,7 +29,7 @@ _OPENGL_VARIABLES = (
 
 @dataclass(frozen=True, eq=False)
 class RenderJob:
-    """A strip of pictures or a movie to render, of K frames."""
+    """A strip of K pictures to render."""
 
     output: Path
     bone_m: Floats
@@ -40,12 +40,8 @@ class RenderJob:
     """(K, 55) true configurations."""
     estimate_qpos: Floats
     """(K, 55) estimated configurations."""
-    fps: float = 0.0
-    """Frame rate of the movie [1/s]; 0 makes a strip."""
-    title: str = ""
-    """Caption inside the movie."""
     size: tuple[int, int] = (300, 384)
-    """Width and height of each picture of a strip [px]."""
+    """Width and height of each picture [px]."""
 
 
 class RenderProcess:
@@ -67,7 +63,7 @@ class RenderProcess:
     def __exit__(self, *raised: object) -> None:
         self._close()
 
-    def finish(self, progress: ProgressCallback = lambda last, done, planned: None) -> str:
+    def finish(self) -> str:
         """Wait for the renderer; returns the reason why pictures are missing, "" if none is.
 
         Pictures that were finished before a failure are kept.
@@ -75,12 +71,7 @@ class RenderProcess:
         if self._process is not None:
             report_step("rendered pictures")
             frames = sum(len(job.truth_qpos) for job in self._jobs)
-
-            def look() -> None:
-                finished = [job.output.name for job in self._jobs if job.output.exists()]
-                progress(finished[-1] if finished else "", len(finished), len(self._jobs))
-
-            self._reason = finish_renderer(self._process, _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames, look)
+            self._reason = finish_renderer(self._process, _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames)
         return self._reason
 
     def _close(self) -> None:
@@ -102,8 +93,6 @@ class RenderProcess:
                 estimate_bone_m=job.estimate_bone_m,
                 truth_qpos=job.truth_qpos,
                 estimate_qpos=job.estimate_qpos,
-                fps=np.array(job.fps),
-                title=np.array(job.title),
                 size=np.array(job.size),
                 output=np.array(str(job.output.resolve())),
             )
@@ -127,11 +116,9 @@ def finish_renderer(process: PythonProcess, limit_s: float, look: Callable[[], o
 
 
 def _missing_package(jobs: Sequence[RenderJob]) -> str:
-    """Message that names a package which the jobs need and which is not installed, or ""."""
-    for package, needed in (("pyvista", bool(jobs)), ("imageio_ffmpeg", any(job.fps for job in jobs))):
-        if needed and find_spec(package) is None:
-            return str(MissingExtra("A rendered picture", package, "viz"))
-    return ""
+    """Message that names the package which the jobs need, if it is not installed; or ""."""
+    missing = jobs and find_spec("pyvista") is None
+    return str(MissingExtra("A rendered picture", "pyvista", "viz")) if missing else ""
 
 
 def describe_exit(code: int, stderr: str) -> str:

@@ -13,11 +13,8 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import atomic_path
 from harness.core.humanoid24 import standard_skeleton
-from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
+from harness.report.kit.scene import Scene
 from harness.score.pair import PoseSequence, compute_poses
-
-MOVIE_SIZE = (640, 640)
-"""Width and height of a movie [px]; they must be even."""
 
 
 def main(jobs: Sequence[str]) -> None:
@@ -31,12 +28,9 @@ def main(jobs: Sequence[str]) -> None:
                 compute_poses(estimated_skeleton, content["estimate_qpos"]),
             )
             width, height = (int(side) for side in content["size"])
-            output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
+            output = Path(str(content["output"]))
         with atomic_path(output) as temporary:
-            if fps:
-                write_movie(truth, estimate, fps, title, temporary)
-            else:
-                write_strip(truth, estimate, (width, height), temporary)
+            write_strip(truth, estimate, (width, height), temporary)
 
 
 def write_strip(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int], path: Path) -> None:
@@ -45,35 +39,6 @@ def write_strip(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, in
 
     pictures = list(_pictures(truth, estimate, size))
     imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
-
-
-def write_movie(truth: PoseSequence, estimate: PoseSequence, fps: float, title: str, path: Path) -> None:
-    """Write all frames with a caption as an H.264 movie that browsers play."""
-    import imageio_ffmpeg
-
-    options = {"fps": fps, "codec": "libx264", "quality": None, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
-    encoding = ["-crf", "22", "-preset", "veryfast", "-movflags", "+faststart", "-f", "mp4"]
-    writer = imageio_ffmpeg.write_frames(str(path), MOVIE_SIZE, **options, output_params=encoding)
-    writer.send(None)
-    try:
-        for frame, picture in enumerate(_pictures(truth, estimate, MOVIE_SIZE)):
-            writer.send(_add_caption(picture, title, frame / fps))
-    finally:
-        writer.close()
-
-
-def _add_caption(picture: Floats, title: str, time_s: float) -> bytes:
-    """The bytes of the picture with the title, the time since the start and a key to the two bodies."""
-    from PIL import Image, ImageDraw, ImageFont
-
-    image = Image.fromarray(picture)
-    pen, font = ImageDraw.Draw(image), ImageFont.load_default(17)
-    pen.text((20, 16), title, "#23282f", font)
-    pen.text((20, 40), f"{time_s:.2f} s", "#5d6773", font)
-    for n, (name, colour) in enumerate((("truth", TRUTH), ("estimate", ESTIMATE))):
-        pen.ellipse((20 + 90 * n, 606, 32 + 90 * n, 618), colour)
-        pen.text((38 + 90 * n, 602), name, "#23282f", font)
-    return image.tobytes()
 
 
 def _pictures(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int]) -> Iterator[Floats]:

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 
 from harness.report.kit.markup import Markup, inline_code, join, tag
+from harness.report.kit.statement_lines import MARKS, format_difference, format_interval, format_kind, format_p
 from harness.report.kit.table import stacked_cell
 from harness.report.kit.text import to_file_name
 from harness.report.kit.verdict_badge import verdict_badge
-from harness.report.paper.verdicts import MARKS, format_difference, format_interval, format_kind, format_p
-from harness.results.findings import Claim, PaperExperiment, PaperFindings
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import PaperExperiment, PaperFindings
 
 _HEAD = ("claim", "kind", "published", "measured", "difference", "units", "verdict")
 
@@ -24,7 +25,7 @@ def claims_table(findings: PaperFindings) -> Markup:
     return _table(groups) if groups else Markup()
 
 
-def claims_list(claims: Sequence[Claim]) -> Markup:
+def claims_list(claims: Sequence[BenchmarkStatement]) -> Markup:
     """The table of claims that belong to no experiment; nothing without claims."""
     rows = [_claim(claim) for claim in claims]
     return _table([tag("tbody", *rows, role="rowgroup")]) if rows else Markup()
@@ -47,13 +48,13 @@ def _table(groups: Sequence[Markup]) -> Markup:
     return join(tag("p", text, class_="caption"), content)
 
 
-def _claim(claim: Claim) -> Markup:
+def _claim(claim: BenchmarkStatement) -> Markup:
     why = tag("small", inline_code(claim.why)) if claim.why else None
     p = format_p(claim)
     lower = ", ".join(filter(None, (format_interval(claim), f"p {p}" if p else "")))
     difference = stacked_cell(format_difference(claim), lower)
     badge = verdict_badge(claim.verdict, MARKS[claim.verdict])
-    cells = [format_kind(claim), claim.published, claim.ours, difference, claim.clips or "", badge]
+    cells = [format_kind(claim), claim.target, claim.measured, difference, claim.clips or "", badge]
     titled = [
         tag("td", cell, data_label=name, role="cell", class_=None if cell else "empty")
         for name, cell in zip(_HEAD[1:], cells, strict=True)

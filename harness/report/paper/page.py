@@ -10,6 +10,7 @@ from urllib.parse import quote
 from harness.core.files import to_json_types
 from harness.report.kit.document import Section, chart_figure, document
 from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, tag
+from harness.report.kit.statement_lines import MARKS
 from harness.report.kit.style import Chart
 from harness.report.kit.text import describe_motion_source
 from harness.report.kit.verdict_badge import tally_list
@@ -17,7 +18,7 @@ from harness.report.paper.claims import anchor, claims_table
 from harness.report.paper.figure_table import figure_table
 from harness.report.paper.side_by_side import printed_statements, statements_table
 from harness.report.paper.table import paper_table
-from harness.report.paper.verdicts import MARKS, MEANINGS, all_claims, count_verdicts, sentence, shared_differences
+from harness.report.paper.verdicts import MEANINGS, all_claims, count_verdicts, sentence, shared_differences
 from harness.results.findings import BarChart, LineChart, PaperExperiment, PaperFindings
 
 

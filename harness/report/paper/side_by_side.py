@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.statement_lines import MARKS
 from harness.report.kit.table import stacked_cell
 from harness.report.kit.verdict_badge import verdict_badge
-from harness.report.paper.verdicts import MARKS, READINGS
-from harness.results.findings import Claim, PaperFindings, Reading
+from harness.report.paper.verdicts import READINGS
+from harness.results.benchmark_statement import BenchmarkStatement, Reading
+from harness.results.findings import PaperFindings
 
 _VARIANT = re.compile(r":(literal|chai2005)\b")
 """Names of methods as printed, which the statement leaves out."""
@@ -22,18 +24,18 @@ class PrintedStatement:
     text: str
     """The statement, with the names of the paper's methods."""
     published: str
-    claims: Mapping[Reading, Claim]
+    claims: Mapping[Reading, BenchmarkStatement]
     """Reading -> the claim; a claim of no method stands for both."""
 
 
 def printed_statements(findings: PaperFindings) -> list[PrintedStatement]:
     """All printed statements in the order of the experiments, each once."""
-    found: dict[tuple[str, str], dict[Reading, Claim]] = {}
+    found: dict[tuple[str, str], dict[Reading, BenchmarkStatement]] = {}
     for experiment in findings.experiments:
         for claim in experiment.claims:
             if claim.kind == "printed":
                 readings: tuple[Reading, ...] = (claim.reading,) if claim.reading else tuple(READINGS)
-                row = found.setdefault((_VARIANT.sub("", claim.text), claim.published), {})
+                row = found.setdefault((_VARIANT.sub("", claim.text), claim.target), {})
                 row |= dict.fromkeys(readings, claim)
     return [PrintedStatement(text, published, claims) for (text, published), claims in found.items()]
 
@@ -68,11 +70,11 @@ def statements_table(statements: Sequence[PrintedStatement]) -> Markup:
     return join(tag("p", text, class_="caption"), table)
 
 
-def _cell(claim: Claim | None, reading: Reading) -> Markup:
+def _cell(claim: BenchmarkStatement | None, reading: Reading) -> Markup:
     if claim is None:
         return tag("td", "", data_label=reading, role="cell", class_="empty")
     badge = verdict_badge(claim.verdict, MARKS[claim.verdict])
-    return tag("td", stacked_cell(badge, claim.ours), data_label=reading, role="cell")
+    return tag("td", stacked_cell(badge, claim.measured), data_label=reading, role="cell")
 
 
 def statements_lines(statements: Sequence[PrintedStatement], width: int) -> list[str]:
@@ -83,7 +85,7 @@ def statements_lines(statements: Sequence[PrintedStatement], width: int) -> list
         row = [statement.text, statement.published]
         for reading in READINGS:
             claim = statement.claims.get(reading)
-            row += [claim.ours, claim.verdict] if claim else ["", ""]
+            row += [claim.measured, claim.verdict] if claim else ["", ""]
         rows.append(row)
     table = Table(head, rows, text_columns=len(head))
     lines, *wrapped = table.wrapped_rows(width, [0, 2, 4])

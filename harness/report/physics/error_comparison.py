@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
+from harness.results.benchmark_statement import BenchmarkStatement
 
 ERROR_QUANTILES = (0.5, 0.95, 0.99)
 """Quantiles of the position error that `TrackerErrorStatistics` holds."""
@@ -73,31 +74,13 @@ class TrackerErrorStatistics:
         return np.asarray(episodes) * (60.0 / self.station_s if self.station_s else np.nan)
 
 
-@dataclass(frozen=True)
-class TruthRow:
-    """One row of the table that holds the simulated errors to published figures."""
-
-    name: str
-    """The condition, such as "static, spread of 3-D position"."""
-    held_to: str
-    """The range that the figure is held to."""
-    measured: str
-    """The figure measured here."""
-    met: bool | None
-    """Whether the figure is within the range; None without a verdict."""
-    published: str = ""
-    """The published figure; "" without one."""
-    note: str = ""
-    """Why a row is missed, or how it was measured; "" without a note."""
-
-
 @dataclass(frozen=True, eq=False)
 class ErrorModelComparison:
     """Error models side by side, and the truth table of the first one."""
 
     models: tuple[TrackerErrorStatistics, ...]
     """The statistics of each model; the first one is the model that the rows are about."""
-    rows: tuple[TruthRow, ...]
+    rows: tuple[BenchmarkStatement, ...]
     """The rows of the truth table, in their order."""
     command: str
     """The command that makes the page."""

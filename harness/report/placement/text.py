@@ -4,8 +4,9 @@ import textwrap
 
 from harness.core.number_format import NOT_MEASURED
 from harness.core.text_table import Table
+from harness.report.kit.statement_lines import WIDTH
 from harness.report.kit.text import last_line
-from harness.report.paper.text import WIDTH, claims_lines
+from harness.report.paper.text import claims_lines
 from harness.report.placement.wording import (
     TIE_NOTE,
     changes_sentence,

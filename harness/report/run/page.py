@@ -101,7 +101,6 @@ class RunContent:
     strips: Sequence[FilmStrip]
     player: Markup
     """Interactive 3-D view; empty without one."""
-    movies: Sequence[Path]
     missing: Sequence[str]
     """Parts that are not on the page, and why."""
 
@@ -219,9 +218,7 @@ def _worst_section(content: RunContent) -> Markup:
     summary = html_table(Table(head, rows), caption, label="worst two seconds")
     key = tag("p", "The method with the lowest error, in its worst two seconds. ", _colour_key())
     strips = [_film_strip(strip) for strip in content.strips if strip.picture.is_file()]
-    links = bullet_list([tag("a", path.name, href=path.name) for path in content.movies], class_=None)
-    movies = join(tag("h3", "Movies"), links) if links else None
-    return join(key if strips else None, *strips, movies, details("All methods", summary) if strips else summary)
+    return join(key if strips else None, *strips, details("All methods", summary) if strips else summary)
 
 
 def _film_strip(strip: FilmStrip) -> Markup:

@@ -1,4 +1,4 @@
-"""Writes the report of a finished run: charts, rendered pictures, movies on request, and the page."""
+"""Writes the report of a finished run: charts, rendered pictures, and the page."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -10,14 +10,12 @@ import numpy as np
 from harness.core.arrays import Ints
 from harness.core.files import write_text
 from harness.core.number_format import format_number
-from harness.core.progress import ProgressCallback
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.highlights import choose_highlights
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.motion_player import motion_player
 from harness.report.kit.render_process import RenderJob, RenderProcess
-from harness.report.kit.text import to_file_name
 from harness.report.run import charts, parameter_effects, uncertainty
 from harness.report.run.data import WORST_METRICS, RunData, read_run
 from harness.report.run.headline import Headline, build_headline
@@ -27,29 +25,19 @@ from harness.report.run.player_data import run_motion
 from harness.report.run.ranking_chart import ranking_charts
 from harness.report.run.worst_window import WorstWindow, find_worst_window, group_overlapping, select_worst
 from harness.results.cell import Cell
-from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
 _INSTANTS = 5
 """Pictures in a film strip."""
 _STILL_SIZE = (640, 600)
 """Width and height of the picture on the first screen [px]."""
-_MOVIE_FPS = (20.0, 30.0)
-"""Lowest and highest frame rate of a movie [1/s]."""
 
 
-def write_run_page(
-    out: Path,
-    *,
-    movie: bool = False,
-    rendered: bool = True,
-    progress: ProgressCallback = lambda last, done, planned: None,
-) -> Path:
+def write_run_page(out: Path, *, rendered: bool = True) -> Path:
     """Write OUT/plots and OUT/report.html of the run in `out`; returns the path of the page.
 
-    `movie` adds OUT/movie_*.mp4 of each method's worst cell; `progress` is called while movies are rendered. Without
-    `rendered`, OpenGL or an optional package, the page says which pictures are missing and why. BadFile if the folder
-    holds no finished run.
+    Without `rendered`, OpenGL or an optional package, the page says which pictures are missing and why. BadFile if the
+    folder holds no finished run.
     """
     run = read_run(out)
     plots = clear_plots(out)
@@ -71,12 +59,9 @@ def write_run_page(
         missing.append("Rendered pictures of the worst two seconds: no method has the lowest error")
     if strips and reason:
         missing.append(f"Rendered pictures of the worst two seconds: {reason}")
-    movies, no_movies = _movies(run, reader, progress) if movie else ([], "")
-    if no_movies:
-        missing.append(f"Movies: {no_movies}")
     for chart in drawn.all():
         chart.write(plots)
-    content = RunContent(run, headline, drawn, joints, still, reason, windows, strips, player, movies, missing)
+    content = RunContent(run, headline, drawn, joints, still, reason, windows, strips, player, missing)
     path = out / "report.html"
     write_text(path, run_page(content))
     return path
@@ -164,9 +149,8 @@ def _strip_job(cell: Cell, run: RunData, strip: FilmStrip) -> RenderJob:
     return _job(strip.picture, cell, _instants(run, strip.windows[0]))
 
 
-def _job(output: Path, cell: Cell, rows: Ints, fps: float = 0.0, title: str = "") -> RenderJob:
-    qpos = cell.truth_qpos[rows], cell.estimate_qpos[rows]
-    return RenderJob(output, cell.bone_m, cell.estimate_bone_m, *qpos, fps, title)
+def _job(output: Path, cell: Cell, rows: Ints) -> RenderJob:
+    return RenderJob(output, cell.bone_m, cell.estimate_bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows])
 
 
 def _player(run: RunData, windows: Mapping[tuple[str, str], WorstWindow], reader: Callable[[str], Cell]) -> Markup:
@@ -176,34 +160,3 @@ def _player(run: RunData, windows: Mapping[tuple[str, str], WorstWindow], reader
         return Markup()
     player = motion_player(motion, "Truth, estimates and stations in 3-D; drag to turn")
     return join(tag("p", note) if note else None, player)
-
-
-def _movies(run: RunData, reader: Callable[[str], Cell], progress: ProgressCallback) -> tuple[list[Path], str]:
-    """Movies of each method's worst cell in real time: the files that were made, and why others are missing."""
-    jobs = []
-    for series in run.series:
-        rows = [row for row in run.cells if run.series_of(row) == series and row[PRIMARY_METRIC] is not None]
-        if rows:
-            worst = max(rows, key=lambda row: float(row[PRIMARY_METRIC]))
-            jobs.append(_movie_job(reader(str(worst["key"])), series, run.out))
-    with RenderProcess(jobs) as rendering:
-        reason = rendering.finish(progress)
-    return [job.output for job in jobs if job.output.is_file()], reason
-
-
-def _movie_job(cell: Cell, series: str, out: Path) -> RenderJob:
-    """Shows at each time of the movie the latest estimate of that time."""
-    finite = np.flatnonzero(np.isfinite(cell.estimate_qpos).all(axis=1))
-    fps = movie_fps(cell.rate_hz)
-    time_s = cell.time_s[finite]
-    movie_s = np.arange(time_s[0], time_s[-1] + 1e-9, 1.0 / fps)
-    rows = finite[np.searchsorted(time_s, movie_s + 1e-6, side="right") - 1]
-    path = out / f"movie_{to_file_name(series)}_{to_file_name(cell.clip)}_{cell.key[:8]}.mp4"
-    return _job(path, cell, rows, fps, f"{series} on {cell.clip}")
-
-
-def movie_fps(rate_hz: float) -> float:
-    """The stream's rate divided by an integer, between 20 and 30 1/s, so that steps are even; else 25."""
-    low, high = _MOVIE_FPS
-    rates = [rate_hz / n for n in range(1, 1 + int(rate_hz / low)) if low <= rate_hz / n <= high]
-    return max(rates, default=25.0)

@@ -45,7 +45,7 @@ def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: 
             else []
         ),
         "--unpaced",
-        "--overload to see records dropped",
+        "tracker.overload = true in the scenario to see records dropped",
     ]
     raise BadInput(
         f"{load} = {required:.0f} bytes/s; a line of {baud} baud carries {capacity:.0f}.", f"Try {'; '.join(remedies)}."

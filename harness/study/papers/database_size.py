@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 
 from harness.compare.claims import claim_decreasing, claim_lower_error, claim_noninferior
+from harness.results.benchmark_statement import BenchmarkStatement, Reading
 from harness.results.expected_orders import METRIC
-from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment, Reading
+from harness.results.findings import BarChart, FindingsTable, PaperExperiment
 from harness.study.papers.leave_one_out import (
     DYNAMIC_MAP,
     DYNAMIC_MAP_LITERAL,
@@ -30,7 +31,7 @@ _WORDING = (
 
 def database_size(study: PaperStudy) -> PaperExperiment:
     """Error against the share of the database, in nested subsets."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     tables: list[FindingsTable] = []
     figures: list[BarChart] = []
     for inputs in study.runs[SIZE_RUN].inputs:
@@ -76,7 +77,7 @@ def database_size(study: PaperStudy) -> PaperExperiment:
 
 def one_database(study: PaperStudy) -> PaperExperiment:
     """One database for each behaviour compared with one of all behaviours."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     sides: list[dict[str, dict[str, Mapping[str, float]]]] = []
     behaviours = tuple(dict.fromkeys(study.runs[ALL_RUN].motion.behaviours))
     for metric in (METRIC, RMS):

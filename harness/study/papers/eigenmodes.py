@@ -13,7 +13,8 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.results.findings import BarChart, Claim, FindingsTable, LineChart, PaperExperiment
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.bone_lengths import (
     MODES,
     OTHER_SIDE,
@@ -68,19 +69,19 @@ def evaluate_bone_modes(people: Mapping[str, Skeleton], source: str, *, measured
     )
 
 
-def _variance_claim(explained: float, people: int, measured: bool) -> Claim:
+def _variance_claim(explained: float, people: int, measured: bool) -> BenchmarkStatement:
     near = abs(explained - PUBLISHED_VARIANCE) <= _ROUNDING
     why = (
         f"{_percent(1.0 - explained)} is not explained, instead of 1 %. Five modes explain more for fewer people (see "
         "the curve), and nearly all if the mean is not subtracted. The paper states neither choice."
     )
-    return Claim(
+    return BenchmarkStatement(
         text=f"{MODES} modes explain about 99 % of the variance of bone lengths, normalised by the left tibia",
-        published="99 %",
-        ours=f"{_percent(explained)} of {people} skeletons",
+        target="99 %",
+        measured=f"{_percent(explained)} of {people} skeletons",
         verdict=("reproduced" if near else "not reproduced") if measured else "not comparable",
         why=("" if near else why) if measured else f"The skeletons are synthetic. {why}",
-        difference=100.0 * explained,
+        value=100.0 * explained,
         unit="%",
     )
 

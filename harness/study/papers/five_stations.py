@@ -5,8 +5,9 @@ from itertools import product
 
 from harness.compare.claims import Errors, claim_lower_error
 from harness.compare.paired_statistics import compare_paired
+from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Claim, ClaimKind, FindingsTable, PaperExperiment, Reading
+from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import RMS, CellRow, errors_by_unit, mean_table
@@ -96,12 +97,14 @@ def claim_in_run(
     less: Errors,
     more: Errors,
     published: str = "order",
-    kind: ClaimKind = "printed",
+    kind: StatementKind = "printed",
     reading: Reading = "",
-) -> Claim:
+) -> BenchmarkStatement:
     """Claim that `less` is below `more` in a run; "not run" where this motion lacks the run."""
     if run not in study.runs:
-        return Claim(*(text, published, "not measured", "not run", _NO_RUN), unit="deg", kind=kind, reading=reading)
+        return BenchmarkStatement(
+            *(text, published, "not measured", "not run", _NO_RUN), unit="deg", kind=kind, reading=reading
+        )
     return claim_lower_error(text, less, more, published=published, kind=kind, reading=reading)
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from harness.compare.claims import claim_lower_error
+from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Claim, ClaimKind, FindingsTable, PaperExperiment, Reading
+from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import RMS, errors_by_unit, mean_bars, mean_table
 
@@ -57,7 +58,7 @@ class Order(NamedTuple):
 
     lower: str
     higher: str
-    kind: ClaimKind
+    kind: StatementKind
     reading: Reading
 
 
@@ -220,7 +221,7 @@ def _performer_tables(
 
 def _missing_behaviour_claims(
     study: PaperStudy, measured: Iterable[ExperimentCondition], reading: Reading
-) -> Iterator[Claim]:
+) -> Iterator[BenchmarkStatement]:
     """Claims on behaviours of the paper that this motion lacks or that could not be measured."""
     found = {STAND_INS.get(condition.behaviour, condition.behaviour) for condition in measured}
     listed = {behaviour for run in RUNS if run in study.runs for behaviour in study.runs[run].motion.behaviours}
@@ -231,7 +232,7 @@ def _missing_behaviour_claims(
                 "every cell failed" if behaviour in planned else "too little of it in the library; use synthetic motion"
             )
             text = f"{behaviour.replace('_', ' ')}: Liu et al. < local PCA, IK"
-            yield Claim(text, "order", "", "not run", why, reading=reading)
+            yield BenchmarkStatement(text, "order", "", "not run", why, reading=reading)
 
 
 def _remarks(study: PaperStudy) -> tuple[str, ...]:

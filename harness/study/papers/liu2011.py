@@ -6,8 +6,9 @@ from itertools import pairwise
 from harness.compare.claims import claim_lower_error, claim_published_value
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
+from harness.results.benchmark_statement import Reading, StatementKind
 from harness.results.expected_orders import METRIC
-from harness.results.findings import ClaimKind, PaperExperiment, Reading
+from harness.results.findings import PaperExperiment
 from harness.study.papers.database_size import database_size, one_database
 from harness.study.papers.eigenmodes import evaluate_bone_modes
 from harness.study.papers.frame_by_frame import frame_by_frame
@@ -30,7 +31,7 @@ from harness.study.papers.tables import RMS, errors_by_joint_group, errors_by_un
 
 PUBLISHED_DEG = {"pos+ori": 1.25, "pos+torso_ori": 2.25, "pos": 2.52, "mixed": 3.27}
 _READINGS: dict[str, Reading] = {DYNAMIC_MAP_LITERAL: "as printed", DYNAMIC_MAP: "ours", DYNAMIC_MAP_WINDOW: "ours"}
-_KINDS: dict[str, ClaimKind] = {
+_KINDS: dict[str, StatementKind] = {
     DYNAMIC_MAP_LITERAL: "printed",
     DYNAMIC_MAP: "printed",
     DYNAMIC_MAP_WINDOW: "repeated",

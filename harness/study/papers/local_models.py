@@ -1,6 +1,7 @@
 """Kim et al. 2012: local models against a global one."""
 
-from harness.results.findings import Claim, FindingsTable, PaperExperiment, Reading
+from harness.results.benchmark_statement import BenchmarkStatement, Reading
+from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.five_stations import (
     KERNEL_CCA,
     KERNEL_CCA_LITERAL,
@@ -22,7 +23,7 @@ _LOCAL: dict[str, Reading] = {KERNEL_CCA_LITERAL: "as printed", KERNEL_CCA: "our
 
 def local_models(study: PaperStudy) -> PaperExperiment:
     """The error of kernel CCA on nearest neighbours against that of one model of all examples."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     tables: list[FindingsTable] = []
     for behaviour in BEHAVIOURS:
         run, label = f"global_{behaviour}", label_in(study, behaviour)

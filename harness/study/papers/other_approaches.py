@@ -1,8 +1,9 @@
 """Liu et al. 2011: what the paper says of other approaches, and the neighbour graph that its search is built on."""
 
 from harness.compare.claims import claim_lower_error, claim_noninferior
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Claim, PaperExperiment
+from harness.results.findings import PaperExperiment
 from harness.study.papers.database_size import OWN, whole_run
 from harness.study.papers.leave_one_out import DYNAMIC_MAP_LITERAL, behaviour_label, differences
 from harness.study.papers.paper_study import PaperStudy
@@ -12,10 +13,10 @@ RUN = "other_approaches"
 OTHERS = {"best_match+ik": "interpolation generalises better", "kernel_ridge+ik": "local models are better"}
 """Method of another approach -> what the paper says against it."""
 GRAPH = f"{DYNAMIC_MAP_LITERAL}[index=graph]"
-FULL_SET = Claim(
+FULL_SET = BenchmarkStatement(
     text="the quality is comparable with that of a full set of sensors",
-    published="comparable",
-    ours="",
+    target="comparable",
+    measured="",
     verdict="not run",
     why="no clip was recorded with a full set of inertial sensors as well",
 )

@@ -13,7 +13,8 @@ from typing import Any
 from harness.experiment import benchmark_clips
 from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
 from harness.results import manifest
-from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BarChart, FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.quick_form import DATABASE_SHARE
 from harness.study.papers.speed_dataset import MAX_TEST_S, build_speed_dataset, missing_clips
@@ -140,21 +141,25 @@ def make_speed_experiment(
     )
 
 
-def _frame_rate_claim(published: PublishedSpeed, speeds: Mapping[str, Sequence[MethodSpeed]], method: str) -> Claim:
+def _frame_rate_claim(
+    published: PublishedSpeed, speeds: Mapping[str, Sequence[MethodSpeed]], method: str
+) -> BenchmarkStatement:
     text = f"{method} runs at {published.fps:g} frames/s or more with the slowest of the databases of the paper's size"
     stated, unit = f"{published.fps:g} frames/s", "frames/s"
     by_database = _speeds_of_method(speeds, method)
     if not by_database:
-        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit=unit, kind="speed")
+        return BenchmarkStatement(
+            text, stated, "not measured", "not run", "the library has no such motion", unit=unit, kind="speed"
+        )
     database, slowest = min(by_database.items(), key=lambda item: item[1].fps)
     small = _undersized_databases(published, by_database)
-    return Claim(
+    return BenchmarkStatement(
         text=text,
-        published=stated,
-        ours=f"{slowest.fps:,.0f} frames/s ({database}, {slowest.frames:,} frames)",
+        target=stated,
+        measured=f"{slowest.fps:,.0f} frames/s ({database}, {slowest.frames:,} frames)",
         verdict="not comparable" if small else "reproduced" if slowest.fps >= published.fps else "not reproduced",
         why=small or ("" if slowest.fps >= published.fps else "another machine and other code"),
-        difference=slowest.fps,
+        value=slowest.fps,
         unit=unit,
         kind="speed",
     )
@@ -162,21 +167,23 @@ def _frame_rate_claim(published: PublishedSpeed, speeds: Mapping[str, Sequence[M
 
 def _latency_claim(
     published: PublishedSpeed, latency_ms: float, speeds: Mapping[str, Sequence[MethodSpeed]], method: str
-) -> Claim:
+) -> BenchmarkStatement:
     text = f"99 % of the steps of {method} take at most the published latency, with the slowest database"
     stated = f"{latency_ms:g} ms"
     by_database = _speeds_of_method(speeds, method)
     if not by_database:
-        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit="ms", kind="speed")
+        return BenchmarkStatement(
+            text, stated, "not measured", "not run", "the library has no such motion", unit="ms", kind="speed"
+        )
     database, slowest = max(by_database.items(), key=lambda item: item[1].p99_ms)
     small = _undersized_databases(published, by_database)
-    return Claim(
+    return BenchmarkStatement(
         text=text,
-        published=stated,
-        ours=f"p99 {slowest.p99_ms:.2f} ms, p50 {slowest.p50_ms:.2f} ms ({database}, {slowest.frames:,} frames)",
+        target=stated,
+        measured=f"p99 {slowest.p99_ms:.2f} ms, p50 {slowest.p50_ms:.2f} ms ({database}, {slowest.frames:,} frames)",
         verdict="not comparable",
         why=small or "the paper's latency is that of its whole system; here a step of the method is timed",
-        difference=slowest.p99_ms,
+        value=slowest.p99_ms,
         unit="ms",
         kind="speed",
     )

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
+from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Claim, ClaimKind, FindingsTable, LineChart, PaperExperiment, Reading
+from harness.results.findings import FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.five_stations import (
     KERNEL_CCA,
     KERNEL_CCA_LITERAL,
@@ -48,7 +49,7 @@ ARM_AND_SPINE = {
 
 def sparse(study: PaperStudy) -> PaperExperiment:
     """Fig. 4: methods compared with very small databases."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     figures: list[LineChart] = []
     tables: list[FindingsTable] = []
     for run, behaviour, size in _databases():
@@ -62,7 +63,7 @@ def sparse(study: PaperStudy) -> PaperExperiment:
                     f"{title}: {lower} errs less than {higher}",
                     (errors.get(lower, {}), errors.get(higher, {})),
                 )
-                stated: ClaimKind = kind if apart else "repeated"
+                stated: StatementKind = kind if apart else "repeated"
                 claims.append(claim_in_run(study, run, text, *sides, kind=stated, reading=reading))
         if rows:
             tables += method_tables(shown, rows, WORLD_METRICS)

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from harness.compare.claims import Errors, claim_lower_error
+from harness.results.benchmark_statement import BenchmarkStatement, Reading
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Claim, FindingsTable, PaperExperiment, Reading
+from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.range_of_motion import measure_ranges
@@ -122,9 +123,9 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
 
 def _claims(
     study: PaperStudy, method: str, angles: Mapping[str, ErrorsBySet], ranges: Mapping[str, Mapping[str, float]]
-) -> list[Claim]:
+) -> list[BenchmarkStatement]:
     """The claims of Fig. 3 for one method; `angles` is behaviour -> errors, `ranges` behaviour -> ranges of motion."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     for behaviour, other in (("walking", "boxing"), ("boxing", "walking")):
         sets, suitable, other_suitable = angles[behaviour], PUBLISHED_SETS[behaviour], PUBLISHED_SETS[other]
         label, reason, walking = f"{behaviour}, {method}", _DISAGREEMENT_REASONS[behaviour], behaviour == "walking"
@@ -157,7 +158,7 @@ def _ranges(study: PaperStudy, behaviour: str) -> dict[str, float]:
 
 def one_station(study: PaperStudy) -> PaperExperiment:
     """One station on the right hand compared with five."""
-    claims: list[Claim] = []
+    claims: list[BenchmarkStatement] = []
     tables, names = [], []
     for behaviour, run in (
         (label_in(study, "table_tennis"), "one_table_tennis"),

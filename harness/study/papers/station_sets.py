@@ -13,8 +13,9 @@ from harness.compare.paired_statistics import (
     PairedDifference,
     mean_interval,
 )
+from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.expected_orders import METRIC
-from harness.results.findings import BarChart, Claim, ClaimKind, FindingsTable, LineChart
+from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.study.papers.tables import CellRow, errors_by_unit, format_mean, mean_sd, number_of_units
 
 STATION_ABBREVIATIONS = {
@@ -50,7 +51,7 @@ def errors_by_set(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, di
     return {name: errors_by_unit(each, metric) for name, each in by_set.items()}
 
 
-def claim_best_of_size(behaviour: str, suitable: str, sets: ErrorsBySet, why: str = "") -> Claim:
+def claim_best_of_size(behaviour: str, suitable: str, sets: ErrorsBySet, why: str = "") -> BenchmarkStatement:
     """Claim that no other set of the same size errs less, tested against the best of the others.
 
     `why` explains a claim that is not reproduced.
@@ -66,7 +67,7 @@ def claim_best_of_size(behaviour: str, suitable: str, sets: ErrorsBySet, why: st
     return claim_lower_error(claim, sets.get(suitable, {}), others.get(rival, {}), published="called suitable", why=why)
 
 
-def claim_better_than_average(behaviour: str, suitable: str, sets: ErrorsBySet, why: str = "") -> Claim:
+def claim_better_than_average(behaviour: str, suitable: str, sets: ErrorsBySet, why: str = "") -> BenchmarkStatement:
     """Claim that a set errs less than the average of the other sets of the same size."""
     others = {
         name: errors
@@ -78,7 +79,9 @@ def claim_better_than_average(behaviour: str, suitable: str, sets: ErrorsBySet, 
     return claim_lower_error(text, sets.get(suitable, {}), average, published="called suitable", why=why)
 
 
-def claim_suitable(behaviour: str, suitable: str, sets: ErrorsBySet, kind: ClaimKind = "printed") -> Claim:
+def claim_suitable(
+    behaviour: str, suitable: str, sets: ErrorsBySet, kind: StatementKind = "printed"
+) -> BenchmarkStatement:
     """Claim that a set is suitable compared with larger ones: its error is not inferior to that of the best of these.
 
     It must hold against the best set of four and against all five, within the margin of joint angles. The best set is
@@ -103,7 +106,7 @@ def _best_of_size(sets: ErrorsBySet, count: int) -> str:
     return min(measured, key=lambda name: _mean_error(sets[name]), default="")
 
 
-def claim_most_movable(behaviour: str, ranges_deg: Mapping[str, float], sets: ErrorsBySet) -> Claim:
+def claim_most_movable(behaviour: str, ranges_deg: Mapping[str, float], sets: ErrorsBySet) -> BenchmarkStatement:
     """Claim that the most movable joints should be tracked.
 
     `ranges_deg` is abbreviation -> range of motion of its limb in the database. The two stations with the largest are
@@ -124,7 +127,7 @@ def claim_most_movable(behaviour: str, ranges_deg: Mapping[str, float], sets: Er
             }
             side.append(average_by_size(chosen).get(size, {}))
     claim = claim_lower_error(text, _average(both), _average(neither), published="stated")
-    return replace(claim, ours=f"{claim.ours}; ranges {shown} deg" if ranges_deg else claim.ours)
+    return replace(claim, measured=f"{claim.measured}; ranges {shown} deg" if ranges_deg else claim.measured)
 
 
 def _average(sides: Sequence[Errors]) -> dict[str, float]:
@@ -133,7 +136,7 @@ def _average(sides: Sequence[Errors]) -> dict[str, float]:
     return {unit: float(np.mean([errors[unit] for errors in sides])) for unit in sorted(shared)}
 
 
-def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> Claim:
+def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> BenchmarkStatement:
     """Claim that the error, averaged over all sets of a size, decreases with each further station.
 
     Every step must decrease; the reported difference is that of the worst step.
@@ -142,22 +145,22 @@ def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> Claim:
     return claim_decreasing(text, {f"{n}": errors for n, errors in average_by_size(sets).items()}, "stations")
 
 
-def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Claim:
+def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> BenchmarkStatement:
     """Claim that some motion is harder than other motion, by Welch's interval, since the clips are not paired."""
     if not hard or not easy:
-        return Claim(text, "order", "not measured", "not run", "one side has no units", unit="deg")
+        return BenchmarkStatement(text, "order", "not measured", "not run", "one side has no units", unit="deg")
     ours, fewest = f"{_mean_error(hard):.2f} against {_mean_error(easy):.2f} deg", min(len(hard), len(easy))
     difference = _mean_error(hard) - _mean_error(easy)
     if fewest < MIN_UNITS:
         why = f"too few units: {fewest}, of at least {MIN_UNITS}"
-        return Claim(text, "order", ours, "cannot tell", why, fewest, difference, unit="deg")
+        return BenchmarkStatement(text, "order", ours, "cannot tell", why, fewest, difference, unit="deg")
     welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False)
     interval = welch.confidence_interval(CONFIDENCE_LEVEL)
     low, high = float(interval.low), float(interval.high)
     result = PairedDifference(tuple(hard), difference, low, high)
     why = "" if result.verdict == "reproduced" else "; ".join(filter(None, (result.why, why_not)))
     p = float(welch.pvalue) if np.isfinite(welch.pvalue) else None  # NaN where no error differs from another
-    return Claim(text, "order", ours, result.verdict, why, fewest, difference, low, high, "deg", p=p)
+    return BenchmarkStatement(text, "order", ours, result.verdict, why, fewest, difference, low, high, "deg", p=p)
 
 
 def average_by_size(sets: ErrorsBySet) -> dict[int, dict[str, float]]:

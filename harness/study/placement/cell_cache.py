@@ -20,7 +20,7 @@ from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import open_scenario_motion
-from harness.experiment.engine import CellResults, run_cells
+from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
@@ -56,7 +56,7 @@ class SetRequest:
     link: bool = False
 
 
-RunCells = Callable[..., CellResults]
+RunCells = Callable[..., BatchResults]
 
 
 @dataclass
@@ -140,7 +140,7 @@ class CellCache:
             by_clip[clip] = _mean([row[metric] if row is not None else None for row in rows])
         return by_clip
 
-    def _add(self, scenarios: Iterable[Scenario], cells: CellResults) -> None:
+    def _add(self, scenarios: Iterable[Scenario], cells: BatchResults) -> None:
         """Add results; rows are in planned order, without those of failed cells."""
         rows = iter(cells.rows)
         for scenario in scenarios:

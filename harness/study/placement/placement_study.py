@@ -22,7 +22,7 @@ from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
-from harness.results.findings import Claim
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import (
     BestSet,
@@ -267,7 +267,9 @@ class _PlacementRun:
             conditions.append(ConditionCosts(name, _condition_kind(scenario, other), self._costs_in(other, compared)))
         return conditions
 
-    def _claims(self, alternatives: Sequence[StationSet], held: Mapping[StationNames, Costs]) -> Iterator[Claim]:
+    def _claims(
+        self, alternatives: Sequence[StationSet], held: Mapping[StationNames, Costs]
+    ) -> Iterator[BenchmarkStatement]:
         units = self.plan.units(self.plan.held_out) if self.plan.held_out else ()
         basis, costs = f"tested on held-out clips of {count_units(units)}", held
         if len(units) < MIN_UNITS:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from harness.compare.claims import claim_lower_error
-from harness.results.findings import Claim
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.placement_findings import StationNames
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
@@ -50,7 +50,7 @@ def evaluate_claim(
     *,
     unit: str,
     basis: str,
-) -> tuple[Claim, Claim]:
+) -> tuple[BenchmarkStatement, BenchmarkStatement]:
     """Evaluate both claims by costs of the units of the test clips, which `basis` describes in words."""
     measured = {
         names: {name: value for name, value in costs.get(names, {}).items() if value is not None}
@@ -66,7 +66,7 @@ def evaluate_claim(
         shared = measured[claimed].keys() & measured[full].keys()
         mean, mean_of_all = (mean_cost({name: measured[names][name] for name in shared}) for names in (claimed, full))
         limit = f"limit {(1.0 + claim.margin) * mean_of_all:.2f} {unit}, {1.0 + claim.margin:.0%} of {mean_of_all:.2f}"
-        suffices = replace(suffices, ours=f"{mean:.2f} {unit}; {limit} of all {len(full)}")
+        suffices = replace(suffices, measured=f"{mean:.2f} {unit}; {limit} of all {len(full)}")
     return (
         claim_lower_error(best_of_size, measured[claimed], measured[other], published=published, unit=unit, why=why),
         suffices,

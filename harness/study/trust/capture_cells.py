@@ -5,7 +5,6 @@ cells are kept in the folder of the study, so that a stopped study goes on where
 """
 
 import hashlib
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -13,44 +12,32 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, Ints
-from harness.core.calibration import Calibration
 from harness.core.fault_report import named_folder_fault
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
+from harness.experiment.evaluation import evaluate
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.method_run import describe_failure
-from harness.experiment.remote_method import method_identity, resolve_method, run_over_frames
+from harness.experiment.observed_take import ObservedTake
+from harness.experiment.recorded_take import checked_note, find_playback, recorded_take, registered_take
+from harness.experiment.remote_method import method_identity, resolve_method
 from harness.experiment.scenario import Scenario, change_scenario, variants
-from harness.experiment.score_recording import (
-    LoopFrames,
-    checked_note,
-    find_playback,
-    match_recording,
-)
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.results.storage import cell_key
-from harness.score.pair import PoseSequence, compute_poses
+from harness.score.loops import LoopFrames
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import sampling_times_s, simulate_tracker
-from harness.simulate.trajectory import Trajectory
-from harness.stream.frame import TrackerFrame, split_frames
 from harness.stream.recording.replay import RecordingStream
-from harness.study.trust.loop_scores import score_loops
 from harness.study.trust.reading_errors import (
     HealthCounts,
-    IdealReadings,
     count_health,
-    ideal_readings,
     reading_errors,
-    registered_readings,
 )
-from harness.study.trust.reconstruction_scores import measured_calibration, truth_times_s
 from harness.study.trust.truth_motion import truth_of_playback
 from harness.study.trust.validation import validate_capture
 
@@ -98,7 +85,6 @@ class CaptureResult:
 
     clip: str
     sha256: str
-    note: Mapping[str, Any]
     frames: int
     damage: tuple[str, ...]
     notes: tuple[str, ...]
@@ -131,30 +117,6 @@ def run_capture(task: CaptureTask) -> CaptureResult:
 def find_stations(task: CaptureTask) -> tuple[str, ...]:
     """Stations of a capture; raises as `run_capture` where its note or its stations do not fit."""
     return tuple(_CaptureRun(task).playback.scenario.worn_stations)
-
-
-@dataclass(frozen=True, eq=False)
-class _SideFrames:
-    """Frames of the device or of one simulation, with their truth."""
-
-    frames: tuple[TrackerFrame, ...]
-    loops: tuple[LoopFrames, ...]
-    rate_hz: float
-    truth: PoseSequence
-    ideal: IdealReadings
-    calibration: Calibration
-    """What methods receive, of all stations."""
-    notes: tuple[str, ...] = ()
-
-    @cached_property
-    def _columns(self) -> list[NDArray[Any]]:
-        """The fields of all frames (F, S, ...)."""
-        return [np.array([getattr(frame, name) for frame in self.frames]) for name in TrackerFrame.__slots__]
-
-    def of_stations(self, rows: Ints) -> list[TrackerFrame]:
-        """New frames of the stations in these rows."""
-        received_s, *arrays = self._columns
-        return split_frames(received_s.tolist(), *(array[:, rows] for array in arrays))
 
 
 class _CaptureRun:
@@ -196,7 +158,6 @@ class _CaptureRun:
         return CaptureResult(
             clip=str(self.clip),
             sha256=self.sha256,
-            note=self.note,
             frames=len(self.device.frames),
             damage=self.stream.recording.damage,
             notes=self.device.notes,
@@ -204,36 +165,27 @@ class _CaptureRun:
             rate_hz=self.device.rate_hz,
             device=device,
             simulated={str(arm): [each.get(str(arm), {}) for each in simulated] for arm in self.task.arms},
-            readings=tuple(reading_errors(side.frames, side.loops, side.ideal) for side in sides),
-            health=tuple(count_health(side.frames, side.loops, side.rate_hz) for side in sides),
+            readings=tuple(reading_errors(side) for side in sides),
+            health=tuple(count_health(side) for side in sides),
             failures=self.failures,
             methods_s=self.methods_s,
         )
 
     @cached_property
-    def device(self) -> _SideFrames:
+    def device(self) -> ObservedTake:
         """The capture, decoded once.
 
         The frames of a played motion are found by the device's clock. A capture that names no clip itself, and which
         that clock does not relate to the named one, is registered with it.
         """
         try:
-            return self._played()
+            return recorded_take(self.stream, self.playback)
         except BadInput:
             if not self.task.clip or self.note.get("clip"):
                 raise
         return self._registered()
 
-    def _played(self) -> _SideFrames:
-        """The capture of a motion that an emulator or the simulator played; BadInput for another motion."""
-        matched, tracker = match_recording(self.stream, self.playback), self.playback.tracker
-        trajectory = Trajectory(self.playback.body, self.playback.take)
-        time_s = sampling_times_s(trajectory.duration_s, tracker, len(self.stream.stations))
-        truth = compute_poses(self.playback.body.skeleton, trajectory.qpos(time_s.mean(axis=1)))
-        ideal = ideal_readings(self.playback, tracker)
-        return _SideFrames(matched.frames, matched.loops, tracker.rate_hz, truth, ideal, self.playback.calibration)
-
-    def _registered(self) -> _SideFrames:
+    def _registered(self) -> ObservedTake:
         """The capture of a performer, related to the clip by `validate`, whose room and mounts methods receive.
 
         BadInput for motion or stations that are not those of the clip.
@@ -241,33 +193,13 @@ class _CaptureRun:
         found = validate_capture(self.task.capture, truth_of_playback(self.playback, host_clock=False))
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
-        frames, rate_hz = tuple(self.stream), self.playback.tracker.rate_hz
-        trajectory = Trajectory(self.playback.body, self.playback.take)
-        number = np.round(truth_times_s(frames, found.registration) * rate_hz)
-        count = int(trajectory.duration_s * rate_hz) + 1
-        rows = np.flatnonzero((number >= 0.0) & (number < count))
-        highest = np.maximum.accumulate(np.append(-1.0, number[rows]))[:-1]
-        rows = rows[number[rows] > highest]
-        index = number[rows].astype(np.int64)
-        stamps_s = np.array([frames[row].measured_s for row in rows])
-        known_s = found.registration.state.truth_time_s(stamps_s.ravel()).reshape(stamps_s.shape)
-        time_s = np.tile(np.arange(count)[:, None] / rate_hz, (1, stamps_s.shape[1]))
-        time_s[index] = np.where(np.isfinite(known_s), known_s, time_s[index])
-        time_s = np.clip(time_s, 0.0, trajectory.duration_s)
-        calibration = measured_calibration(found.registration)
+        take = registered_take(self.stream, found.registration, self.playback, self.playback.tracker.rate_hz)
         offset_s = found.numbers["time_offset_orientation_s"].value
-        return _SideFrames(
-            frames,
-            (LoopFrames(rows, index),),
-            rate_hz,
-            compute_poses(self.playback.body.skeleton, trajectory.qpos(time_s.mean(axis=1))),
-            registered_readings(trajectory, calibration, time_s),
-            calibration,
-            (
-                f"{self.task.capture.name} was registered with {self.clip}: its clock is {offset_s:.4f} s ahead, and "
-                "methods received the room and mounts that were found; in the simulation they received the true ones.",
-            ),
+        note = (
+            f"{self.task.capture.name} was registered with {self.clip}: its clock is {offset_s:.4f} s ahead, and "
+            "methods received the room and mounts that were found; in the simulation they received the true ones."
         )
+        return replace(take, notes=(note,))
 
     @cached_property
     def fitted(self) -> Scenario:
@@ -285,28 +217,34 @@ class _CaptureRun:
         tracker = tracker_of(self.fitted).as_dict()
         return {"seed": seed, "noise": asdict(self._noise), "tracker": tracker, "span_s": self._span_s}
 
-    def _simulate(self, seed: int) -> _SideFrames:
+    def _simulate(self, seed: int) -> ObservedTake:
         """A simulation of the same take, scored from the first frame that the device has to its last.
 
         The seed of its errors is derived from the plan's, so that a capture of a simulated line with the same seed has
         other errors.
         """
-        mounts, tracker = self.playback.clip_evaluation.session.true_mounts, tracker_of(self.fitted)
-        drawn = int(generator(seed, "trust").integers(2**62))
-        found = simulate_tracker(self.playback.body, self.playback.take, mounts, tracker, self._noise, seed=drawn)
+        playback, tracker = self.playback, tracker_of(self.fitted)
+        mounts, drawn = playback.clip_evaluation.session.true_mounts, int(generator(seed, "trust").integers(2**62))
+        found = simulate_tracker(playback.body, playback.take, mounts, tracker, self._noise, seed=drawn)
         first, last = (time_s * tracker.rate_hz for time_s in self._span_s)
         rows: Ints = np.flatnonzero((found.frame_index >= first - 0.5) & (found.frame_index <= last + 0.5))
-        loop = LoopFrames(rows, found.frame_index[rows])
-        truth = compute_poses(self.playback.body.skeleton, found.truth_qpos)
-        ideal = ideal_readings(self.playback, tracker)
-        return _SideFrames(found.frames, (loop,), tracker.rate_hz, truth, ideal, self.playback.calibration)
+        return ObservedTake(
+            playback.clip_evaluation,
+            playback.take,
+            found.frames,
+            playback.calibration,
+            (LoopFrames(rows, found.frame_index[rows]),),
+            sampling_times_s(playback.take.duration_s, tracker, len(mounts)),
+            tracker.rate_hz,
+            overload=tracker.overload,
+        )
 
     @cached_property
     def _span_s(self) -> tuple[float, float]:
         """Times of the first and the last true frame of the device in the take [s]."""
-        loops, rate_hz = self.device.loops, self.device.rate_hz
-        first, last = min(int(loop.index[0]) for loop in loops), max(int(loop.index[-1]) for loop in loops)
-        return first / rate_hz, last / rate_hz
+        take = self.device
+        expected = [loop.expected for loop in take.loops]
+        return min(each[0] for each in expected) / take.rate_hz, max(each[-1] for each in expected) / take.rate_hz
 
     @cached_property
     def _evaluations(self) -> list[tuple[dict[str, Any], ClipEvaluation]]:
@@ -321,7 +259,7 @@ class _CaptureRun:
         ]
 
     def _cells(
-        self, side: str, identity: Mapping[str, Any], load: Callable[[], _SideFrames]
+        self, side: str, identity: Mapping[str, Any], load: Callable[[], ObservedTake]
     ) -> dict[str, dict[str, float | None]]:
         """Arm -> metric -> error of one side; arms that fail are left out and named in `failures`."""
         found = {}
@@ -333,7 +271,7 @@ class _CaptureRun:
         return found
 
     def _cell(
-        self, arm: Arm, side: str, identity: Mapping[str, Any], load: Callable[[], _SideFrames]
+        self, arm: Arm, side: str, identity: Mapping[str, Any], load: Callable[[], ObservedTake]
     ) -> dict[str, float | None]:
         method = resolve_method(arm.method, DEFAULT_ISOLATION)
         evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
@@ -343,14 +281,16 @@ class _CaptureRun:
         cell = {"key": path.stem, "arm": str(arm), "clip": str(self.clip), "side": side}
         if path.is_file():
             return read_cell_errors(path, cell, self.task.metrics)
-        frames, worn = load(), tuple(self.playback.scenario.worn_stations)
-        rows = np.array([worn.index(station) for station in arm.stations])
-        shown = frames.of_stations(rows)
-        start = time.perf_counter()
-        fitted = evaluation.fit_method(method, arm.method)
-        answers = run_over_frames(fitted, _select_stations(frames.calibration, rows), shown)
-        self.methods_s += time.perf_counter() - start
-        errors = score_loops(self.task.metrics, answers, frames.loops, frames.truth, frames.rate_hz)
+        found = evaluate(
+            method,
+            arm.method,
+            load(),
+            stations=arm.stations,
+            learnt_from=evaluation,
+            metrics=self.task.metrics,
+        )
+        self.methods_s += found.seconds
+        errors = {metric: found.metrics[metric] for metric in self.task.metrics}
         with named_folder_fault(self.task.out):
             write_result_json(path, {**cell, "errors": errors})
         return errors
@@ -371,14 +311,3 @@ def read_cell_errors(path: Path, cell: Mapping[str, Any], metrics: Sequence[str]
         if value is not None and not (isinstance(value, float) and np.isfinite(value)):
             raise BadFile(path, f"an error of {value!r}", _EXPECTED, _ADVICE)
     return errors
-
-
-def _select_stations(calibration: Calibration, rows: Ints) -> Calibration:
-    """The calibration of the stations in these rows."""
-    return replace(
-        calibration,
-        stations=tuple(calibration.stations[row] for row in rows),
-        bones=tuple(calibration.bones[row] for row in rows),
-        mount_m=calibration.mount_m[rows],
-        bone_from_station=calibration.bone_from_station[rows],
-    )

@@ -81,7 +81,7 @@ def truth_of_playback(
     bodies = _bone_truths(playback.body.skeleton, motion, calibration.bones, times_s)
     if device_s is not None:  # as long as the capture, so that other loops overlap it less
         bodies = {bone: _cut(truth, *device_s) for bone, truth in bodies.items()}
-    clip, duration_s = playback.clip_evaluation.part, (len(playback.take) - 1) / playback.take.rate_hz
+    clip, duration_s = playback.clip_evaluation.part, playback.take.duration_s
     names = tuple(stations) or calibration.stations
     return TruthMotion(
         f"clip {clip} of the scenario {playback.scenario.name}, {duration_s:.1f} s",

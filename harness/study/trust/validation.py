@@ -1,6 +1,6 @@
 """Validation of a capture against a reference: registration, accuracy, latency, and departures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,8 +9,9 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
+from harness.experiment.evaluation import Evaluation, evaluate_each
+from harness.experiment.recorded_take import find_playback, registered_take
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.experiment.score_recording import find_playback
 from harness.measure.accuracy import ErrorQuantiles, error_quantiles
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.measured import Measured
@@ -44,6 +45,8 @@ from harness.study.trust.truth_motion import (
     truth_of_playback,
 )
 
+SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
+"""Errors of methods that a validated capture states."""
 SESSION_KEYS = ("scale", "heading_rad", "latency_s")
 """Numbers that hold for a session of the device; a unit file keeps them in [session]."""
 _DEFAULT_LATENCY_S, _DEFAULT_BAUD = 0.004, 115200
@@ -222,6 +225,23 @@ def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]
         for station, (place, turn) in shares.items()
         if max(place, turn) > _MOST_LEFT_OUT
     )
+
+
+def evaluate_registered(
+    capture: Path,
+    found: Validation,
+    methods: Sequence[str],
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> list[Evaluation]:
+    """Evaluate methods on the frames of a capture with the registered room and mounts, on the performer's body.
+
+    BadInput where the reference has no performer or no frame is inside it; else as `evaluate_each`.
+    """
+    playback, rate_hz = found.truth.playback, found.reader.wire.rate_hz
+    if playback is None:
+        raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
+    take = registered_take(RecordingStream(capture), found.registration, playback, rate_hz, found.truth.loop_s)
+    return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
 def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFile:

@@ -12,7 +12,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE
 from harness.score.angles import wrap_difference
-from harness.score.score import WARM_UP_S
+from harness.score.loops import WARM_UP_S
 from harness.testing.contract_case import (
     DISTURBANCES,
     FRAMES,

@@ -14,36 +14,39 @@ ALL = Target("boxing default", "boxing, default", 0.84, 0.75)
 
 def test_every_row_is_the_ratio_of_its_means() -> None:
     results = evaluate_targets(errors(2.0), errors(1.5))
-    assert [result.target for result in results] == list(TARGETS)
+    assert [result.text for result in results] == [target.title for target in TARGETS]
     for result in results:
-        factor = 2.0 if "silent" in result.target.title else 1.0
-        assert result.stored == pytest.approx(2.01 * factor)
-        assert result.today == pytest.approx(1.51 * factor)
-        assert result.ratio == pytest.approx(1.51 / 2.01)
+        factor = 2.0 if "silent" in result.text else 1.0
+        assert result.more["stored_deg"] == pytest.approx(2.01 * factor)
+        assert result.more["today_deg"] == pytest.approx(1.51 * factor)
+        assert result.value == pytest.approx(1.51 / 2.01)
 
 
 def test_seeds_are_averaged_within_a_clip_before_clips_are() -> None:
     skewed = {"boxing, default": {"a": clip_errors([1.0, 1.0, 1.0]), "b": clip_errors([5.0, 5.0, 5.0])}}
-    assert evaluate_target(ALL, skewed, skewed).today == pytest.approx(3.0)
+    assert evaluate_target(ALL, skewed, skewed).more["today_deg"] == pytest.approx(3.0)
     partly = ClipErrors("boxing", "known", dict.fromkeys(CELL_METRICS, (5.0, None, None)))
     unbalanced = {"boxing, default": {**skewed["boxing, default"], "b": partly}}
-    assert evaluate_target(ALL, skewed, unbalanced).today == pytest.approx(3.0)
+    assert evaluate_target(ALL, skewed, unbalanced).more["today_deg"] == pytest.approx(3.0)
 
 
 def test_a_row_of_new_performers_has_their_clips_alone() -> None:
     today = errors(1.0, changed={("walking, clean", f"walking_new_{n}"): 3.0 for n in range(3)})
-    by_title = {result.target.title: result for result in evaluate_targets(errors(1.0), today)}
-    assert by_title["walking new, clean"].today == pytest.approx(3.0)
-    assert by_title["walking new, clean"].clips == tuple(f"walking_new_{n}" for n in range(3))
-    assert by_title["walking known, clean"].ratio == pytest.approx(1.0)
+    by_title = {result.text: result for result in evaluate_targets(errors(1.0), today)}
+    assert by_title["walking new, clean"].more["today_deg"] == pytest.approx(3.0)
+    assert by_title["walking new, clean"].more["clip_names"] == [f"walking_new_{n}" for n in range(3)]
+    assert by_title["walking known, clean"].value == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
-    ("today", "met"), [(0.749, "goal"), (0.75, "goal"), (0.751, "at least"), (0.84, "at least"), (0.841, "no")]
+    ("today", "verdict", "goal"),
+    [(0.749, "met", True), (0.75, "met", True), (0.751, "met", False), (0.84, "met", False), (0.841, "missed", False)],
 )
-def test_what_is_met(today: float, met: str) -> None:
+def test_what_is_met(today: float, verdict: str, goal: bool) -> None:
     before, now = ({"boxing, default": {"a": clip_errors([value])}} for value in (1.0, today))
-    assert evaluate_target(ALL, before, now).met == met
+    found = evaluate_target(ALL, before, now)
+    assert (found.verdict, found.target) == (verdict, "<= 0.84 (goal 0.75)")
+    assert found.measured == f"{today:.3f}" + (" (goal met)" if goal else "")
 
 
 @pytest.mark.parametrize("side", ["today", "in the stored errors"])
@@ -59,8 +62,8 @@ def test_a_condition_without_clips_is_refused_and_left_out_of_the_table() -> Non
     with pytest.raises(BadInput, match="every clip missing"):
         evaluate_target(ALL, {}, {})
     only = {"boxing, default": errors(1.0)["boxing, default"]}
-    assert [result.target for result in evaluate_targets(errors(1.0), only)] == [
-        target for target in TARGETS if target.condition == "boxing, default"
+    assert [result.text for result in evaluate_targets(errors(1.0), only)] == [
+        target.title for target in TARGETS if target.condition == "boxing, default"
     ]
 
 
@@ -80,15 +83,16 @@ def test_an_error_that_was_not_measured_is_refused() -> None:
 @pytest.mark.parametrize(
     ("jitter", "skate", "met"),
     [
-        (1.0, 130.0, ("goal", "goal")),
-        (1.11, 131.0, ("at least", "at least")),
-        (0.89, 180.0, ("at least", "at least")),
-        (1.21, 181.0, ("no", "no")),
-        (0.79, 0.0, ("no", "goal")),
+        (1.0, 130.0, ("met (goal met)", "met (goal met)")),
+        (1.11, 131.0, ("met", "met")),
+        (0.89, 180.0, ("met", "met")),
+        (1.21, 181.0, ("missed", "missed")),
+        (0.79, 0.0, ("missed", "met (goal met)")),
     ],
 )
 def test_the_row_with_a_lag(jitter: float, skate: float, met: tuple[str, str]) -> None:
     values = dict.fromkeys(CELL_METRICS, (1.0,)) | {TRUE_JITTER: (100.0,), JITTER: (100.0 * jitter,), SKATE: (skate,)}
-    result = evaluate_lag("m[lag=2]", {"a": ClipErrors("boxing", "known", values)})
-    assert result.jitter_ratio == pytest.approx(jitter)
-    assert (result.jitter_met, result.skate_met) == met
+    clips = {"a": ClipErrors("boxing", "known", values)}
+    rows = evaluate_lag("m[lag=2]", clips, clips)
+    assert [row.value for row in rows] == pytest.approx([jitter, skate])
+    assert tuple(row.verdict + " (goal met)" * row.measured.endswith(" (goal met)") for row in rows) == met

@@ -64,7 +64,7 @@ def test_a_changed_constant_is_found_and_a_margin_is_kept() -> None:
     assert sum(declares_equivalence(seed, (-1.0) ** seed) for seed in seeds) <= 4
     assert sum(declares_equivalence(seed, 3.0) for seed in seeds) == 0
     assert sum(declares_equivalence(seed, 0.0) for seed in seeds) >= 10
-    assert same_profile_row(seeds).met
+    assert same_profile_row(seeds).verdict == "met"
 
 
 def test_more_captures_find_more() -> None:
@@ -81,8 +81,8 @@ def test_two_methods_differ_by_a_tenth_from_draw_to_draw() -> None:
 def test_the_rows_of_a_hundred_plans() -> None:
     """Two methods swapped by 5 % are missed with one capture of each clip; a row that is met by then should say so."""
     same, swapped, changed, related, twice, edge, none = trust_rows()
-    assert (same.met, swapped.met, edge.met) == (True, False, True)
-    assert "scatters by" in swapped.note
+    assert (same.verdict, swapped.verdict, edge.verdict) == ("met", "missed", "met")
+    assert "scatters by" in swapped.why
     assert changed.measured == "in 100 of 100"
-    assert all(row.met is None for row in (changed, related, twice, none))
+    assert all(row.verdict == "" for row in (changed, related, twice, none))
     assert int(related.measured.split()[1]) < 80 <= int(twice.measured.split()[1])

@@ -34,16 +34,16 @@ def test_every_kind_is_met_when_all_is_found_and_missed_when_nothing_is() -> Non
     seeds = (1, 2)
     rows = fault_rows(seeds, {(kind, seed): _found(kind, seed) for kind in KINDS for seed in seeds})
     assert len(rows) == len(KINDS) == 14
-    assert all(row.met for row in rows)
-    assert not any(row.note for row in rows)
+    assert all(row.verdict == "met" for row in rows)
+    assert not any(row.why for row in rows)
     nothing = {(kind, seed): CaptureOutcome(kind, seed, "") for kind in KINDS for seed in seeds}
-    assert [row.met for row in fault_rows(seeds, nothing)] == [kind in NO_FAULTS for kind in KINDS]
+    assert [row.verdict == "met" for row in fault_rows(seeds, nothing)] == [kind in NO_FAULTS for kind in KINDS]
 
 
 def test_a_size_may_be_near_or_within_its_interval() -> None:
-    def met(value: float, half: float, named: bool = True) -> bool | None:
+    def met(value: float, half: float, named: bool = True) -> bool:
         check = _check("components.clock.drift_ppm", value, half=half, named=named)
-        return fault_row("clock", [CaptureOutcome("clock", 1, "", (check,))]).met
+        return fault_row("clock", [CaptureOutcome("clock", 1, "", (check,))]).verdict == "met"
 
     assert all(met(*found) for found in [(80.0, 0.0), (95.0, 0.0), (65.0, 0.0), (120.0, 41.0)])
     assert not met(97.0, 10.0)
@@ -55,7 +55,7 @@ def test_the_size_of_a_change_is_that_beside_the_earlier_number() -> None:
     earlier = 0.02
     for measured, met in ((number.value + earlier, True), (number.value, False)):
         check = replace(_check("scale", measured), expected=earlier)
-        assert fault_row("scale", [CaptureOutcome("scale", 3, "", (check,))]).met is met
+        assert fault_row("scale", [CaptureOutcome("scale", 3, "", (check,))]).verdict == ("met" if met else "missed")
 
 
 def test_named_and_sized_must_hold_of_one_capture() -> None:
@@ -63,14 +63,14 @@ def test_named_and_sized_must_hold_of_one_capture() -> None:
     wrong = replace(_found("clock"), checks=(_check("components.clock.drift_ppm", 300.0),))
     row = fault_row("clock", [_found("clock")] * 93 + [unnamed] * 3 + [wrong] * 4)
     assert row.measured == "named in 97, its size in 96, both in 93"
-    assert row.met is False
-    assert fault_row("clock", [_found("clock")] * 95 + [wrong] * 5).met is True
+    assert row.verdict == "missed"
+    assert fault_row("clock", [_found("clock")] * 95 + [wrong] * 5).verdict == "met"
 
 
 def test_a_fault_of_one_station_is_not_found_at_another() -> None:
     (check,) = _found("lost").checks
     assert check.station == STATION
-    assert fault_row("lost", [replace(_found("lost"), checks=(replace(check, station="head"),))]).met is False
+    assert fault_row("lost", [replace(_found("lost"), checks=(replace(check, station="head"),))]).verdict == "missed"
 
 
 def test_what_else_is_named_and_what_is_refused_is_told() -> None:
@@ -79,17 +79,20 @@ def test_what_else_is_named_and_what_is_refused_is_told() -> None:
         NO_FAULT, [replace(_found(NO_FAULT), checks=(other,)), CaptureOutcome(NO_FAULT, 2, "", failure="No")]
     )
     assert row.measured == "in 0"
-    assert row.note == "named: scale in 1; refused in 1: No"
+    assert row.why == "named: scale in 1; refused in 1: No"
     row = fault_row("clock", [replace(_found("clock"), checks=(*_found("clock").checks, other))])
-    assert row.met is True
-    assert row.note == "also named: scale in 1"
+    assert row.verdict == "met"
+    assert row.why == "also named: scale in 1"
 
 
 def test_exchanged_stations_must_be_the_planted_ones() -> None:
-    assert fault_row("exchanged", [replace(_found("exchanged"), exchanged=("head: thorax",))]).met is False
+    assert fault_row("exchanged", [replace(_found("exchanged"), exchanged=("head: thorax",))]).verdict == "missed"
     row = fault_row("latency", [replace(_found("latency"), exchanged=("head: thorax",))])
-    assert "exchanged stations (head: thorax) in 1" in row.note
-    assert fault_row("none_validated", [replace(_found("none_validated"), exchanged=("head: thorax",))]).met is False
+    assert "exchanged stations (head: thorax) in 1" in row.why
+    assert (
+        fault_row("none_validated", [replace(_found("none_validated"), exchanged=("head: thorax",))]).verdict
+        == "missed"
+    )
 
 
 def test_coverage_has_two_sides() -> None:
@@ -100,22 +103,22 @@ def test_coverage_has_two_sides() -> None:
         low = 0.9 * true if covers else 1.1 * true
         return CaptureOutcome(NO_FAULT, 1, "", parameters=(StoredNumber(key, low, low, 2.0 * true),))
 
-    def met(covered: int) -> bool | None:
+    def met(covered: int) -> bool:
         (row,) = coverage_rows([outcome(i < covered) for i in range(200)])
-        return row.met
+        return row.verdict == "met"
 
     assert [met(count) for count in (179, 180, 190, 198, 199)] == [False, True, True, True, False]
     (row,) = coverage_rows([outcome(True), CaptureOutcome(NO_FAULT, 2, "")])
-    assert row.note == "not measured in 1 of 2"
+    assert row.why == "not measured in 1 of 2"
 
 
 def test_registration_is_held_to_its_promises() -> None:
     exact = dict.fromkeys(PROMISES, 0.0)
-    assert all(row.met for row in registration_rows([exact] * 20, 20))
-    assert [row.met for row in registration_rows([exact] * 18, 20)] == [False] * len(PROMISES)
+    assert all(row.verdict == "met" for row in registration_rows([exact] * 20, 20))
+    assert {row.verdict for row in registration_rows([exact] * 18, 20)} == {"missed"}
     off = registration_rows([exact | {"mounts_m": 0.003}] * 2, 2)
-    assert [row.met for row in off].count(False) == 1
-    assert off[1].note == "largest 3 mm"
+    assert [row.verdict for row in off].count("missed") == 1
+    assert off[1].why == "largest 3 mm"
 
 
 def test_constants_are_not_chosen_on_the_seeds_of_the_table() -> None:
@@ -130,6 +133,6 @@ def test_registration_of_a_capture_is_as_promised(tmp_path: Path) -> None:
     from harness.bench.lab.validated_captures import validate_planted
 
     errors = registration_errors(validate_planted("none_validated", 1001, tmp_path), 1001)
-    assert all(row.met for row in registration_rows([errors], 1))
+    assert all(row.verdict == "met" for row in registration_rows([errors], 1))
     assert all(value > 0.0 for value in errors.values())
-    assert all(not row.met for row in registration_rows([dict.fromkeys(errors, 1000.0)], 1))
+    assert all(row.verdict == "missed" for row in registration_rows([dict.fromkeys(errors, 1000.0)], 1))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from harness.bench.physics import scenes, truth
-from harness.report.physics.error_comparison import TruthRow
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.simulate.physics.settings import Physics
 
 SEEDS = tuple(range(101, 115))
@@ -27,11 +27,11 @@ SEEDS = tuple(range(101, 115))
         (truth.covered_row, 2),
     ],
 )
-def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[TruthRow]], count: int) -> None:
+def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[BenchmarkStatement]], count: int) -> None:
     found = rows(SEEDS)
     assert len(found) == count
     for row in found:
-        assert row.met is True, f"{row.name}: {row.measured}"
+        assert row.verdict == "met", f"{row.text}: {row.measured}"
 
 
 def changed(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
@@ -42,8 +42,8 @@ def changed(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
 def test_a_row_is_missed_where_ranges_are_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, sound=replace(Physics().sound, range_noise_m=0.01))
     (row,) = truth.rest_row(SEEDS[:3])
-    assert row.met is False
-    assert row.name == "static, spread of 3-D position"
+    assert row.verdict == "missed"
+    assert row.text == "static, spread of 3-D position"
 
 
 def test_the_temperature_row_is_missed_where_the_device_measures_the_temperature(
@@ -52,19 +52,19 @@ def test_the_temperature_row_is_missed_where_the_device_measures_the_temperature
     monkeypatch.setattr(truth, "_WARMER_K", 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         (row,) = truth.temperature_row(SEEDS[:2])
-    assert row.met is False
+    assert row.verdict == "missed"
 
 
 @pytest.mark.slow
 def test_excursions_need_the_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, room=replace(Physics().room, shadow=False))
-    assert truth.free_rows(SEEDS[:3])[0].met is False
+    assert truth.free_rows(SEEDS[:3])[0].verdict == "missed"
 
 
 @pytest.mark.long
 def test_a_filter_that_never_gives_a_station_up_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, fusion=replace(Physics().fusion, sigma_limit_m=10.0, coast_s=60.0))
-    assert truth.covered_row(SEEDS[:3])[1].met is False
+    assert truth.covered_row(SEEDS[:3])[1].verdict == "missed"
 
 
 def test_a_station_is_lost_rather_than_wrong_while_an_accelerometer_is_at_its_limit() -> None:

@@ -34,8 +34,8 @@ def test_every_kind_of_a_run_is_drawn_the_same_twice(kind: str, framed: Path, tm
 
 def test_a_placement_study_is_drawn_by_default(tmp_path: Path) -> None:
     study = write_made_up(tmp_path / "study")
-    figure = write_figure(study, fmt="png")
-    assert (figure.path, figure.kind, figure.width_mm) == (study / "figures" / "placement.png", "placement", 170.0)
+    figure = write_figure(study)
+    assert (figure.path, figure.kind, figure.width_mm) == (study / "figures" / "placement.pdf", "placement", 170.0)
 
 
 @pytest.mark.parametrize(
@@ -65,12 +65,10 @@ def test_kinds_of_a_run_are_refused_for_a_study(tmp_path: Path) -> None:
         write_figure(write_made_up(tmp_path), "time")
 
 
-def test_formats_that_contradict_the_suffix_or_do_not_exist_are_refused(ranked: Path, tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="--format pdf with --out"):
-        write_figure(ranked, fmt="pdf", out=tmp_path / "x.svg")
+def test_formats_that_do_not_exist_are_refused(ranked: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="no format of figures called 'jpg'"):
         write_figure(ranked, out=tmp_path / "x.jpg")
-    assert write_figure(ranked, fmt="svg", out=tmp_path / "x.v2").path.read_bytes().startswith(b"<?xml")
+    assert write_figure(ranked, out=tmp_path / "x.SVG").path.read_bytes().startswith(b"<?xml")
 
 
 def test_nothing_is_written_over(ranked: Path, tmp_path: Path) -> None:

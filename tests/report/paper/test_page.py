@@ -9,11 +9,13 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadFile
+from harness.report.kit.statement_lines import MARKS
 from harness.report.paper import writer
 from harness.report.paper.page import run_link
-from harness.report.paper.verdicts import MARKS, count_verdicts, sentence
+from harness.report.paper.verdicts import KINDS, count_verdicts, sentence
 from harness.report.paper.writer import write_paper_page
-from harness.results.findings import BarChart, Claim, FindingsTable, LineChart, PaperExperiment, PaperFindings
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings
 from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
 from tests.report.reading import read, text_of
 from tests.results.rewrite import read_json, write_json
@@ -52,7 +54,7 @@ def test_every_claim_stands_in_the_table_with_both_figures_and_its_verdict(study
     assert len(rows) == len(claims)
     for row, claim in zip(rows, claims, strict=True):
         told = " ".join(re.sub(r"<[^>]*>", " ", row).replace("&#x27;", "'").split())
-        for text in (claim.text, claim.published, claim.ours, claim.why, MARKS[claim.verdict], claim.verdict):
+        for text in (claim.text, claim.target, claim.measured, claim.why, MARKS[claim.verdict], claim.verdict):
             assert text in told
         if claim.low is not None and claim.high is not None:
             assert f"{claim.low:.2f} to {claim.high:.2f}" in told
@@ -125,7 +127,7 @@ def test_the_same_findings_give_the_same_bytes(study: Path) -> None:
 
 
 def test_hostile_text_stays_text(tmp_path: Path) -> None:
-    claim = Claim(HOSTILE, HOSTILE, HOSTILE, "not run", HOSTILE, 1, 0.5, 0.1, 0.9, HOSTILE)
+    claim = BenchmarkStatement(HOSTILE, HOSTILE, HOSTILE, "not run", HOSTILE, 1, 0.5, 0.1, 0.9, HOSTILE)
     bars = BarChart(HOSTILE, HOSTILE, (HOSTILE, "b"), {HOSTILE: (1.0, None)}, caption=HOSTILE)
     lines = LineChart(HOSTILE, HOSTILE, HOSTILE, (0.0, 1.0), {HOSTILE: (1.0, 2.0)}, caption=HOSTILE)
     table = FindingsTable(HOSTILE, (HOSTILE, HOSTILE), ((HOSTILE, HOSTILE),))
@@ -199,7 +201,7 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
     long = "a_name_without_end_" * 12
     bars = BarChart("Bars", "deg", (long, "b"), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
     lines = LineChart("Lines", "x", "y", (0.0, 1.0), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
-    claim = Claim(long, long, long, "cannot tell", long, 3)
+    claim = BenchmarkStatement(long, long, long, "cannot tell", long, 3)
     page = alone(tmp_path, replace(EMPTY, title=long, claims=(claim,), figures=(bars, lines)))
     assert text_of(page).count(long) >= 8
 
@@ -243,7 +245,7 @@ def test_a_table_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_sentence_counts_every_claim() -> None:
-    claims = [Claim("", "", "", verdict) for verdict in MARKS for _ in range(3)]
+    claims = [BenchmarkStatement("", "", "", verdict) for verdict in KINDS for _ in range(3)]
     for count in range(len(claims) + 1):
         some = claims[:count]
         numbers = [int(number) for number in re.findall(r"\d+", sentence(some))]

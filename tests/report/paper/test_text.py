@@ -9,11 +9,12 @@ import pytest
 import harness
 from harness.cli import main
 from harness.errors import BadFile
+from harness.report.kit.statement_lines import WIDTH, format_difference, format_interval, format_p
 from harness.report.paper.readme import update_readme
 from harness.report.paper.side_by_side import printed_statements
-from harness.report.paper.text import WIDTH, statements_text, text_tables
-from harness.report.paper.verdicts import format_difference, format_interval, format_p
-from harness.results.findings import Claim, PaperExperiment
+from harness.report.paper.text import statements_text, text_tables
+from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings import PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
 RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")
@@ -27,8 +28,8 @@ def test_every_claim_is_told_whole() -> None:
     told = letters(text_tables(liu()))
     for claim in (claim for experiment in liu().experiments for claim in experiment.claims):
         for text in (
-            claim.published,
-            claim.ours,
+            claim.target,
+            claim.measured,
             claim.why,
             format_difference(claim),
             format_interval(claim),
@@ -42,7 +43,7 @@ def test_every_claim_is_told_whole() -> None:
 @pytest.mark.parametrize("repeats", [1, 20])
 def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
     long = " ".join(["some words"] * repeats) + "and_one_without_any_end" * repeats
-    claim = Claim(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
+    claim = BenchmarkStatement(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
     findings = replace(
         liu(), experiments=(PaperExperiment("a", long, long, (long,), (claim, claim)), *kim().experiments)
     )
@@ -55,7 +56,7 @@ def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
 
 def test_columns_stand_under_their_titles() -> None:
     lines = text_tables(liu()).split("\n")
-    top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("claim"))
+    top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("statement"))
     for title in ("published", "measured", "difference", "95 % interval", "units", "verdict"):
         at = lines[top].index(title)
         assert lines[top + 1][at - 2 : at] == "  "
@@ -63,7 +64,7 @@ def test_columns_stand_under_their_titles() -> None:
 
 
 def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
-    claim = Claim("one\ntwo\t three", "a\nb", "c", "reproduced")
+    claim = BenchmarkStatement("one\ntwo\t three", "a\nb", "c", "reproduced")
     told = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
     assert "one two three  printed  a b        c         reproduced" in told
 
@@ -84,13 +85,15 @@ def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
 def test_an_interval_that_does_not_hold_zero_never_reads_so(
     values: tuple[float | None, float | None, float | None], unit: str, told: tuple[str, str]
 ) -> None:
-    claim = Claim("", "", "", "cannot tell", "", 7, *values, unit)
+    claim = BenchmarkStatement("", "", "", "cannot tell", "", 7, *values, unit)
     assert (format_difference(claim), format_interval(claim)) == told
 
 
 @pytest.mark.parametrize(("p", "told"), [(None, ""), (0.0004, "< 0.001"), (0.0312, "0.031"), (1.0, "1.000")])
 def test_p_after_holm_stands_beside_the_interval(p: float | None, told: str) -> None:
-    claim = Claim("first", "order", "1 against 2", "reproduced", "", 12, 1.0, 0.5, 1.5, "deg", p=0.0001, p_holm=p)
+    claim = BenchmarkStatement(
+        "first", "order", "1 against 2", "reproduced", "", 12, 1.0, 0.5, 1.5, "deg", p=0.0001, p_holm=p
+    )
     assert format_p(claim) == told
     text = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
     assert ("p (Holm)" in text) == (p is not None)
@@ -98,9 +101,9 @@ def test_p_after_holm_stands_beside_the_interval(p: float | None, told: str) -> 
 
 
 def test_a_figure_that_is_ours_already_is_not_told_twice() -> None:
-    assert format_difference(Claim("", "1.25 deg", "1.21 deg", "reproduced", difference=1.21, unit="deg")) == ""
+    assert format_difference(BenchmarkStatement("", "1.25 deg", "1.21 deg", "reproduced", value=1.21, unit="deg")) == ""
     assert (
-        format_difference(Claim("", "order", "1.21 against 2", "cannot tell", difference=0.79, unit="deg"))
+        format_difference(BenchmarkStatement("", "order", "1.21 against 2", "cannot tell", value=0.79, unit="deg"))
         == "0.79 deg"
     )
 
@@ -171,7 +174,7 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
     assert main(["report", str(folder), "--readme", str(readme)]) == 0
     assert "kim2012-cmu" in readme.read_text()
     assert (folder / "report.html").is_file()
-    assert main(["report", str(folder), "--movie"]) == 2
+    assert main(["report", str(folder), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
     assert "the study of a paper; expected a run." in capsys.readouterr().err
     assert main(["report", str(tmp_path), "--readme", str(readme)]) == 2
     assert "no results of the harness; expected" in capsys.readouterr().err
@@ -188,10 +191,14 @@ def test_the_results_page_has_its_markers() -> None:
 def test_a_printed_statement_has_one_row_with_both_readings() -> None:
     """Names of methods as printed are those of the paper; other kinds of claims are counted below the table."""
     claims = (
-        Claim("a: dynamic_map:literal errs less", "order", "1 against 2 deg", "reproduced", reading="as printed"),
-        Claim("a: dynamic_map errs less", "order", "3 against 2 deg", "not reproduced", reading="ours"),
-        Claim("five modes", "99 %", "95 %", "not comparable"),
-        Claim("b: dynamic_map errs less", "order", "7 against 8 deg", "reproduced", kind="derived", reading="ours"),
+        BenchmarkStatement(
+            "a: dynamic_map:literal errs less", "order", "1 against 2 deg", "reproduced", reading="as printed"
+        ),
+        BenchmarkStatement("a: dynamic_map errs less", "order", "3 against 2 deg", "not reproduced", reading="ours"),
+        BenchmarkStatement("five modes", "99 %", "95 %", "not comparable"),
+        BenchmarkStatement(
+            "b: dynamic_map errs less", "order", "7 against 8 deg", "reproduced", kind="derived", reading="ours"
+        ),
     )
     findings = replace(liu(), experiments=(PaperExperiment("a", "b", "", (), claims),))
     first, second = printed_statements(findings)

@@ -194,7 +194,7 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
     said = json.loads(capsys.readouterr().out)
     assert said == {"report": str(folder / "report.html"), "next": f"harness plot {folder}", "outcome": "pass"}
     assert (folder / "report.html").read_bytes() == first
-    assert main(["report", str(folder), "--movie"]) == 2
+    assert main(["report", str(folder), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
     assert "a placement study" in capsys.readouterr().err
 
 

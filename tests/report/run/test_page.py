@@ -19,7 +19,7 @@ from harness.report.run.data import WORST_METRICS, read_run
 from harness.report.run.headline import build_headline
 from harness.report.run.tables import results_tables
 from harness.report.run.text import run_table
-from harness.report.run.writer import movie_fps, write_run_page
+from harness.report.run.writer import write_run_page
 from harness.results.storage import read_summary
 from tests.report.fabricate import METHODS, Plan, fabricate
 
@@ -328,25 +328,6 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
         red, _, blue = np.moveaxis(imread(strip)[..., :3], -1, 0)
         assert np.mean(red - blue > 0.3) > 0.003, "no orange estimate"
         assert np.mean(blue - red > 0.1) > 0.003, "no blue truth"
-
-
-@pytest.mark.long
-def test_the_movie_plays_in_real_time(tmp_path: Path, renders: None) -> None:
-    import imageio_ffmpeg
-
-    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"a+b": 2.0}, duration_s=1.0))
-    page = write_run_page(out, movie=True, rendered=False)
-    (movie,) = out.glob("movie_*.mp4")
-    assert movie.name.startswith("movie_a_b_walking_p1_01_")
-    assert f'href="{movie.name}"' in page.read_text(encoding="utf-8")
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(movie))
-    assert frames == 21
-    assert seconds == pytest.approx(1.05, abs=0.02)
-
-
-@pytest.mark.parametrize(("rate_hz", "fps"), [(40, 20), (60, 30), (90, 30), (100, 25), (30, 30), (15, 25), (180, 30)])
-def test_movies_take_every_nth_frame_where_they_can(rate_hz: float, fps: float) -> None:
-    assert movie_fps(rate_hz) == fps
 
 
 @pytest.mark.parametrize("silent", [("ik",), ("ik", "mean_pose")])

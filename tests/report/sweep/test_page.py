@@ -300,7 +300,7 @@ def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pyte
     assert main(["report", str(tmp_path)]) == 0
     assert page.read_bytes() == before
     assert str(page) in capsys.readouterr().out
-    assert main(["report", str(tmp_path), "--movie"]) == 2
+    assert main(["report", str(tmp_path), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
     cell = next((tmp_path / "cells").glob("*/cell.json"))
     cell.write_text(cell.read_text().replace("walking", "running"))
     assert main(["report", str(tmp_path)]) == 2

@@ -28,7 +28,7 @@ def test_the_experiment_on_drawn_people_is_not_comparable() -> None:
     assert len(modes.series) == MODES
     assert isinstance(kept, LineChart)
     assert isinstance(counts, LineChart)
-    assert kept.series["normalised by the left tibia"][MODES - 1] == pytest.approx(claim.difference)
+    assert kept.series["normalised by the left tibia"][MODES - 1] == pytest.approx(claim.value)
     assert all(len(row) == len(table.columns) for table in told.tables for row in table.rows)
     means = {name: np.mean(np.array(values, float)) for name, values in bones.series.items()}
     assert means["5 modes"] < 0.6 * means["the mean skeleton"]

@@ -14,8 +14,9 @@ from harness.core.split import ClipPart, allowed_frames
 from harness.errors import UnknownName
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import load_scenario, shipped_scenarios, variants
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.cell import Cell
-from harness.results.findings import Claim, PaperExperiment
+from harness.results.findings import PaperExperiment
 from harness.study.papers.database_size import database_size, one_database
 from harness.study.papers.frame_by_frame import frame_by_frame
 from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
@@ -157,7 +158,7 @@ def test_the_size_of_the_database_is_judged_from_the_least_share_to_the_whole(
     found = database_size(told(motion, {"share": share}))
     assert verdicts(found, "with the whole database than with 1 %") == {verdict: 4}
     (ours,) = [c for c in found.claims if c.text.startswith("boxing, positions: dynamic_map errs less with the whole")]
-    assert ours.difference == pytest.approx(0.99 * share, abs=0.15)
+    assert ours.value == pytest.approx(0.99 * share, abs=0.15)
     assert [row[0] for row in found.tables[0].rows] == ["1 %", "3 %", "10 %", "30 %", "100 %"]
 
 
@@ -200,7 +201,7 @@ def test_what_failed_is_not_run() -> None:
     assert {claim.why for claim in leave_one_out(nothing).claims} == {"every cell failed"}
 
 
-def claim_of(experiment: PaperExperiment, text: str) -> Claim:
+def claim_of(experiment: PaperExperiment, text: str) -> BenchmarkStatement:
     (found,) = [claim for claim in experiment.claims if claim.text == text]
     return found
 
@@ -209,7 +210,7 @@ def test_combinations_of_inputs_are_judged_by_neighbours() -> None:
     rising = dict(zip(PUBLISHED_DEG, (1.0, 2.0, 3.0, 4.0), strict=True))
     found = boxing_inputs(told("builtin", rising))
     assert verdicts(found, " err less than ") == {"reproduced": 9}
-    assert found.claims[0].published == "1.25 < 2.25 deg"
+    assert found.claims[0].target == "1.25 < 2.25 deg"
     assert verdicts(found)["not comparable"] == 12  # figures of built-in motion
     late = boxing_inputs(told("builtin", {**rising, "mixed": 2.0}))
     wrong = [claim.text for claim in late.claims if claim.verdict == "not reproduced"]

@@ -48,7 +48,7 @@ def test_findings_hold_what_the_cells_say(finished: Path) -> None:
     claim = walks.claims[0]
     assert (claim.clips, claim.verdict, claim.low) == (2, "cannot tell", None)
     off = [errors["ik:previous"][unit] - errors["mean_pose"][unit] for unit in errors["mean_pose"]]
-    assert claim.difference == pytest.approx(np.mean(off))
+    assert claim.value == pytest.approx(np.mean(off))
     bars, lines = walks.figures
     assert isinstance(bars, BarChart)
     assert isinstance(lines, LineChart)

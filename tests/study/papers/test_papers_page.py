@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 import harness
-from harness.report.paper.verdicts import MARKS
+from harness.report.kit.statement_lines import MARKS
+from harness.report.paper.verdicts import MEANINGS
 from harness.results.findings import PaperExperiment
 from harness.study.papers.paper import PAPERS, load_paper
 from harness.study.papers.paper_study import PaperStudy
@@ -25,7 +26,7 @@ def test_every_experiment_and_no_other_has_a_row() -> None:
 
 def test_every_verdict_has_a_row() -> None:
     assert re.findall(r"^\| (\S) ([a-z ]+) \|", PAGE.split("## Reproduction")[1], re.MULTILINE) == [
-        (mark, word) for word, mark in MARKS.items()
+        (MARKS[word], word) for word in MEANINGS
     ]
 
 
@@ -38,7 +39,8 @@ def test_every_file_that_is_named_is_there() -> None:
 
 def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     """The experiment in the text runs; without results its claim is "not run"."""
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    page = (ROOT / "docs" / "notes" / "paper_experiments.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     imports = (
         "from harness.results.findings import PaperExperiment\nfrom harness.compare.claims import claim_lower_error\n"
         "from harness.study.papers.paper_study import PaperStudy\n"

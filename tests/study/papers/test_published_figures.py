@@ -46,7 +46,7 @@ def test_errors_on_boxing_are_those_of_liu() -> None:
 def test_texts_quote_the_same_errors() -> None:
     experiment = unmeasured(LIU, "boxing_inputs")
     assert re.findall(r"\d\.\d\d", experiment.question) == list(BOXING_DEG)
-    quoted = {claim.published for claim in experiment.claims}
+    quoted = {claim.target for claim in experiment.claims}
     assert quoted == {"1.25 < 2.25 deg", "2.25 < 2.52 deg", "2.52 < 3.27 deg", *(f"{deg} deg" for deg in BOXING_DEG)}
 
 
@@ -58,7 +58,7 @@ def test_suitable_sets_are_those_of_kim(behaviour: str, suitable: str) -> None:
     texts = [
         claim.text
         for claim in experiment.claims
-        if claim.text.startswith(f"{behaviour}, ") and claim.published == "called suitable"
+        if claim.text.startswith(f"{behaviour}, ") and claim.target == "called suitable"
     ]
     assert texts
     assert all(suitable in text for text in texts)
@@ -116,7 +116,7 @@ def people(explained: float, rng: np.random.Generator) -> dict[str, Skeleton]:
 def test_about_99_percent_is_what_rounds_to_99(explained: float, verdict: str, rng: np.random.Generator) -> None:
     """Fig. 4 of Liu et al.: five modes explain about 99 %."""
     (claim,) = evaluate_bone_modes(people(explained, rng), "planted", measured=True, seed=1).claims
-    assert claim.difference == pytest.approx(100.0 * explained, abs=1e-6)
-    assert claim.published == "99 %"
+    assert claim.value == pytest.approx(100.0 * explained, abs=1e-6)
+    assert claim.target == "99 %"
     assert "about 99 %" in claim.text
     assert claim.verdict == verdict

@@ -53,7 +53,7 @@ def test_the_slowest_database_decides(published: PublishedSpeed, claims: int) ->
     rates = [[claim for claim in each.claims if claim.unit == "frames/s"] for each in (fast, slow)]
     assert {claim.verdict for claim in rates[0]} == {"reproduced"}
     assert {claim.verdict for claim in rates[1]} == {"not reproduced"}
-    assert last in slow.claims[0].ours
+    assert last in slow.claims[0].measured
     assert all("another machine" in claim.why for claim in rates[1])
     assert {claim.verdict for claim in fast.claims if claim.unit == "ms"} <= {"not comparable"}
     assert any("this machine" in difference for difference in fast.differences)

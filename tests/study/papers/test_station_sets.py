@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from harness.results.findings import ClaimVerdict
+from harness.results.benchmark_statement import Verdict
 from harness.study.papers.station_sets import (
     STATION_ABBREVIATIONS,
     average_by_size,
@@ -61,7 +61,7 @@ def test_rows_are_put_together_by_what_is_worn() -> None:
     ],
 )
 def test_a_set_is_the_best_of_as_many_trackers_or_it_is_not(
-    others: tuple[float, float], best: ClaimVerdict, average: ClaimVerdict
+    others: tuple[float, float], best: Verdict, average: Verdict
 ) -> None:
     """Larger and smaller sets have no say, however well they do."""
     rng = np.random.default_rng(1)
@@ -70,7 +70,7 @@ def test_a_set_is_the_best_of_as_many_trackers_or_it_is_not(
     claim = claim_best_of_size("walking", "RA+LA+PEL", sets)
     assert claim.verdict == best
     assert "RH+LH+PEL" in claim.text
-    assert claim.difference == pytest.approx(others[0], abs=0.02)
+    assert claim.value == pytest.approx(others[0], abs=0.02)
     assert claim_better_than_average("walking", "RA+LA+PEL", sets).verdict == average
 
 
@@ -93,7 +93,7 @@ def test_few_clips_cannot_tell_and_none_were_not_run() -> None:
         ((5.0, 4.0, 4.0, 2.0, 2.5), "not reproduced", "4 to 5"),
     ],
 )
-def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdict: ClaimVerdict, step: str) -> None:
+def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdict: Verdict, step: str) -> None:
     sets = made(np.random.default_rng(3), {name: by_count[count_stations(name) - 1] for name in ALL})
     for name in (n for n in ALL if count_stations(n) == 5):  # one set is as noisy as the ten of three together are not
         sets[name] = {clip: error + 0.02 * (-1) ** k for k, (clip, error) in enumerate(sets[name].items())}
@@ -112,13 +112,13 @@ def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdi
     ],
 )
 def test_three_stations_are_suitable_when_no_larger_set_is_better_by_the_margin(
-    four: float, five: float, verdict: ClaimVerdict, part: str
+    four: float, five: float, verdict: Verdict, part: str
 ) -> None:
     larger = {"RH+RA+LA+PEL": -four, "LH+RA+LA+PEL": 3.0, "RH+LH+RA+LA+PEL": -five}
     claim = claim_suitable("walking", "RA+LA+PEL", made(np.random.default_rng(6), {"RA+LA+PEL": 0.0, **larger}))
     assert claim.verdict == verdict
     assert claim.why.startswith(part)
-    assert "LH+RA+LA+PEL" not in claim.ours.replace("RH+LH+RA+LA+PEL", "")
+    assert "LH+RA+LA+PEL" not in claim.measured.replace("RH+LH+RA+LA+PEL", "")
 
 
 def test_a_suitable_set_needs_both_larger_sizes() -> None:
@@ -127,7 +127,7 @@ def test_a_suitable_set_needs_both_larger_sizes() -> None:
 
 
 @pytest.mark.parametrize(("gain", "verdict"), [(1.0, "reproduced"), (-1.0, "not reproduced"), (0.0, "same")])
-def test_the_most_movable_stations_are_compared_with_the_rest_of_their_size(gain: float, verdict: ClaimVerdict) -> None:
+def test_the_most_movable_stations_are_compared_with_the_rest_of_their_size(gain: float, verdict: Verdict) -> None:
     """Sets with one of the two have no say, nor have sets of other sizes."""
     ranges = {"RH": 40.0, "LH": 50.0, "RA": 70.0, "LA": 60.0, "PEL": 0.0}
     both = {name: len({"RA", "LA"} & set(name.split("+"))) for name in ALL}
@@ -135,9 +135,9 @@ def test_the_most_movable_stations_are_compared_with_the_rest_of_their_size(gain
     means = {name: mean[both[name]] if count_stations(name) in (2, 3) else -9.0 for name in ALL}
     claim = claim_most_movable("walking", ranges, made(np.random.default_rng(8), means))
     assert "RA and LA" in claim.text
-    assert "RA 70" in claim.ours
+    assert "RA 70" in claim.measured
     assert claim.verdict == verdict
-    assert claim.difference == pytest.approx(gain, abs=0.02)
+    assert claim.value == pytest.approx(gain, abs=0.02)
     assert claim_most_movable("walking", ranges, {}).verdict == "not run"
 
 
@@ -155,7 +155,7 @@ def test_harder_clips_need_not_be_the_same() -> None:
     )
     claim = claim_harder("walking is harder", walks, bouts)
     assert claim.verdict == "reproduced"
-    assert (claim.low or 0.0) < (claim.difference or 0.0) < (claim.high or 0.0)
+    assert (claim.low or 0.0) < (claim.value or 0.0) < (claim.high or 0.0)
     assert claim_harder("boxing is harder", bouts, walks).verdict == "not reproduced"
     assert claim_harder("both", walks, dict(zip(bouts, walks.values(), strict=True))).verdict == "cannot tell"
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.results.findings import Claim
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.placement_findings import StationNames
 from harness.study.placement.candidates import Candidate, make_candidate_groups
 from harness.study.placement.config import PublishedClaim
@@ -26,7 +26,7 @@ def costs(level: float, jitter: float = 0.01, clips: int = 8) -> Costs:
     return {f"clip_{n}": level + jitter * (-1) ** n for n in range(clips)}
 
 
-def verdicts(found: dict[StationNames, Costs]) -> tuple[Claim, Claim]:
+def verdicts(found: dict[StationNames, Costs]) -> tuple[BenchmarkStatement, BenchmarkStatement]:
     return evaluate_claim(CLAIM, SUITED, OTHER, WHOLE, found, unit="deg", basis="on some clips")
 
 
@@ -72,7 +72,7 @@ def test_too_few_clips_and_none_are_said() -> None:
 
 def test_the_limit_is_labelled_and_stands_beside_the_error_that_it_is_derived_from() -> None:
     _, suffices = verdicts({SUITED: costs(2.37), OTHER: costs(3.0), WHOLE: costs(1.98)})
-    assert suffices.ours == "2.37 deg; limit 2.18 deg, 110% of 1.98 of all 1"
+    assert suffices.measured == "2.37 deg; limit 2.18 deg, 110% of 1.98 of all 1"
     missing = {**costs(1.98), "clip_0": None}
     _, suffices = verdicts({SUITED: {**costs(2.37), "clip_0": 99.0}, OTHER: costs(3.0), WHOLE: missing})
-    assert suffices.ours.startswith("2.37 deg; limit 2.18 deg")
+    assert suffices.measured.startswith("2.37 deg; limit 2.18 deg")

@@ -1,21 +1,29 @@
 """Errors of readings against the ideal ones, and the health of streams."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.core.arrays import Floats
-from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.score_recording import LoopFrames
+from harness.core.arrays import Floats, Ints
+from harness.experiment.observed_take import ObservedTake, simulated_take
+from harness.experiment.playback import prepare_playback
+from harness.score.loops import LoopFrames
 from harness.stream.frame import TrackerFrame
-from harness.study.trust.reading_errors import HealthCounts, count_health, ideal_readings, reading_errors
+from harness.study.trust.reading_errors import HealthCounts, count_health, reading_errors
 
 
 @pytest.fixture(scope="module")
-def played() -> Playback:
-    return prepare_playback("demo", clip="boxing_p1_01", stations=2, noise="clean")
+def clean() -> ObservedTake:
+    playback = prepare_playback("demo", clip="boxing_p1_01", stations=2, noise="clean")
+    return simulated_take(playback.clip_evaluation, "pos+ori")
+
+
+def with_frames(take: ObservedTake, frames: Sequence[TrackerFrame], rows: Ints) -> ObservedTake:
+    """The take with other frames, of which those in these rows have the truth of their row."""
+    return replace(take, frames=tuple(frames), loops=(LoopFrames(rows, rows),))
 
 
 def with_errors(frame: TrackerFrame, offset_m: Floats, turn_rad: Floats) -> TrackerFrame:
@@ -23,71 +31,64 @@ def with_errors(frame: TrackerFrame, offset_m: Floats, turn_rad: Floats) -> Trac
     return replace(frame, position_m=frame.position_m + offset_m, tracker_from_station=turned)
 
 
-def test_a_clean_simulation_has_hardly_any_errors(played: Playback) -> None:
-    simulation = played.simulation
-    loop = LoopFrames(np.arange(len(simulation.frames)), simulation.frame_index)
-    errors = reading_errors(simulation.frames, [loop], ideal_readings(played, played.tracker))
+def test_a_clean_simulation_has_hardly_any_errors(clean: ObservedTake) -> None:
+    errors = reading_errors(clean)
     assert np.abs(errors["position error"][0]).max() < 2e-4  # rounding on the line
     assert np.abs(errors["orientation error"][0]).max() < 2e-4
-    assert errors["position error"][0].shape == (simulation.expected, 2, 3)
+    assert errors["position error"][0].shape == (len(clean.sample_s), 2, 3)
 
 
-def test_planted_errors_are_found_minus_their_median(played: Playback) -> None:
-    simulation = played.simulation
+def test_planted_errors_are_found_minus_their_median(clean: ObservedTake) -> None:
     offset_m, turn_rad = np.array([0.01, 0.0, -0.02]), np.array([0.0, 0.05, 0.01])
     frames = [
         with_errors(frame, offset_m + (k % 2) * 0.004, turn_rad) if k >= 10 else frame
-        for k, frame in enumerate(simulation.frames)
+        for k, frame in enumerate(clean.frames)
     ]
-    loop = LoopFrames(np.arange(10, len(frames)), simulation.frame_index[10:])
-    errors = reading_errors(frames, [loop], ideal_readings(played, played.tracker))
+    errors = reading_errors(with_frames(clean, frames, np.arange(10, len(frames))))
     position = errors["position error"][0]
     assert np.abs(np.diff(position, axis=0)).max() == pytest.approx(0.004, abs=3e-4)
     assert np.abs(position).max() < 0.004 + 3e-4
     assert np.abs(errors["orientation error"][0]).max() < 3e-4
 
 
-def test_the_error_of_orientation_is_in_the_trackers_axes(played: Playback) -> None:
-    simulation = played.simulation
-    count = len(simulation.frames) // 2
+def test_the_error_of_orientation_is_in_the_trackers_axes(clean: ObservedTake) -> None:
+    count = len(clean.frames) // 2
     turn_rad = np.array([0.0, 0.0, 0.1])
-    frames = [with_errors(f, np.zeros(3), turn_rad) if k > count else f for k, f in enumerate(simulation.frames)]
-    loop = LoopFrames(np.arange(len(frames)), simulation.frame_index)
-    found = reading_errors(frames, [loop], ideal_readings(played, played.tracker))["orientation error"][0]
+    frames = [with_errors(f, np.zeros(3), turn_rad) if k > count else f for k, f in enumerate(clean.frames)]
+    found = reading_errors(with_frames(clean, frames, np.arange(len(frames))))["orientation error"][0]
     steps = found[-1] - found[0]
     assert steps == pytest.approx(np.tile(turn_rad, (2, 1)), abs=1e-3)
 
 
-def test_lost_suspect_and_missing_readings_are_gaps(played: Playback) -> None:
-    simulation = played.simulation
-    frames = list(simulation.frames)
+def test_lost_suspect_and_missing_readings_are_gaps(clean: ObservedTake) -> None:
+    frames = list(clean.frames)
     lost = replace(frames[3], position_m=np.full((2, 3), np.nan))
     suspect = replace(frames[4], suspect=np.array([True, False]))
     frames[3:5] = [lost, suspect]
     rows = np.delete(np.arange(20), 7)
-    errors = reading_errors(frames, [LoopFrames(rows, rows)], ideal_readings(played, played.tracker))
+    errors = reading_errors(with_frames(clean, frames, rows))
     missing = np.asarray(np.isnan(errors["position error"][0]).any(axis=2))
     assert np.flatnonzero(missing[:, 0]).tolist() == [3, 4, 7]
     assert np.flatnonzero(missing[:, 1]).tolist() == [3, 7]
     assert np.flatnonzero(np.isnan(errors["orientation error"][0][:, 1, 0])).tolist() == [7]
 
 
-def test_a_silent_station_has_no_errors(played: Playback) -> None:
-    frames = [replace(f, position_m=f.position_m * [[1.0], [np.nan]]) for f in played.simulation.frames[:20]]
+def test_a_silent_station_has_no_errors(clean: ObservedTake) -> None:
+    frames = [replace(f, position_m=f.position_m * [[1.0], [np.nan]]) for f in clean.frames[:20]]
     rows = np.arange(20)
-    found = reading_errors(frames, [LoopFrames(rows, rows)], ideal_readings(played, played.tracker))["position error"]
+    found = reading_errors(with_frames(clean, frames, rows))["position error"]
     assert np.isfinite(found[0][:, 0]).all()
     assert np.isnan(found[0][:, 1]).all()
 
 
-def test_health_counts_gaps_losses_and_frames_that_never_came(played: Playback) -> None:
-    frames = list(played.simulation.frames[:40])
+def test_health_counts_gaps_losses_and_frames_that_never_came(clean: ObservedTake) -> None:
+    frames = list(clean.frames[:40])
     for k in (5, 6, 20):
         valid = np.array([False, True])
         frames[k] = replace(frames[k], position_valid=valid, quality=np.array([0.0, 0.8]))
     frames[30] = replace(frames[30], suspect=np.array([False, True]))
     rows = np.delete(np.arange(40), 10)
-    left, right = (counts.as_health() for counts in count_health(frames, [LoopFrames(rows, rows)], 40.0))
+    left, right = (counts.as_health() for counts in count_health(with_frames(clean, frames, rows)))
     assert left.lost_share == pytest.approx(4 / 40)
     assert right.lost_share == pytest.approx(1 / 40)
     assert left.gaps_per_min == pytest.approx(3 * 60.0, rel=1e-3)  # in one second

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
+from harness.experiment import evaluation
 from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
@@ -23,7 +24,6 @@ from harness.results.lock import folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
-from harness.study.trust import capture_cells
 from harness.study.trust.capture_cells import Arm, CaptureTask, read_cell_errors, run_capture
 from harness.study.trust.expected_values import preset_components
 from harness.study.trust.plan import plan_digest
@@ -136,7 +136,7 @@ def test_finished_cells_are_read_and_the_findings_have_the_same_bytes(
         ran.append(calibration)
         return run_over_frames(fitted, calibration, frames)
 
-    monkeypatch.setattr(capture_cells, "run_over_frames", count_runs)
+    monkeypatch.setattr(evaluation, "run_over_frames", count_runs)
     run_trust_study(small_study.plan, small_study.captures, out)
     assert len(ran) == len(cells[::5])
     assert (out / FINDINGS).read_bytes() == (finished / FINDINGS).read_bytes()
@@ -281,7 +281,7 @@ def test_a_method_that_fails_costs_its_cells(
             raise ZeroDivisionError("the method divides by zero")
         return run_over_frames(fitted, calibration, frames)
 
-    monkeypatch.setattr(capture_cells, "run_over_frames", fail_for_four)
+    monkeypatch.setattr(evaluation, "run_over_frames", fail_for_four)
     found = run_trust_study(small_study.plan, small_study.captures, tmp_path / "out").findings
     assert found.outcome is Outcome.INCOMPLETE
     assert len(found.failures) == len(CLIPS) * 3 * 3

@@ -17,11 +17,11 @@ from harness.stream.recording.recording import record_capture
 from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust import validation
 from harness.study.trust.expected_values import preset_components
-from harness.study.trust.reconstruction_scores import measured_calibration, score_registered
 from harness.study.trust.truth_motion import TruthMotion, read_stations
 from harness.study.trust.validation import (
     Validation,
     describe_left_out,
+    evaluate_registered,
     load_truth,
     session_unit,
     validate_capture,
@@ -132,11 +132,12 @@ def test_another_tracker_as_reference_is_compared_with_no_preset(boxing: Path) -
 
 
 def test_scores_of_a_registered_capture_are_those_of_the_method(boxing: Path, found: Validation) -> None:
-    scores = {(one.method, one.metric): one.value for one in score_registered(boxing, found, ["ik"])}
-    value = scores["ik", "joint_angle_mean_deg"]
+    (scores,) = evaluate_registered(boxing, found, ["ik"])
+    value = scores.metrics["joint_angle_mean_deg"]
     assert value is not None
     assert 1.0 < value < 8.0
-    assert measured_calibration(found.registration, tuple("abcdef")).stations == tuple("abcdef")
+    assert scores.scores.coverage == 1.0
+    assert scores.take.calibration.kind == "registered"
 
 
 def test_a_lost_part_of_the_capture_is_reported(boxing: Path, truth: TruthMotion, tmp_path: Path) -> None:
@@ -194,7 +195,7 @@ def test_a_station_without_a_pose_is_left_out(
     assert found.notes == ("head: no pose in the whole capture; left out.",)
     assert found.named == ()
     with pytest.raises(BadInput, match="head has no mount"):
-        score_registered(boxing, found, ["ik"])
+        evaluate_registered(boxing, found, ["ik"])
     monkeypatch.setattr(validation, "read_stations", lambda reader: ({"head": lost}, ()))
     with pytest.raises(NotComparable, match="has a pose"):
         validate_capture(boxing, truth)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.bench.calibration_accuracy import CalibrationAccuracy, measure_calibration_accuracy
 from harness.errors import BadInput, UnknownName
-from harness.experiment.calibration_accuracy import CalibrationAccuracy, measure_calibration_accuracy
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Recordings judged against the motion that they were played from."""
+"""Recordings scored against the motion that they were played from."""
 
 import re
 from collections.abc import Sequence
@@ -9,18 +9,11 @@ import pytest
 
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
-from harness.experiment.method_run import run_method
+from harness.experiment.evaluation import Evaluation, check_methods, evaluate_each, format_score_table
+from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment.recorded_take import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenario import find_scenario
-from harness.experiment.score_recording import (
-    RecordingScore,
-    find_playback,
-    format_score_table,
-    reconstruct_recording,
-    score_methods,
-)
-from harness.reconstruct import registry
-from harness.score.score import score_estimate
 from harness.stream.codec import commands
 from harness.stream.codec.reader import WireFormat
 from harness.stream.emulator.device import Device
@@ -70,7 +63,15 @@ def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequ
     return path
 
 
-def errors(judged: Sequence[RecordingScore]) -> list[dict[str, float | None]]:
+def score_methods(stream: RecordingStream, playback: Playback, methods: Sequence[str]) -> list[Evaluation]:
+    return evaluate_each(methods, recorded_take(stream, playback))
+
+
+def recorded(path: Path, playback: Playback) -> ObservedTake:
+    return recorded_take(RecordingStream(path), playback)
+
+
+def errors(judged: Sequence[Evaluation]) -> list[dict[str, float | None]]:
     """All that was measured but how long it took."""
     timed = ("step_", "fps")
     return [{n: v for n, v in one.metrics.items() if not n.startswith(timed)} for one in judged]
@@ -88,39 +89,31 @@ def test_a_recorded_simulation_has_its_frames_bit_by_bit(rate_hz: float, tmp_pat
 
 
 def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: Path) -> None:
-    judged = score_methods(RecordingStream(simulated), played, METHODS)
-    simulation = played.simulation
-    for one in judged:
-        fitted = played.clip_evaluation.fit_method(registry.resolve(one.method), one.method)
-        qpos, status, _, step_ms, *_ = run_method(fitted, simulation.calibration, simulation.frames)
-        assert not (status == Status.LOST).all()
-        truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
-        scores = score_estimate(played.body.skeleton, played.tracker.rate_hz, *truth)
-        (measured,) = errors([one])
-        assert measured == {name: scores.metrics[name] for name in measured}
-        assert one.frames_matched == scores.metrics["frames_matched"] == one.frames_expected
-    assert errors(judged)[0]["mpjpe_mm"] is not None
+    cells = simulated_take(played.clip_evaluation, "pos+ori")
+    for one, whole in zip(
+        *(evaluate_each(METHODS, take) for take in (recorded(simulated, played), cells)), strict=True
+    ):
+        assert not (one.answers.status == Status.LOST).all()
+        np.testing.assert_array_equal(one.answers.qpos, whole.answers.qpos)
+        assert errors([one]) == errors([whole])
+        assert one.scores.matched == one.scores.expected == whole.scores.expected
+        assert one.metrics["mpjpe_mm"] is not None
 
 
-def test_a_recording_is_reconstructed_frame_by_frame(played: Playback, simulated: Path) -> None:
-    """Each frame of a recorded simulation has the pose of its own row, and the estimates of a run."""
-    done = reconstruct_recording(RecordingStream(simulated), played, METHODS)
-    assert len(done.frames) == len(played.simulation.frames)
-    np.testing.assert_array_equal(done.truth_row, np.arange(len(done.frames)))
-    assert set(done.estimates) == set(METHODS)
-    for qpos, status in done.estimates.values():
-        assert qpos.shape == (len(done.frames), 55)
-        assert set(status.tolist()) <= set(map(int, Status))
+def test_each_recorded_frame_has_the_truth_of_its_own_row(played: Playback, simulated: Path) -> None:
+    take = recorded(simulated, played)
+    np.testing.assert_array_equal(take.truth_row, np.arange(len(played.simulation.frames)))
+    np.testing.assert_array_equal(take.truth_qpos, played.simulation.truth_qpos)
+    for one in evaluate_each(METHODS, take):
+        assert one.answers.qpos.shape == (len(take.frames), 55)
+        assert set(one.answers.status.tolist()) <= set(map(int, Status))
 
 
 def test_frames_on_the_way_back_have_no_truth(played: Playback, tmp_path: Path) -> None:
     loop_s = played.samples.device_loop_s
-    path = emulated(played, tmp_path / "b.rec", [1.2 * loop_s])
-    done = reconstruct_recording(RecordingStream(path), played, ())
-    rows = done.truth_row
-    assert (rows == -1).any()
-    assert rows[rows >= 0].max() < len(played.simulation.truth_qpos)
-    assert done.estimates == {}
+    take = recorded(emulated(played, tmp_path / "b.rec", [1.2 * loop_s]), played)
+    assert (take.truth_row == -1).any()
+    assert take.truth_row.max() < len(take.truth_qpos)
 
 
 def test_scores_at_1x_and_max_are_equal(played: Playback, tmp_path: Path) -> None:
@@ -128,7 +121,7 @@ def test_scores_at_1x_and_max_are_equal(played: Playback, tmp_path: Path) -> Non
     record_capture(path, simulation.wire_format, simulation.wire, NOTE, seconds=2.5)
     at_once, in_time = (score_methods(RecordingStream(path, speed), played, METHODS) for speed in ("max", 1.0))
     assert errors(at_once) == errors(in_time)
-    assert [one.frames_matched for one in at_once] == [one.frames_matched for one in in_time] == [60, 60]
+    assert [one.scores.matched for one in at_once] == [one.scores.matched for one in in_time] == [60, 60]
     assert all(value is not None for value in errors(at_once)[0].values())
 
 
@@ -137,8 +130,8 @@ def test_later_laps_fold_back_and_the_way_back_is_not_judged(played: Playback, t
     path = emulated(played, tmp_path / "a.rec", [2.2 * samples.loop_s])
     (judged,) = score_methods(RecordingStream(path), played, ["best_match"])
     warm_up, rest = round(played.tracker.rate_hz), round(0.2 * len(samples))
-    assert judged.frames_expected == pytest.approx(2 * samples.take_frames - warm_up + rest, abs=2)
-    assert judged.frames_matched == judged.frames_expected
+    assert judged.scores.expected == pytest.approx(2 * samples.take_frames - warm_up + rest, abs=2)
+    assert judged.scores.matched == judged.scores.expected
     (once,) = score_methods(
         RecordingStream(emulated(played, tmp_path / "b.rec", [samples.loop_s])), played, ["best_match"]
     )
@@ -148,7 +141,7 @@ def test_later_laps_fold_back_and_the_way_back_is_not_judged(played: Playback, t
 def test_a_device_that_was_set_up_anew_plays_from_the_beginning(played: Playback, tmp_path: Path) -> None:
     path = emulated(played, tmp_path / "a.rec", [3.0, 2.0])
     (judged,) = score_methods(RecordingStream(path), played, ["best_match"])
-    assert judged.frames_matched == judged.frames_expected == pytest.approx(40 * (3 - 1 + 2), abs=4)
+    assert judged.scores.matched == judged.scores.expected == pytest.approx(40 * (3 - 1 + 2), abs=4)
     (once,) = score_methods(RecordingStream(emulated(played, tmp_path / "b.rec", [3.0])), played, ["best_match"])
     assert judged.metrics["mpjpe_mm"] == pytest.approx(once.metrics["mpjpe_mm"], rel=0.3)
 
@@ -167,7 +160,7 @@ def test_too_little_is_not_measured(played: Playback, tmp_path: Path) -> None:
     path, simulation = tmp_path / "a.rec", played.simulation
     record_capture(path, simulation.wire_format, simulation.wire, NOTE, seconds=0.5)
     (judged,) = score_methods(RecordingStream(path), played, ["ik:previous"])
-    assert (judged.frames_matched, judged.frames_expected) == (0, 0)
+    assert (judged.scores.matched, judged.scores.expected) == (0, 0)
     assert set(judged.metrics.values()) == {None}
     assert "not measured" in format_score_table([judged])
 
@@ -182,6 +175,8 @@ def test_another_motion_is_refused(other: dict[str, str], simulated: Path) -> No
 def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, tmp_path: Path) -> None:
     stream = RecordingStream(simulated)
     with pytest.raises(UnknownName, match="no method called 'il'"):
+        check_methods(["ik", "il"])
+    with pytest.raises(UnknownName, match="no method called 'il'"):
         score_methods(stream, played, ["il"])
     with pytest.raises(UnknownName, match="no scenario called 'dem'"):
         find_playback(stream, scenario="dem")
@@ -189,3 +184,12 @@ def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, 
     record_capture(bare, played.simulation.wire_format, played.simulation.wire, {})
     with pytest.raises(BadInput, match=r"Nothing says what .*a\.rec was played from"):
         find_playback(RecordingStream(bare))
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3, 0.5, 0.7])
+def test_frames_of_a_capture_are_numbered_whatever_their_phase(shift: float, rng: np.random.Generator) -> None:
+    """One frame is lost, and each stamp is off by up to a fifth of the period."""
+    expected = np.delete(np.arange(400), 7)
+    number, begin_s = frame_numbers((expected + shift + rng.uniform(-0.2, 0.2, 399)) / 40.0, 40.0)
+    np.testing.assert_array_equal(number - number[0], expected)
+    assert begin_s + number[0] / 40.0 == pytest.approx(shift / 40.0, abs=0.1 / 40.0)

@@ -17,11 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.bench.rows import BenchmarkRow
+from harness.bench.cpu_time import overbooked
 from harness.bench.wire import SECONDS, start_device
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.live.scheduling_jitter import JitterProbe
+from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.codec import commands
 from harness.stream.codec.blocks import RECEIVED
 from harness.stream.codec.items import STANDARD_LIST
@@ -48,34 +49,27 @@ class ServedRun(NamedTuple):
     """(M,) the same without the recorder, just before [ms]."""
 
 
-def bench_serve(seed: int = 1, *, runs: int = 1) -> list[BenchmarkRow]:
+def bench_serve(seed: int = 1, *, runs: int = 1) -> list[BenchmarkStatement]:
     """Measure `runs` times; the rows have medians over the runs, and all missing bytes."""
     return served_rows([_run(seed) for _ in range(runs)])
 
 
-def served_rows(runs: list[ServedRun]) -> list[BenchmarkRow]:
+def served_rows(runs: list[ServedRun]) -> list[BenchmarkStatement]:
     """The rows of all runs."""
     served = np.array([np.quantile(run.delay_ms, (0.5, 0.99)) for run in runs])
     direct = np.array([np.quantile(run.direct_ms, (0.5, 0.99)) for run in runs])
     timers = np.array([run.timer_p99_ms for run in runs])
-    above, timer = np.median(served[:, 1] - timers), np.median(timers)
+    above, timer = np.median(served[:, 1] - timers), float(np.median(timers))
     (p50, p99), (direct_p50, direct_p99) = np.median(served, axis=0), np.median(direct, axis=0)
     line = f"record --serve, {RATE_HZ:g} Hz x {STATIONS}"
     times = "one run" if len(runs) == 1 else f"median of {len(runs)} runs"
     without = f"without recorder {direct_p50:.2f} and {direct_p99:.2f} ms"
     reference = f"{times}; p50 {p50:.2f}, p99 {p99:.2f} ms; timer p99 {timer:.2f} ms late; {without}"
     records = sum(len(run.delay_ms) for run in runs)
+    name, missing, doubt = f"{line}: delay p99, above the timer's", sum(run.missing for run in runs), overbooked(timer)
     return [
-        BenchmarkRow(
-            f"{line}: delay p99, above the timer's", float(above), "ms", reference, f"<= {MAX_ABOVE_TIMER_MS:g}"
-        ),
-        BenchmarkRow(
-            f"{line}: bytes that the recording lacks",
-            float(sum(run.missing for run in runs)),
-            "",
-            f"of {records} records",
-            "0",
-        ),
+        hold_to_limit(name, float(above), "ms", most=MAX_ABOVE_TIMER_MS, reference=reference, doubt=doubt),
+        hold_to_limit(f"{line}: bytes that the recording lacks", missing, most=0.0, reference=f"of {records} records"),
     ]
 
 

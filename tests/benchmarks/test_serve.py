@@ -1,9 +1,11 @@
-"""What `harness bench serve` makes of the notes of emulator and client."""
+"""What `python -m tests.benchmarks serve` makes of the notes of emulator and client."""
+
+import os
 
 import numpy as np
 import pytest
 
-from harness.bench.serve import ServedRun, record_delays, served_rows
+from tests.benchmarks.serve import ServedRun, record_delays, served_rows
 
 
 def test_a_record_is_there_when_its_last_byte_is_read() -> None:
@@ -16,7 +18,8 @@ def test_a_record_is_there_when_its_last_byte_is_read() -> None:
             record_delays(sent, written_s, wrong, [8], [2.0])
 
 
-def test_rows_have_the_median_over_runs_and_all_missing_bytes() -> None:
+def test_rows_have_the_median_over_runs_and_all_missing_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     runs = [
         ServedRun(np.full(10, delay), timer, n, np.full(5, 0.5))
         for delay, timer, n in ((3.0, 1.0, 0), (1.0, 0.5, 4), (9.0, 1.0, 1))
@@ -26,4 +29,8 @@ def test_rows_have_the_median_over_runs_and_all_missing_bytes() -> None:
     assert (
         "median of 3 runs; p50 3.00, p99 3.00 ms; timer p99 1.00 ms late; without recorder 0.50 and" in above.reference
     )
-    assert (missing.value, missing.target) == (5.0, "0")
+    assert (missing.value, missing.target, missing.verdict) == (5.0, "0", "missed")
+    assert above.verdict == "missed"
+    monkeypatch.setattr(os, "getloadavg", lambda: (99.0, 0.0, 0.0))
+    above, missing = served_rows(runs)
+    assert (above.verdict, missing.verdict) == ("no verdict", "missed")

@@ -1,0 +1,184 @@
+"""How a method is evaluated: it is trained, runs over the frames of an observed take, and is scored against the truth.
+
+Runs, replayed recordings, validated captures and trust studies differ in their takes alone (`observed_take`).
+"""
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from harness.core.estimate import name_with_lag
+from harness.core.number_format import format_fixed
+from harness.core.progress import ProgressCallback
+from harness.core.text_table import Table
+from harness.errors import BadInput, RenamedKey, UnknownName
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.isolation import DEFAULT_ISOLATION
+from harness.experiment.method_process import MethodFailure
+from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_failure
+from harness.experiment.observed_take import ObservedTake
+from harness.experiment.remote_method import resolve_method, run_over_frames
+from harness.reconstruct.contract import Method
+from harness.results.reported_metrics import TABLE_COLUMNS
+from harness.results.sigma_table import sigma_lines
+from harness.score.loops import COVERAGE_FLOOR, LoopScores, score_loops
+from harness.score.metrics import FRAME_METRICS
+from harness.score.timing import step_times_ms
+from harness.score.uncertainty import score_sigma
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What a method answered to an observed take, and how far that is from the truth."""
+
+    method: str
+    take: ObservedTake
+    answers: MethodAnswers
+    """The answers by frame; those of a method that failed are empty."""
+    lag: int = 0
+    """Number of later frames that the method uses for each estimate."""
+    seconds: float = 0.0
+    """Wall time of training and of all steps [s]."""
+    names: tuple[str, ...] = tuple(FRAME_METRICS)
+    """The errors that are computed, of `FRAME_METRICS`."""
+    failure: str = ""
+    """Why the method has no answers, as for a failed cell; "" if it has them."""
+
+    @property
+    def title(self) -> str:
+        """Name in tables, with the lag."""
+        return name_with_lag(self.method, self.lag)
+
+    @cached_property
+    def scores(self) -> LoopScores:
+        """The errors of each frame, over all loops of the take."""
+        take, skeleton = self.take, self.take.clip.performer_calibration.body.skeleton
+        return score_loops(
+            take.truth,
+            take.rate_hz,
+            self.answers.qpos,
+            take.loops,
+            metrics=self.names,
+            estimate_skeleton=skeleton,
+        )
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether errors count: there are enough estimates and enough records."""
+        return self.scores.is_enough() and self.take.has_records
+
+    @cached_property
+    def metrics(self) -> dict[str, float | None]:
+        """Errors and times of the steps over all loops, by the names of `Scores.metrics`; None is "not measured"."""
+        values = self.scores.pooled() | step_times_ms(self.answers.step_ms[1:])
+        return {name: value if self.is_measured and np.isfinite(value) else None for name, value in values.items()}
+
+    @property
+    def sigma_scores(self) -> dict[str, float]:
+        """Scores of the standard deviations over all loops (see `score.uncertainty`); empty without them."""
+        found, sigma_rad = self.scores, self.answers.angle_sigma_rad
+        if sigma_rad is None or not self.is_measured:
+            return {}
+        rows, index = found.rows[found.scored], found.index[found.scored]
+        return score_sigma(self.take.truth_qpos[index], self.answers.qpos[rows], sigma_rad[rows]).scores()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Content for JSON."""
+        return {
+            "method": self.method,
+            "frames_matched": self.scores.matched,
+            "frames_expected": self.scores.expected,
+            "records_arrived": self.take.records_arrived,
+            "records_expected": self.take.records_expected,
+            "metrics": self.metrics,
+            "lag": self.lag,
+            "sigma_scores": self.sigma_scores,
+            "failure": self.failure,
+        }
+
+
+def evaluate(
+    method: Method,
+    name: str,
+    take: ObservedTake,
+    *,
+    stations: Sequence[str] = (),
+    learnt_from: ClipEvaluation | None = None,
+    metrics: Sequence[str] = tuple(FRAME_METRICS),
+) -> Evaluation:
+    """Train the method of that name, once, and run it over a take, in its process if it has one.
+
+    It sees the frames of these `stations`, by default of all, and learns from what the take's clip allows, or from
+    `learnt_from`. Whatever the method raises is raised.
+    """
+    stations = stations or take.calibration.stations
+    frames, calibration = take.copy_frames(stations), take.calibration.of_stations(stations)
+    start = time.perf_counter()
+    fitted = (learnt_from or take.clip).fit_method(method, name)
+    answers, lag = run_over_frames(fitted, calibration, frames).by_frame()
+    return Evaluation(name, take, answers, lag, time.perf_counter() - start, tuple(metrics))
+
+
+def evaluate_each(
+    names: Sequence[str],
+    take: ObservedTake,
+    *,
+    metrics: Sequence[str] = tuple(FRAME_METRICS),
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> list[Evaluation]:
+    """Evaluate methods by name on one take. A method that fails has its `failure`, and stops no other.
+
+    Names and options that do not exist are refused: UnknownName, RenamedKey and BadInput.
+    """
+    found = []
+    for done, name in enumerate(names):
+        progress(f"reconstructing with {name}", done, len(names))
+        try:
+            found.append(evaluate(resolve_method(name, DEFAULT_ISOLATION), name, take, metrics=metrics))
+        except (UnknownName, RenamedKey, BadInput):
+            raise
+        except (Exception, SystemExit) as error:  # a method may raise anything: it fails alone
+            failure = describe_failure(error)
+            found.append(Evaluation(name, take, NO_ANSWERS, names=tuple(metrics), failure=failure))
+    return found
+
+
+def check_methods(names: Sequence[str]) -> None:
+    """Refuse names and options of methods that do not exist: UnknownName, RenamedKey and BadInput."""
+    for name in names:
+        with suppress(MethodFailure):  # it fails when it is evaluated, alone
+            resolve_method(name, DEFAULT_ISOLATION)
+
+
+def format_score_table(evaluations: Sequence[Evaluation]) -> str:
+    """A row for each method that did not fail, and a table of the standard deviations if a method states them.
+
+    The failures follow, each with the last line of its reason, and a line if too few records arrived.
+    """
+    rows, done = [], [one for one in evaluations if not one.failure]
+    for one in done:
+        figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
+        rows.append([one.title, f"{one.scores.matched}/{one.scores.expected}", *figures])
+    table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
+    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in done])
+    failed = [f"failed: {one.method}: {one.failure.strip().splitlines()[-1]}" for one in evaluations if one.failure]
+    missing = _missing_records(evaluations[0].take) if evaluations else []
+    return "\n".join([*(table.lines() if done else []), *sigmas, *failed, *missing])
+
+
+def _missing_records(take: ObservedTake) -> list[str]:
+    """A line if fewer records arrived than let anything be measured, unless the recording's scenario allows it."""
+    if take.records_arrived >= COVERAGE_FLOOR * take.records_expected:
+        return []
+    arrived = f"{take.records_arrived:,} of {take.records_expected:,} records arrived"
+    if take.overload:
+        return [f"{arrived}, which tracker.overload of the recording's scenario allows."]
+    return [
+        f"{arrived}: the line is too slow for the stations, or some were off. Record at a lower rate, a higher baud "
+        "rate or with fewer stations. If the slow line is what the scenario studies, set tracker.overload = true in it."
+    ]
