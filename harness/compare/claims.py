@@ -1,4 +1,4 @@
-"""Evaluation of a paper's claims with errors by clip, and Holm's correction for the number of printed statements."""
+"""Evaluation of a paper's claims with errors by unit, and Holm's correction for the number of printed statements."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -8,12 +8,12 @@ import numpy as np
 
 from harness.compare.margins import margin_of
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
-from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
+from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind, Verdict
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 Errors = Mapping[str, float]
-"""Clip -> error; all clips are of one kind."""
+"""Unit of statistics -> error; all are of one kind (see `units`)."""
 TOLERANCE = 0.25
 """Largest relative difference to a published figure that counts as reproduced."""
 
@@ -38,7 +38,7 @@ def claim_lower_error(
         return BenchmarkStatement(
             text, published, "not measured", "not run", difference.why, unit=unit, kind=kind, reading=reading
         )
-    means = [sum(side[clip] for clip in difference.clips) / len(difference.clips) for side in (less, more)]
+    means = [sum(side[unit] for unit in difference.units) / len(difference.units) for side in (less, more)]
     verdict, reason = difference.verdict, difference.why
     margin = margin_of(PRIMARY_METRIC).of(means[1])
     if unit == "deg" and difference.low is not None and -margin <= difference.low <= (difference.high or 0.0) <= margin:
@@ -51,12 +51,12 @@ def claim_lower_error(
         kind=kind,
         reading=reading,
         why="" if verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
-        clips=len(difference.clips),
+        clips=len(difference.units),
         value=difference.mean,
         low=difference.low,
         high=difference.high,
         unit=unit,
-        p=_paired_p(more, less, difference.clips),
+        p=_paired_p(more, less, difference.units),
     )
 
 
@@ -81,9 +81,9 @@ def claim_noninferior(
         return BenchmarkStatement(
             text, published, "not measured", "not run", excess.why, unit="deg", kind=kind, reading=reading
         )
-    means = [sum(side[clip] for clip in excess.clips) / len(excess.clips) for side in (errors, reference)]
+    means = [sum(side[unit] for unit in excess.units) / len(excess.units) for side in (errors, reference)]
     margin = margin_of(PRIMARY_METRIC).of(means[1])
-    allowed = {clip: reference[clip] + margin for clip in excess.clips}
+    allowed = {name: reference[name] + margin for name in excess.units}
     room = compare_paired(allowed, errors)
     reason = {
         "reproduced": "",
@@ -97,14 +97,14 @@ def claim_noninferior(
         measured=f"{means[0]:.2f} against {means[1]:.2f} deg, margin {margin:.2f}",
         verdict=room.verdict,
         why="" if room.verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
-        clips=len(room.clips),
+        clips=len(room.units),
         value=room.mean,
         low=room.low,
         high=room.high,
         unit="deg",
         kind=kind,
         reading=reading,
-        p=_paired_p(allowed, errors, room.clips),
+        p=_paired_p(allowed, errors, room.units),
     )
 
 
@@ -146,7 +146,7 @@ def claim_decreasing(
         for before, after in pairwise(names)
     }
     if not steps or any(step.verdict == "not run" for step in steps.values()):
-        why = f"no clip has results for all {what}"
+        why = f"no unit has results for all {what}"
         return BenchmarkStatement(text, "order", "not measured", "not run", why, unit="deg", kind=kind, reading=reading)
     means = ", ".join(f"{sum(errors.values()) / len(errors):.2f}" for errors in series.values())
     return replace(claim_all(text, steps), measured=f"{means} deg with {', '.join(names)} {what}")
@@ -156,8 +156,8 @@ def correct_claims(claims: Sequence[BenchmarkStatement]) -> list[BenchmarkStatem
     """Correct the p of a paper's printed statements for their number, by the method of Holm (1979).
 
     The statements of each reading are one family. A verdict by a difference that is not significant in its family
-    becomes *cannot tell*. The p of a sign-flip test of n clips is 2^(1 - n) or more, so the reason says where there are
-    too few clips. Claims of other kinds, and those without a p, stay as they are.
+    becomes *cannot tell*. The p of a sign-flip test of n units is 2^(1 - n) or more, so the reason says where there are
+    too few units, and how many would do. Claims of other kinds, and those without a p, stay as they are.
     """
     corrected = list(claims)
     for reading in {claim.reading for claim in claims}:
@@ -177,16 +177,17 @@ def _with_correction(claim: BenchmarkStatement, p: float, statements: int) -> Be
         return claim
     few = statements * 2.0 ** (1 - claim.clips) > SIGNIFICANCE
     reason = (
-        f"too few clips: {claim.clips} cannot show a difference among {statements} printed statements"
+        f"too few units: {claim.clips}, and among {statements} printed statements a difference needs "
+        f"{count_needed(statements)}"
         if few
         else f"not significant among {statements} printed statements: p = {p:.2g} after Holm"
     )
     return replace(claim, verdict="cannot tell", why="; ".join(filter(None, (reason, claim.why))))
 
 
-def _paired_p(more: Errors, less: Errors, clips: Iterable[str]) -> float | None:
-    """p of the paired differences by sign flips; None with too few clips for an interval."""
-    difference = np.array([more[clip] - less[clip] for clip in clips])
+def _paired_p(more: Errors, less: Errors, units: Iterable[str]) -> float | None:
+    """p of the paired differences by sign flips; None with too few units for an interval."""
+    difference = np.array([more[unit] - less[unit] for unit in units])
     return sign_flip_p(difference) if len(difference) >= MIN_UNITS else None
 
 
@@ -206,7 +207,7 @@ def claim_published_value(
     The means are compared directly, since figures from two motion libraries have no paired difference.
     """
     claim = BenchmarkStatement(
-        *(text, f"{published:g} {unit}", "not measured", "not run", "no clip was measured"),
+        *(text, f"{published:g} {unit}", "not measured", "not run", "no unit was measured"),
         unit=unit,
         kind=kind,
         reading=reading,

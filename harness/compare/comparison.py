@@ -26,7 +26,7 @@ from harness.compare.matching import (
     pair_cells,
 )
 from harness.compare.significance import Verdict
-from harness.compare.units import Performers
+from harness.compare.units import Sampling
 from harness.core.files import to_json_types
 from harness.core.training_data import training_note
 from harness.errors import Outcome
@@ -106,8 +106,8 @@ def compare_results(
     groups = [] if refused else group_pairs(matched.pairs)
     gated = _gated_metrics(metrics, a.manifest, b.manifest)
     informed = [metric for metric in (*metrics, *GATED_METRICS, *INFORMATIVE_METRICS) if metric not in gated]
-    performers = _merge_performers(a.manifest, b.manifest)
-    differences = compare_groups(groups, gated, dict.fromkeys(informed), performers)
+    sampling = _merge_sampling(a.manifest, b.manifest)
+    differences = compare_groups(groups, gated, dict.fromkeys(informed), sampling)
     faults = {"coverage": find_coverage_faults(groups, metrics), "cells": find_unpaired_cells(matched)}
     faults_refused = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
     missing = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
@@ -150,10 +150,11 @@ def compare_runs(
     return compare_results(reference, other, methods=methods, metrics=metrics, allow=allow)
 
 
-def _merge_performers(a: Manifest, b: Manifest) -> Performers | None:
-    """The performers that either side knows; None where neither stored any, so that names tell them."""
+def _merge_sampling(a: Manifest, b: Manifest) -> Sampling:
+    """The performers that either side knows, or by name where neither stored any; clips are units if both say so."""
     sides = [side.performers for side in (a, b) if side.performers is not None]
-    return {clip: who for side in sides for clip, who in side.items()} if sides else None
+    known = {clip: who for side in sides for clip, who in side.items()} if sides else None
+    return Sampling(known, "clip" if a.unit == b.unit == "clip" else "performer")
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from harness.compare.margins import margin_of
 from harness.compare.matching import CellPair
 from harness.compare.significance import SignificanceResult, Verdict, decide_verdicts
-from harness.compare.units import Performers, average_units
+from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Floats
 from harness.score.metrics import DEFINITIONS
 
@@ -102,18 +102,18 @@ def compare_groups(
     groups: Sequence[PairGroup],
     gated: Sequence[str],
     informed: Iterable[str] = (),
-    performers: Performers | None = None,
+    sampling: Sampling = BY_NAME,
 ) -> tuple[Difference, ...]:
     """Compare every metric of every group that both sides measured on some clip.
 
     Gated lines come first and are tested together. The lines in `informed` are tested individually, and the parts of a
     gated line together.
     """
-    first = [sides for group in groups for metric in gated if (sides := _sides(group, metric, performers)).clips]
-    others = [sides for group in groups for metric in informed if (sides := _sides(group, metric, performers)).clips]
+    first = [sides for group in groups for metric in gated if (sides := _sides(group, metric, sampling)).clips]
+    others = [sides for group in groups for metric in informed if (sides := _sides(group, metric, sampling)).clips]
     families = [first, *([sides] for sides in others)]
     for sides in first:
-        parts = [_sides(part, sides.metric, performers) for part in sides.group.parts]
+        parts = [_sides(part, sides.metric, sampling) for part in sides.group.parts]
         families.append([part for part in parts if part.clips])
     lines = []
     for number, family in enumerate(families):
@@ -148,7 +148,7 @@ class _Sides:
         return margin_of(self.metric).of(float(self.unit_a.mean()))
 
 
-def _sides(group: PairGroup, metric: str, performers: Performers | None) -> _Sides:
+def _sides(group: PairGroup, metric: str, sampling: Sampling) -> _Sides:
     """Average the cells of each clip, then the clips of each unit; what either side did not measure is left out."""
     by_clip: dict[str, list[tuple[float, float]]] = {}
     for a, b in group.pairs:
@@ -157,7 +157,7 @@ def _sides(group: PairGroup, metric: str, performers: Performers | None) -> _Sid
             by_clip.setdefault(a.clip, []).append((mine, theirs))
     clips = tuple(sorted(by_clip))
     of_clips = np.array([np.mean(by_clip[clip], axis=0) for clip in clips]).reshape(-1, 2)
-    of_units = [average_units(dict(zip(clips, side, strict=True)), performers) for side in of_clips.T]
+    of_units = [average_units(dict(zip(clips, side, strict=True)), sampling) for side in of_clips.T]
     unit_a, unit_b = (np.array(list(side.values())) for side in of_units)
     return _Sides(group, metric, clips, of_clips[:, 0], of_clips[:, 1], tuple(of_units[0]), unit_a, unit_b)
 

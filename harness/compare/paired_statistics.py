@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import special
 
+from harness.compare.units import Sampling, average_units
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
@@ -31,20 +32,20 @@ _RESAMPLES, _DRAWN_AT_ONCE, _MAX_CACHED = 2000, 250, 64
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Differences a - b over the clips on which both were measured."""
+    """Differences a - b over the units on which both were measured."""
 
-    clips: tuple[str, ...]
+    units: tuple[str, ...]
     mean: float | None
-    """Mean difference; None without clips."""
+    """Mean difference; None without units."""
     low: float | None = None
-    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` clips."""
+    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` units."""
     high: float | None = None
     """Upper end."""
 
     @property
     def verdict(self) -> Verdict:
         """Verdict on the claim that a is greater than b."""
-        if not self.clips:
+        if not self.units:
             return "not run"
         if self.low is None or self.high is None or self.low <= 0.0 <= self.high:
             return "cannot tell"
@@ -53,32 +54,39 @@ class PairedDifference:
     @property
     def why(self) -> str:
         """Reason for the verdict; "" where it is "reproduced"."""
-        if not self.clips:
-            return "no clip was measured on both sides"
+        if not self.units:
+            return "no unit was measured on both sides"
         if self.low is None:
-            return f"too few clips: {len(self.clips)}, of at least {MIN_UNITS}"
+            return f"too few units: {len(self.units)}, of at least {MIN_UNITS}"
         return {"cannot tell": "the interval contains zero", "not reproduced": "the difference has the other sign"}.get(
             self.verdict, ""
         )
 
 
-def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> PairedDifference:
-    """Compare errors by clip; a clip that either side lacks (or has None for) is left out.
+def compare_paired(
+    a: Mapping[str, float | None], b: Mapping[str, float | None], sampling: Sampling | None = None
+) -> PairedDifference:
+    """Compare errors by unit; a unit that either side lacks (or has None for) is left out.
 
-    All clips must be of one kind: never put known and new performers, or two splits, into one mapping. BadInput for a
+    With `sampling` the errors are by clip, and the differences of the clips of a unit are averaged.
+
+    All units must be of one kind: never put known and new performers, or two splits, into one mapping. BadInput for a
     number that is not finite.
     """
-    clips = tuple(sorted(clip for clip in a if a[clip] is not None and b.get(clip) is not None))
-    difference = np.array([a[clip] for clip in clips], float) - np.array([b[clip] for clip in clips], float)
+    units = tuple(sorted(unit for unit in a if a[unit] is not None and b.get(unit) is not None))
+    difference = np.array([a[unit] for unit in units], float) - np.array([b[unit] for unit in units], float)
+    if sampling is not None:
+        averaged = average_units(dict(zip(units, difference.tolist(), strict=True)), sampling)
+        units, difference = tuple(averaged), np.array(list(averaged.values()))
     if not np.isfinite(difference).all():
-        wrong = clips[int(np.flatnonzero(~np.isfinite(difference))[0])]
+        wrong = units[int(np.flatnonzero(~np.isfinite(difference))[0])]
         raise BadInput(f"The errors on {wrong} are not finite.", "Use None for what was not measured.")
-    if not clips:
+    if not units:
         return PairedDifference((), None)
     mean = float(difference.mean())
-    if len(clips) < MIN_UNITS:
-        return PairedDifference(clips, mean)
-    return PairedDifference(clips, mean, *mean_interval(difference))
+    if len(units) < MIN_UNITS:
+        return PairedDifference(units, mean)
+    return PairedDifference(units, mean, *mean_interval(difference))
 
 
 def mean_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from harness.compare.margins import GATED_METRICS, TIME_METRICS, margin_of
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
-from harness.compare.units import Performers, average_units
+from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Floats
 
 ClipValues = Mapping[str, Mapping[str, float]]
@@ -70,26 +70,24 @@ def split_by_lag(values: Mapping[str, ClipValues], lags: Mapping[str, int]) -> d
     return parts
 
 
-def rank_methods(
-    values: Mapping[str, ClipValues], metric: str, performers: Performers | None = None
-) -> MethodRanking | None:
+def rank_methods(values: Mapping[str, ClipValues], metric: str, sampling: Sampling = BY_NAME) -> MethodRanking | None:
     """Rank methods by a metric with a margin, of which lower values are better; None when they share no clip.
 
-    Methods without a value of the metric are left out. `performers` are those of `unit_of`.
+    Methods without a value of the metric are left out. `sampling` says what is a unit.
     """
     measured = {name: by_metric for name, by_metric in values.items() if by_metric.get(metric)}
     clips = shared_clips(by_metric[metric] for by_metric in measured.values())
     if not clips:
         return None
     by_unit = {
-        name: average_units({clip: of[metric][clip] for clip in clips}, performers) for name, of in measured.items()
+        name: average_units({clip: of[metric][clip] for clip in clips}, sampling) for name, of in measured.items()
     }
     columns = {name: np.array(list(of_unit.values())) for name, of_unit in by_unit.items()}
     units = tuple(next(iter(by_unit.values())))
     lowest, *others = sorted(columns, key=lambda name: float(columns[name].mean()))
     metrics = dict.fromkeys((metric, *(each for each in GATED_METRICS if each not in TIME_METRICS)))
     pairs = [(name, each) for each in metrics for name in others]
-    lines = [_paired(measured[name], measured[lowest], each, performers) for name, each in pairs]
+    lines = [_paired(measured[name], measured[lowest], each, sampling) for name, each in pairs]
     kept = [(line, margin) for line, margin in lines if len(line)]
     results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
     ordered = {name: columns[name] for name in (lowest, *others)}
@@ -97,22 +95,22 @@ def rank_methods(
     return MethodRanking(metric, clips, units, ordered, dict(zip(others, results, strict=True)), differences)
 
 
-def find_best(values: Mapping[str, ClipValues], metric: str, performers: Performers | None = None) -> str | None:
+def find_best(values: Mapping[str, ClipValues], metric: str, sampling: Sampling = BY_NAME) -> str | None:
     """The method that is better than every other one by this metric, as `MethodRanking.best`; None when there is none.
 
     It computes intervals only where no single p already excludes this.
     """
     measured = {name: of[metric] for name, of in values.items() if of.get(metric)}
     clips = shared_clips(measured.values())
-    by_unit = {name: average_units({clip: of[clip] for clip in clips}, performers) for name, of in measured.items()}
+    by_unit = {name: average_units({clip: of[clip] for clip in clips}, sampling) for name, of in measured.items()}
     if len(measured) < 2 or len(next(iter(by_unit.values()))) < MIN_UNITS:
         return None
     lowest = min(measured, key=lambda name: np.mean(list(by_unit[name].values())))
     for name in measured:
-        line, _ = _paired(values[name], values[lowest], metric, performers)
+        line, _ = _paired(values[name], values[lowest], metric, sampling)
         if name != lowest and sign_flip_p(line) > SIGNIFICANCE:
             return None
-    ranking = rank_methods(values, metric, performers)
+    ranking = rank_methods(values, metric, sampling)
     return ranking.best if ranking else None
 
 
@@ -122,11 +120,11 @@ def shared_clips(values: Iterable[Mapping[str, float]]) -> tuple[str, ...]:
     return tuple(sorted(set.intersection(*sets))) if sets else ()
 
 
-def _paired(a: ClipValues, b: ClipValues, metric: str, performers: Performers | None) -> tuple[Floats, float]:
+def _paired(a: ClipValues, b: ClipValues, metric: str, sampling: Sampling) -> tuple[Floats, float]:
     """Differences b - a over the units that both have, an increase being worse, and the margin for a reference a."""
     clips: Sequence[str] = shared_clips((a.get(metric, {}), b.get(metric, {})))
     before, after = (
-        np.array(list(average_units({clip: side[metric][clip] for clip in clips}, performers).values()))
+        np.array(list(average_units({clip: side[metric][clip] for clip in clips}, sampling).values()))
         for side in (a, b)
     )
     margin = margin_of(metric)

@@ -10,6 +10,8 @@ import numpy as np
 from harness.errors import BadInput
 
 Split = Literal["block", "sequence", "subject"]
+StatisticalUnit = Literal["performer", "clip"]
+"""What statistics count (see `harness.compare.units`)."""
 
 GUARD_S = 1.0
 """No example frame lies within this time of a tested block [s]."""

@@ -309,6 +309,7 @@ class Observation:
             content["physics"] = physics  # with what the noise preset leaves out
         for key in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
             del content[key]
+        del content["unit"]  # it changes no result
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
         for key in ("test", "behaviours", "examples", "withheld"):
             del content["motion"][key]

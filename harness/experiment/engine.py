@@ -44,7 +44,7 @@ from harness.results import storage
 from harness.results.index import CellIndex
 from harness.results.manifest import Manifest, describe_run, source_hash
 
-_CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault")
+_CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault", "unit")
 """Keys of a scenario that are no inputs of a sweep; the name is in the scenario's label."""
 
 
@@ -188,6 +188,7 @@ def _run_folder(
                 name=name,
                 command=command,
                 performers=manifest.performers,
+                unit=manifest.unit,
                 training_data=manifest.training_data,
                 scenarios=[scenario_label(scenario) for scenario in scenarios],
                 vary=dict(pair for scenario in scenarios for pair in dotted_keys(scenario.vary)),
@@ -227,6 +228,7 @@ def _describe(
         constants=constants,
         training_data=training_data,
         performers=performers,
+        unit="clip" if all(scenario.unit == "clip" for scenario in scenarios) else "performer",
     )
 
 

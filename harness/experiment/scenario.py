@@ -17,7 +17,7 @@ from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range, check_fields
-from harness.core.split import ClipPart
+from harness.core.split import ClipPart, StatisticalUnit
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.fitted_unit import merge_fitted_unit
 from harness.mocap.library import LibraryFolders
@@ -34,7 +34,7 @@ SCHEMA = 1
 MOST_VARIANTS = 1_000_000
 """Most combinations of varied values [choice]."""
 _STATION_SETS_FILE = "stations.toml"
-_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault", "fitted")
+_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault", "fitted", "unit")
 
 
 @dataclass(frozen=True)
@@ -164,6 +164,9 @@ class Scenario:
     or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
     """Rankings that papers state (see `harness.results.expected_orders`)."""
+    unit: StatisticalUnit = "performer"
+    """What statistics of the results count. Clips of one performer are not independent. `clip` is for test clips of too
+    few performers: every page then says that its statements hold for these performers only."""
     left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()

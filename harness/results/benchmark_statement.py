@@ -24,7 +24,7 @@ Verdict = Literal[
 
 A paper's statement has one by the paired 95 % interval of the difference. *reproduced*: it lies on the published side;
 *same*: it lies within the margin of `compare.margins`, so the difference is too small to matter; *not reproduced*: it
-lies on the other side; *cannot tell*: it contains zero, there are too few clips, or the difference is not significant
+lies on the other side; *cannot tell*: it contains zero, there are too few units, or the difference is not significant
 after Holm's correction; *not comparable*: absolute figures of other motion; *not run*: not measured.
 
 Our own targets are *met* or *missed*; *no verdict*: nothing was measured, or the run cannot tell. "" is a figure
@@ -58,9 +58,9 @@ class BenchmarkStatement:
     why: str = ""
     """Reason for the verdict: what differs, or what is missing; or how the figure was measured."""
     clips: int = 0
-    """Number of clips on which both sides were measured."""
+    """Number of units on which both sides were measured: performers, or clips where the scenario says so."""
     value: float | None = None
-    """The measured figure in `unit`, such as a mean paired difference over clips."""
+    """The measured figure in `unit`, such as a mean paired difference over units."""
     low: float | None = None
     high: float | None = None
     """Ends of the 95 % interval of `value`."""

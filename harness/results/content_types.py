@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.fields import check_entries
+from harness.core.split import StatisticalUnit
 from harness.errors import BadFile, HarnessError, UnknownName
 from harness.score.metrics import DEFINITIONS
 
@@ -99,6 +100,7 @@ def check_summary_types(path: Path, content: Mapping[str, Any], advice: str) -> 
         check_entries(content, _SUMMARY, "summary")
         if content.get("performers") is not None:  # versions before did not store them
             check_entries(content, {"performers": dict[str, str]}, "summary")
+        check_entries({"unit": "performer", **content}, {"unit": StatisticalUnit}, "summary")
         for n, row in enumerate(content["cells"]):
             if not re.fullmatch(r"\w+", str(row.get("key"))):
                 raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)

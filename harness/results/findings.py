@@ -44,7 +44,7 @@ class BarChart:
     low: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     high: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     spread: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
-    """Standard deviations over clips, where the paper shows them."""
+    """Standard deviations over units, where the paper shows them."""
     published: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     """Figures that the paper prints, by series."""
     horizontal: bool = False

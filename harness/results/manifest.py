@@ -15,9 +15,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from harness.core.fields import convert
 from harness.core.files import to_json_types
 from harness.core.package_data import PACKAGE_FOLDER, VERSION, data_folder
-from harness.errors import BadFile
+from harness.core.split import StatisticalUnit
+from harness.errors import BadFile, UnknownName
 from harness.results.digests import read_result_json
 from harness.score.metrics import VERSIONS
 
@@ -38,6 +40,8 @@ class Manifest:
     """Methods, command, source hash, commit, versions, platform."""
     performers: Mapping[str, str] | None = None
     """Performer of each test clip whose performer is known; None in manifests of versions that did not store them."""
+    unit: StatisticalUnit = "performer"
+    """What statistics count, as the scenario declares it."""
 
     @property
     def training_data(self) -> Mapping[str, str]:
@@ -59,8 +63,9 @@ class Manifest:
             )
             performers = content.get("performers")
             known = None if performers is None else {str(clip): str(who) for clip, who in performers.items()}
-            return cls(inputs, versions, circumstances, known)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            unit = convert(StatisticalUnit, content.get("unit", "performer"), "unit")
+            return cls(inputs, versions, circumstances, known, unit)
+        except (KeyError, TypeError, ValueError, AttributeError, UnknownName) as error:
             advice = "Is this a folder written by `harness run`?"
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
 
@@ -78,13 +83,15 @@ def describe_run(
     constants: Mapping[str, str] | None = None,
     training_data: Mapping[str, str] | None = None,
     performers: Mapping[str, str] | None = None,
+    unit: StatisticalUnit = "performer",
 ) -> Manifest:
     """Manifest of running a scenario, or a sweep's scenarios, with this code on this machine.
 
-    Methods, their `constants` and `training_data`, expected orders and omissions (`left_out`) are circumstances, all
-    else is input.
+    Methods, their `constants` and `training_data`, expected orders and omissions (`left_out`) are circumstances. The
+    `unit` of statistics changes no result. All else is input.
     """
-    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "expected_order", "left_out")}
+    no_inputs = ("methods", "expected_order", "left_out", "unit")
+    inputs = {name: value for name, value in scenario.items() if name not in no_inputs}
     return Manifest(
         inputs={**inputs, "motion_source": motion_source},
         metric_versions=VERSIONS,
@@ -97,6 +104,7 @@ def describe_run(
             **current_circumstances(),
         },
         performers=performers,
+        unit=unit,
     )
 
 

@@ -1,7 +1,7 @@
 """Findings of a placement study (which trackers to wear, and where), as plain records that are stored as JSON.
 
-A *set* is a choice of candidates that are worn together. All errors are of one metric, with one value per clip
-(averaged over methods, seeds and whatever else the study varies), so that sets are compared on the same clips. A page
+A *set* is a choice of candidates that are worn together. All errors are of one metric, with one value per unit
+of statistics (averaged over clips, methods and seeds), so that sets are compared on the same units. A page
 can be drawn from the file alone.
 """
 
@@ -52,11 +52,11 @@ class StationSetResult:
     rate_hz: float
     """Rate at which the line carries that many stations [Hz]."""
     errors: dict[str, float | None]
-    """Clip -> error; None where it was not measured."""
+    """Unit of statistics -> error (see `compare.units`); None where it was not measured. Older findings have clips."""
     mean: float | None
-    """Mean over the clips that were measured."""
+    """Mean over the units that were measured."""
     low: float | None = None
-    """Ends of the 95 % interval of the mean over clips; None with too few."""
+    """Ends of the 95 % interval of the mean over units; None with too few."""
     high: float | None = None
 
 
@@ -72,7 +72,7 @@ class RankedSet:
     rank_high: int
     """Worst rank that they allow: the number of sets minus those that are significantly worse."""
     difference: float | None
-    """Mean paired difference over clips to the set of rank 1, positive if that set is better; 0 for rank 1."""
+    """Mean paired difference over units to the set of rank 1, positive if that set is better; 0 for rank 1."""
     low: float | None = None
     """Ends of the 95 % interval of `difference`."""
     high: float | None = None
@@ -154,11 +154,11 @@ class BestSet:
     of: int = 0
     """Number of sets of this size that it was chosen from."""
     stays: float | None = None
-    """Share of resamples of the clips in which it is still the best."""
+    """Share of resamples of the units in which it is still the best."""
     crossed: float | None = None
-    """Cross-validated error: the mean over clips of the error of the set that the other clips would have chosen.
+    """Cross-validated error: the mean over units of the error of the set that the other units would have chosen.
 
-    It exceeds the mean error by the optimism of choosing and evaluating on the same clips.
+    It exceeds the mean error by the optimism of choosing and evaluating on the same units.
     """
     held_out: float | None = None
     """Mean error on the held-out clips."""
@@ -181,7 +181,7 @@ class PlacementCondition:
     """Mean error of each set of `PlacementFindings.compared`."""
     clips: int = 0
     stays: float | None = None
-    """Share of resamples of the clips in which the best of the compared sets is still the best."""
+    """Share of resamples of the units in which the best of the compared sets is still the best."""
 
 
 @dataclass(frozen=True)
@@ -194,8 +194,8 @@ class ChangedOrder:
     differences: tuple[float, float]
     """Mean error of `second` minus that of `first`, under either condition, positive where `first` is better."""
     significant: bool | None = None
-    """Whether the change of the difference is significant: sign flips over clips, corrected for all pairs of sets. None
-    if it was not tested: the conditions have different or few clips, or there are many sets."""
+    """Whether the change of the difference is significant: sign flips over units, corrected for all pairs of sets. None
+    if it was not tested: the conditions have different or few units, or there are many sets."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ class RankAgreement:
     """Kendall's tau-b over the sets: 1 for the same order, 0 for none, -1 for the reversed order."""
     sets: int
     low: float | None = None
-    """Ends of the 95 % interval by resampling clips; None if it was not computed."""
+    """Ends of the 95 % interval that the decided pairs leave (see `compare.rank_correlation`); None if unknown."""
     high: float | None = None
     changed: tuple[ChangedOrder, ...] = ()
     """The first pairs of sets whose order differs: the significant changes first, then the largest."""
@@ -220,16 +220,16 @@ class RankAgreement:
 
 @dataclass(frozen=True)
 class StatisticalPower:
-    """What the clips of a study can show, estimated from its first sets before the others ran."""
+    """What the units of a study can show, estimated from its first sets before the others ran."""
 
     clips: int
-    """Number of clips on which sets are compared."""
+    """Number of units on which sets are compared."""
     sets: int
     """Number of sets that are compared with each other."""
     unit: str
     """Unit of `spread`, `shown` and `wanted`."""
     least_clips: int
-    """Least number of clips with which any difference between so many sets can be significant."""
+    """Least number of units with which any difference between so many sets can be significant."""
     duration_s: float | None = None
     """Estimated duration of the whole study [s]; None if no cell was measured."""
     least_duration_s: float | None = None
@@ -237,13 +237,13 @@ class StatisticalPower:
     cell_s: float | None = None
     """Duration of a cell on one worker [s], the median of the first sets."""
     spread: float | None = None
-    """Standard deviation of paired differences between sets over clips, in the metric's unit; None if unknown."""
+    """Standard deviation of paired differences between sets over units, in the metric's unit; None if unknown."""
     shown: float | None = None
     """Smallest difference that is found with probability 0.8; None if none can be significant or it is unknown."""
     wanted: float | None = None
     """A tenth of the mean error of the first sets."""
     needed_clips: int | None = None
-    """Number of clips that would show a difference of `wanted`."""
+    """Number of units that would show a difference of `wanted`."""
     needed_duration_s: float | None = None
     """Estimated duration of the study with `needed_clips` clips [s]."""
     pilot_sets: int = 0
@@ -293,7 +293,7 @@ class PlacementFindings:
     sizes: tuple[int, ...] = ()
     """The numbers of stations that were asked about; () for the smallest number that suffices."""
     power: StatisticalPower | None = None
-    """What the clips can show; None in findings of versions that did not estimate it."""
+    """What the units can show; None in findings of versions that did not estimate it."""
     better: Literal["lower", "higher"] = "lower"
     """Which values of the metric are better; all differences are signed accordingly."""
     kind: Literal["placement"] = "placement"

@@ -83,7 +83,7 @@ class ErrorDistance:
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Equivalence of one metric of one arm: simulation minus device over clips, by two one-sided tests."""
+    """Equivalence of one metric of one arm: simulation minus device over units, by two one-sided tests."""
 
     arm: str
     metric: str
@@ -91,12 +91,12 @@ class Equivalence:
     """Largest difference without practical importance, in the metric's unit, as the difference and its interval."""
     clips: int
     device: float | None
-    """Mean over the clips."""
+    """Mean over the units."""
     simulated: float | None
     difference: float | None
     """Mean of simulation minus device."""
     low: float | None
-    """Lower end of the interval of the level 1 - 2 x the plan's; None with too few clips."""
+    """Lower end of the interval of the level 1 - 2 x the plan's; None with too few units."""
     high: float | None
     verdict: EquivalenceVerdict
     why: str
@@ -104,11 +104,11 @@ class Equivalence:
 
 @dataclass(frozen=True)
 class SideDifference:
-    """Error of arm a minus that of arm b on one side, over the clips of the plan."""
+    """Error of arm a minus that of arm b on one side, over the units of the plan."""
 
     mean: float | None
     low: float | None
-    """Lower end of the interval of the level 1 - 2 x the plan's, for these motions; None with too few clips."""
+    """Lower end of the interval of the level 1 - 2 x the plan's, for these motions; None with too few units."""
     high: float | None
     p: float | None
     """One-sided p in the direction of the mean."""
@@ -133,7 +133,7 @@ class PairAgreement:
 
 @dataclass(frozen=True)
 class RankCorrelation:
-    """A correlation of the arms' mean errors on both sides, with an interval over clips."""
+    """A correlation of the arms' mean errors on both sides, with an interval."""
 
     name: str
     value: float | None

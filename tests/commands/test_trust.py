@@ -46,7 +46,7 @@ def test_another_plan_is_not_comparable_unless_exploratory(
     code, out, _ = run(capsys, *words, "--exploratory")
     assert code == 3
     assert out.startswith("Exploratory: ")
-    assert "too few clips: 1" in out
+    assert "too few units: 1" in out
 
 
 def test_truth_names_the_clips(small_study: SmallStudy, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

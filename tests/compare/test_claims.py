@@ -45,7 +45,7 @@ def test_noninferior_is_an_excess_whose_interval_ends_below_the_margin(
 def test_five_clips_are_too_few_for_noninferiority() -> None:
     claim = claim_noninferior("suitable", by_clip(np.ones(5)), by_clip(2.0 * np.ones(5)))
     assert (claim.verdict, claim.p) == ("cannot tell", None)
-    assert "too few clips" in claim.why
+    assert "too few units" in claim.why
     assert claim_noninferior("suitable", {}, by_clip(np.ones(5))).verdict == "not run"
 
 
@@ -93,7 +93,7 @@ def test_holm_takes_back_what_is_not_significant_among_the_printed_statements() 
     assert correct_claims([order(8)] * 6)[0].p_holm == pytest.approx(6.0 * 2.0**-7)
     taken_back = correct_claims([order(8)] * 7)
     assert {claim.verdict for claim in taken_back} == {"cannot tell"}
-    assert "too few clips: 8 cannot show a difference among 7 printed statements" in taken_back[0].why
+    assert "too few units: 8, and among 7 printed statements a difference needs 9" in taken_back[0].why
     assert {claim.verdict for claim in correct_claims([order(8, -1.0)] * 7)} == {"cannot tell"}
     assert {claim.verdict for claim in correct_claims([order(12)] * 40)} == {"reproduced"}
 

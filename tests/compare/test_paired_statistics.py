@@ -69,7 +69,7 @@ def test_only_clips_of_both_sides_count() -> None:
     a = {"x": 1.0, "y": 2.0, "gone": None, "mine": 9.0}
     b = {"y": 1.0, "x": 0.5, "gone": 1.0, "theirs": 9.0}
     found = compare_paired(a, b)
-    assert found.clips == ("x", "y")
+    assert found.units == ("x", "y")
     assert found.mean == 0.75
 
 
@@ -78,7 +78,7 @@ def test_few_clips_tell_nothing(count: int) -> None:
     found = compare_paired(errors(np.full(count, 9.0) + np.arange(count)), errors(np.zeros(count)))
     assert found.low is found.high is None
     assert found.verdict == ("cannot tell" if count else "not run")
-    assert ("too few clips" in found.why) if count else ("no clip" in found.why)
+    assert ("too few units" in found.why) if count else ("no unit" in found.why)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import pytest
 
 from harness.compare.comparison import compare_results
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, split_by_lag
+from harness.compare.units import Sampling
 from harness.core.seeds import generator
 from harness.results.reader import ResultSet
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -132,7 +133,7 @@ def test_clips_of_one_performer_are_one_unit() -> None:
     assert len(ranking.clips) == 12
     assert ranking.results["b"].why == "too few units: 3, of at least 6"
     np.testing.assert_allclose(ranking.values["b"], [2.015, 2.055, 2.095])
-    each_its_own = {clip: clip for clip in clips}
+    each_its_own = Sampling(unit="clip")
     apart = rank_methods(values, PRIMARY_METRIC, each_its_own)
     assert apart is not None
     assert (len(apart.units), apart.best) == (12, "a")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.compare.units import average_units, count_clips, unit_of
+from harness.compare.units import BY_NAME, Sampling, average_complete_units, average_units, count_clips, count_units
 
 
 @pytest.mark.parametrize(
@@ -20,13 +20,31 @@ from harness.compare.units import average_units, count_clips, unit_of
     ],
 )
 def test_clips_and_units_are_counted(clips: tuple[str, ...], performers: dict[str, str] | None, words: str) -> None:
-    assert count_clips(clips, performers) == words
+    assert count_clips(clips, Sampling(performers)) == words
 
 
 def test_parts_of_one_take_are_one_unit_where_the_performer_is_not_known() -> None:
-    assert unit_of("demo: mine@0.20-0.40") == unit_of("mine@0.60-0.80") == "mine"
+    assert BY_NAME.unit_of("demo: mine@0.20-0.40") == BY_NAME.unit_of("mine@0.60-0.80") == "mine"
 
 
 def test_the_mean_of_a_unit_is_that_of_its_clips() -> None:
     values = {"13_17@0.2-0.4": 1.0, "14_02@0.2-0.4": 5.0, "13_17@0.6-0.8": 2.0}
     assert average_units(values) == {"performer 13": 1.5, "performer 14": 5.0}
+
+
+BLOCKS = {"13_17@0.2-0.4": 1.0, "13_17@0.6-0.8": 2.0, "14_02": 5.0}
+CLIPS = Sampling(unit="clip")
+
+
+def test_clips_are_units_where_a_scenario_says_so_and_hold_for_these_performers_only() -> None:
+    assert list(average_units(BLOCKS, CLIPS).values()) == [1.0, 2.0, 5.0]
+    counted = "3 clips of 2 performers, these performers only"
+    assert count_units(average_units(BLOCKS, CLIPS)) == count_clips(BLOCKS, CLIPS) == counted
+    assert count_clips(["mine@0.2-0.4"], CLIPS, "sequence") == "1 sequence of 1 take, this take only"
+
+
+def test_a_unit_without_one_of_its_clips_is_left_out() -> None:
+    """Its mean would be over other clips than that of what it is paired with."""
+    planned = [*BLOCKS, "14_03"]
+    assert average_complete_units(BLOCKS, planned) == {"performer 13": 1.5}
+    assert len(average_complete_units(BLOCKS, planned, CLIPS)) == 3

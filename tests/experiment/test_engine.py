@@ -71,6 +71,11 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     assert Manifest.read(out / "manifest.json").performers == performers
     assert read_summary(out)["performers"] == performers
     assert "on 2 performers:" in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
+    engine.run(replace(SMALL, unit="clip"), out)  # the cells are the same, and what is said of them is not
+    assert {row["key"] for row in rows(out)} == {row["key"] for row in found.values()}
+    assert (Manifest.read(out / "manifest.json").unit, read_summary(out)["unit"]) == ("clip", "clip")
+    counted = "on 2 clips of 2 performers, these performers only:"
+    assert counted in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
 
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from harness.compare.comparison import Comparison, Difference, Verdict
-from harness.compare.units import unit_of
+from harness.compare.units import BY_NAME
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import Outcome
@@ -52,7 +52,7 @@ def judged(method: str, group: str, metric: str, unit: str, a: Floats, b: Floats
         clips=names,
         a=tuple(map(float, a)),
         b=tuple(map(float, b)),
-        units=tuple(unit_of(name) for name in names),
+        units=tuple(BY_NAME.unit_of(name) for name in names),
         mean_a=float(a.mean()) if clips else 0.0,
         mean_b=float(b.mean()) if clips else 0.0,
         difference=mean,

@@ -183,7 +183,7 @@ def _worth(
 ) -> MarginalContribution:
     gain = _paired(less, more)
     return MarginalContribution(
-        name, "add" if mode == "add" else "ablate", base, gain.mean, gain.low, gain.high, len(gain.clips)
+        name, "add" if mode == "add" else "ablate", base, gain.mean, gain.low, gain.high, len(gain.units)
     )
 
 

@@ -43,9 +43,9 @@ def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> 
             for other in COMPARED_METHODS:
                 theirs = pool_clips(by_method.get(other, {}), noise, performer)
                 difference = compare_paired(theirs, ours)
-                if other == method or not difference.clips:
+                if other == method or not difference.units:
                     continue
-                error, other_error = (float(np.mean([of[clip] for clip in difference.clips])) for of in (ours, theirs))
+                error, other_error = (float(np.mean([of[clip] for clip in difference.units])) for of in (ours, theirs))
                 is_better, is_worse = (difference.verdict == word for word in ("reproduced", "not reproduced"))
                 found.append(
                     state_verdict(
@@ -54,7 +54,7 @@ def compare_methods(method: str, by_method: Mapping[str, ErrorsByCondition]) -> 
                         f"{error:.2f} against {other_error:.2f} deg",
                         None if difference.low is None else is_better if performer == "known" else not is_worse,
                         why=difference.why if difference.low is None else "",
-                        clips=len(difference.clips),
+                        clips=len(difference.units),
                         value=difference.mean,
                         low=difference.low,
                         high=difference.high,

@@ -1,12 +1,8 @@
 """Agreement of a ranking on built-in motion with that on real motion, over performers.
 
 A unit is a performer, because the clips of one performer are not independent. Both sides have performers of their own.
-A pair of items is decided where both sides show a difference (`study.trust.pair_agreement.decide_pairs`).
-
-The interval of Kendall's tau follows from the decided pairs. Every other pair may be in the same or in the opposite
-order. Holm's correction makes all decisions true at once with a probability of 95 %, and tau then lies in the interval
-(simultaneous inference for ranks, as Klein, Wright and Wieczorek 2020). Percentiles of tau over resampled performers
-are no such interval: resampling exchanges items that are nearly equal, which biases tau towards zero.
+A pair of items is decided where both sides show a difference, and the interval of Kendall's tau follows from the
+decided pairs (see `compare.rank_correlation`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,11 +13,10 @@ import numpy as np
 from scipy import special
 
 from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.rank_correlation import tau_b
+from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats
-from harness.results.trust_findings import PairAgreement, PairVerdict, SideDifference
-from harness.study.trust.pair_agreement import decide_pairs, side_difference
+from harness.results.trust_findings import PairAgreement, PairVerdict
 
 MIN_ITEMS = 3
 """Least number of items with a rank correlation."""
@@ -89,8 +84,9 @@ def compare_rankings(builtin: ErrorsByUnit, real: ErrorsByUnit) -> RankingAgreem
     items, tables = [items[at] for at in order], [table[order] for table in tables]
     means = [table.mean(axis=1) for table in tables]
     tau = float(tau_b(*means)) if len(items) >= MIN_ITEMS else float("nan")
-    pairs = _decide(items, tables)
-    low, high = _interval(pairs) if np.isfinite(tau) and min(map(len, units.values())) >= MIN_UNITS else (None, None)
+    real_first = (tables[1], tables[0])
+    pairs = tuple(compare_orders(items, real_first, ("real side", "built-in side"), "performers"))
+    low, high = tau_interval(pairs) if np.isfinite(tau) else (None, None)
     return RankingAgreement(
         units["built-in"],
         units["real"],
@@ -102,30 +98,6 @@ def compare_rankings(builtin: ErrorsByUnit, real: ErrorsByUnit) -> RankingAgreem
         _enough_units(tables),
         left_out,
     )
-
-
-def _decide(items: Sequence[str], tables: Sequence[Floats]) -> tuple[PairAgreement, ...]:
-    """Decide on all pairs of (items, performers) errors on built-in and on real motion."""
-    compared = []
-    for a, b in combinations(range(len(items)), 2):
-        builtin, real = (_side_difference(table[a] - table[b]) for table in tables)
-        compared.append((min(table.shape[1] for table in tables), (real, builtin)))
-    names = list(combinations(items, 2))
-    sides = ("real side", "built-in side")
-    return tuple(decide_pairs(names, compared, SIGNIFICANCE, sides=sides, unit="performers"))
-
-
-def _side_difference(values: Floats) -> SideDifference:
-    if len(values) < MIN_UNITS:
-        return SideDifference(float(values.mean()) if len(values) else None, None, None, None)
-    return side_difference(values, float(values.var(ddof=1)), len(values) - 1, SIGNIFICANCE / 2.0)
-
-
-def _interval(pairs: Sequence[PairAgreement]) -> tuple[float, float]:
-    """The smallest and the largest tau that the decided pairs allow."""
-    verdicts = [pair.verdict for pair in pairs]
-    decided, undecided = verdicts.count("agree") - verdicts.count("contradict"), verdicts.count("cannot tell")
-    return (decided - undecided) / len(pairs), (decided + undecided) / len(pairs)
 
 
 def _enough_units(tables: Sequence[Floats]) -> tuple[int | None, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
-from harness.compare.units import Performers
+from harness.compare.units import Sampling
 from harness.errors import BadInput, NothingMeasured, UnknownName
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
@@ -38,8 +38,8 @@ class RunCondition:
     """Rows of the summary."""
     methods: tuple[Row, ...]
     """Rows of the summary's methods, which name the series."""
-    performers: Performers | None
-    """Performer of each clip whose performer is known; None in runs of versions that did not store them."""
+    sampling: Sampling
+    """What is a unit of statistics."""
 
     @property
     def name(self) -> str:
@@ -70,7 +70,7 @@ class RunCondition:
 
     def rank(self, metric: str = PRIMARY_METRIC, behaviour: str | None = None) -> MethodRanking | None:
         """The ranking by one of RANKING_METRICS; None when the series share no clip."""
-        return rank_methods(self.values(behaviour), metric, self.performers)
+        return rank_methods(self.values(behaviour), metric, self.sampling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def _condition(
         tuple(part for part in (varied_text(varied), performers, lag) if part),
         tuple(row for row in summary["cells"] if (row["varied"], _group_of(row)) == (varied, group)),
         tuple(row for row in summary["methods"] if row["performer"] == group.performer),
-        summary.get("performers"),
+        Sampling.of_summary(summary),
     )
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.compare.paired_statistics import mean_interval
+from harness.compare.units import count_clips
 from harness.core.arrays import Floats
-from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import ConditionSet
 from harness.report.figures.selection import FigureSelection
@@ -16,7 +16,7 @@ from harness.report.kit.highlights import Highlights
 from harness.report.kit.print_figure import MM_PER_IN, WIDTHS_MM, PrintFigure
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, INK, PAPER, mark_scale
-from harness.report.run.joint_errors import BONE_ROWS, means_by_clip
+from harness.report.run.joint_errors import BONE_ROWS, means_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,18 +33,21 @@ def joints_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
     highlights = rank_highlights(condition, selection)
     shown = [name for name in (highlights.leader, highlights.control) if name]
     traces = read_series(run.folder, condition, lambda name, row: name in shown and selection.clip in ("", row["clip"]))
-    means = {name: found for name, of in traces.items() if len((found := means_by_clip(of))[0])}
+    means = {name: found for name, of in traces.items() if len((found := means_by_unit(of, condition.sampling))[0])}
     if highlights.leader not in means:
         raise BadInput(f"{highlights.leader} was not measured on {selection.clip}.", "Choose another clip with --clip.")
     count = len(means[highlights.leader][0])
-    where = (selection.clip or count_noun(count, "clip")) + (f", {condition.name}" if condition.name else "")
+    clips = {trace.clip for trace in traces[highlights.leader]}
+    where = (selection.clip or count_clips(clips, condition.sampling)) + (
+        f", {condition.name}" if condition.name else ""
+    )
     against = f" Diamonds: {highlights.control}, the control." if highlights.control in means else ""
     leader = f"{highlights.leader}, the method with the lowest mean joint angle error"
     return PrintFigure(
         "joints",
         f"Mean error of {leader}, at each bone on {where}. "
         "Rotation error: geodesic error of the rotation relative to the parent bone."
-        f"{' Whiskers: 95 % interval over clips.' if count > 1 else ''}{against}{run.missing_note}",
+        f"{' Whiskers: 95 % interval over units.' if count > 1 else ''}{against}{run.missing_note}",
         lambda figure: _draw(figure, means, highlights),
         _FRAME_MM + _ROW_MM * len(BONE_ROWS),
     )
@@ -71,7 +74,7 @@ def _draw(figure: "Figure", means: Mapping[str, tuple[Floats, Floats]], highligh
 
 
 def _draw_bars(axes: "Axes", values: Floats, label: str) -> None:
-    """A bar for the mean of each column of (clips, 22) values, and its interval."""
+    """A bar for the mean of each column of (units, 22) values, and its interval."""
     rows = np.arange(values.shape[1])
     axes.barh(rows, values.mean(axis=0), 0.68, color=COLOURS[4], label=label)
     if len(values) > 1:

@@ -87,7 +87,7 @@ def _errors(condition: RunCondition) -> dict[str, dict[str, float]]:
     by_clip = {name: errors for name, errors in by_clip.items() if errors}
     shared = shared_clips(by_clip.values())
     return {
-        name: average_units({clip: errors[clip] for clip in shared}, condition.performers)
+        name: average_units({clip: errors[clip] for clip in shared}, condition.sampling)
         for name, errors in by_clip.items()
     }
 

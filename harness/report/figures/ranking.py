@@ -34,7 +34,7 @@ def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure
 
 def _caption(run: ConditionSet, metric: str, shown: list[RunCondition], panels: list[RankingPanel]) -> str:
     counts = list(
-        dict.fromkeys(count_clips(panel.ranking.clips, of.performers) for of, panel in zip(shown, panels, strict=True))
+        dict.fromkeys(count_clips(panel.ranking.clips, of.sampling) for of, panel in zip(shown, panels, strict=True))
     )
     fewer = any(len(panel.ranking.clips) < len(each.clips) for each, panel in zip(shown, panels, strict=True))
     clips = " and ".join(counts) + (" that all methods were measured on" if fewer else "")

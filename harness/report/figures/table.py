@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
-from harness.compare.units import Performers, average_units, count_clips
+from harness.compare.units import Sampling, average_units, count_clips
 from harness.core.number_format import format_number
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
@@ -101,14 +101,14 @@ def build_table(
     for each in run.conditions:
         for behaviour in each.behaviours if by_behaviour else (None,):
             values = each.values(behaviour)
-            rankings = {m: rank_methods(values, m, each.performers) for m in metrics if m in RANKING_METRICS}
+            rankings = {m: rank_methods(values, m, each.sampling) for m in metrics if m in RANKING_METRICS}
             few |= any(len(ranking.units) < MIN_UNITS for ranking in rankings.values() if ranking)
             texts = tuple(_condition_text(each, name, behaviour) for name in names)
             rows += [
                 ResultsRow(
                     texts,
                     series,
-                    tuple(_value(m, values[series], series, rankings, each.performers) for m in metrics),
+                    tuple(_value(m, values[series], series, rankings, each.sampling) for m in metrics),
                 )
                 for series in each.series
                 if series in values
@@ -144,12 +144,12 @@ def _value(
     values: ClipValues,
     series: str,
     rankings: Mapping[str, MethodRanking | None],
-    performers: Performers | None,
+    sampling: Sampling,
 ) -> MetricValue:
     by_clip = values.get(metric, {})
     if not by_clip:
         return MetricValue(metric, None)
-    by_unit = np.array(list(average_units(by_clip, performers).values()))
+    by_unit = np.array(list(average_units(by_clip, sampling).values()))
     low, high = mean_interval(by_unit) if len(by_unit) > 1 else (None, None)
     ranking = rankings.get(metric)
     standing = _standing(ranking, series) if ranking else ""
@@ -165,7 +165,7 @@ def _standing(ranking: MethodRanking, series: str) -> Standing:
 
 def _note(run: ConditionSet, rows: Sequence[ResultsRow], few: bool) -> str:
     rankings = [(each, ranking) for each in run.conditions if (ranking := each.rank()) is not None]
-    counted = dict.fromkeys(count_clips(ranking.clips, each.performers) for each, ranking in rankings)
+    counted = dict.fromkeys(count_clips(ranking.clips, each.sampling) for each, ranking in rankings)
     sentences = [f"Mean over units and its 95 % interval: {' or '.join(counted)}."] if counted else []
     if any(value.bold for row in rows for value in row.values):
         sentences.append("Bold: the lowest mean and those tied with it, by the rules of harness compare.")

@@ -26,7 +26,7 @@ MARKS: Mapping[Verdict, str] = {
 
 def statement_head(first: str = "statement", target: str = "target", reference: str = "reference") -> list[str]:
     """Heads of the columns of `statement_row`."""
-    return [first, "kind", target, "measured", "difference", "clips", "verdict", reference]
+    return [first, "kind", target, "measured", "difference", "units", "verdict", reference]
 
 
 def statement_row(statement: BenchmarkStatement) -> list[object]:

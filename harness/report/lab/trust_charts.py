@@ -83,7 +83,7 @@ def pairs_chart(findings: TrustFindings) -> Chart | None:
     return draw_chart(
         "pairs",
         f"Difference of each pair in {metric_title(findings.ranked_metric)}",
-        f"Mean error of the first method minus that of the second, with its {interval_title(findings)} over clips. "
+        f"Mean error of the first method minus that of the second, with its {interval_title(findings)} over units. "
         "Where both intervals lie on the same side of zero, the sides agree. Where they lie on opposite sides, they "
         "contradict each other.",
         f"Differences of pairs in {metric_title(findings.ranked_metric)}: {texts}.",
@@ -141,7 +141,7 @@ def ranks_chart(findings: TrustFindings) -> Chart | None:
     return draw_chart(
         "ranks",
         "Simulation against device",
-        f"A point for each method: its {metric_title(findings.ranked_metric)}, mean over all clips. On the line the "
+        f"A point for each method: its {metric_title(findings.ranked_metric)}, mean over all units. On the line the "
         "two sides are equal; the band is the margin. A ranking is the same on both sides if the points rise from left "
         "to right.",
         f"Mean {metric_title(findings.ranked_metric)} on the device and in the simulation: {texts}.",
@@ -178,7 +178,7 @@ def equivalence_chart(findings: TrustFindings) -> Chart | None:
     return draw_chart(
         "equivalence",
         "Simulation minus device against the margin",
-        f"Mean difference over clips in units of the margin, with its {interval_title(findings)}. Equivalent: the "
+        f"Mean difference over units in units of the margin, with its {interval_title(findings)}. Equivalent: the "
         "whole interval lies in the grey band. Diamonds: the whole interval lies outside. Hollow: it cannot be told.",
         f"Simulation minus device in units of the margin: {texts}.",
         lambda figure: _draw_equivalence(figure, rows),

@@ -52,7 +52,7 @@ OUTCOME_TITLES: Mapping[Outcome, str] = {
 _PAIR_MARKS: Mapping[PairVerdict, str] = {"contradict": "✗", "cannot tell": "?", "agree": "✓"}
 _PAIR_MEANINGS: Mapping[PairVerdict, str] = {
     "contradict": "both sides show a difference, in opposite directions",
-    "cannot tell": "at least one side shows no difference, or there are too few clips",
+    "cannot tell": "at least one side shows no difference, or there are too few units",
     "agree": "both sides show a difference in the same direction",
 }
 _EQUIVALENCE_MARKS: Mapping[EquivalenceVerdict, str] = {"beyond the margin": "✗", "cannot tell": "?", "equivalent": "✓"}
@@ -109,6 +109,8 @@ def verdict_sentence(findings: TrustFindings) -> str:
     """The verdict in one sentence."""
     pairs = count_pairs(findings.pairs)
     counted = f"{count_noun(len(findings.pairs), 'pair')} of methods on {count_noun(len(clips(findings)), 'clip')}"
+    if (units := max((pair.clips for pair in findings.pairs), default=0)) < len(clips(findings)):
+        counted += f" ({count_noun(units, 'unit')} of statistics)"
     match findings.outcome:
         case Outcome.PASS:
             return f"The simulation ranks methods as the device does: of {counted}, none contradicts."
@@ -178,11 +180,11 @@ def _pairs_table(found: TrustFindings) -> DataTable:
         for pair in sort_pairs(found.pairs)
     ]
     caption = (
-        f"Error of the first method minus that of the second in {metric_title(found.ranked_metric)}, over clips, with "
+        f"Error of the first method minus that of the second in {metric_title(found.ranked_metric)}, over units, with "
         f"its {interval_title(found)}. p is the larger one of the two sides, after Holm's correction for the number of "
         "pairs."
     )
-    return DataTable(["pair", "verdict", "device", "simulation", "p (Holm)", "clips"], rows, caption=caption)
+    return DataTable(["pair", "verdict", "device", "simulation", "p (Holm)", "units"], rows, caption=caption)
 
 
 def _equivalence_table(found: TrustFindings) -> DataTable:
@@ -204,7 +206,7 @@ def _equivalence_table(found: TrustFindings) -> DataTable:
         "Two one-sided tests for each metric of each method: simulation minus device with its "
         f"{interval_title(found)}. The margins stand in the plan, which was fixed before the captures."
     )
-    head = ["method", "metric", "verdict", "device", "simulation", "difference", "margin", "clips"]
+    head = ["method", "metric", "verdict", "device", "simulation", "difference", "margin", "units"]
     return DataTable(head, rows, caption=caption, label="equivalence")
 
 

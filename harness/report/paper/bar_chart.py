@@ -87,7 +87,7 @@ def explain_signs(bars: BarChart) -> str:
     """Sentences that explain the marks that the chart has."""
     signs: dict[str, SeriesValues] = {
         "Whiskers: 95 % interval.": bars.high,
-        "Thin grey lines: standard deviation over clips.": bars.spread,
+        "Thin grey lines: standard deviation over units.": bars.spread,
         "Diamonds: published values.": bars.published,
     }
     sentences = [text for text, values in signs.items() if has_values(values)]

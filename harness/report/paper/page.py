@@ -51,7 +51,7 @@ MEANINGS: Mapping[Verdict, str] = {
     "most 0.05; or a printed value is met (an error within 25 %)",
     "same": "the whole interval lies within the margin of a comparison: the difference is too small to matter",
     "not reproduced": "the interval lies on the other side; or a printed value is not met",
-    "cannot tell": "the interval contains zero, there are too few clips, or the difference is not significant among "
+    "cannot tell": "the interval contains zero, there are too few units, or the difference is not significant among "
     "the printed statements (Holm)",
     "not comparable": "the printed value is for other motion or conditions",
     "not run": "not measured here",
@@ -59,16 +59,16 @@ MEANINGS: Mapping[Verdict, str] = {
 KINDS: tuple[Verdict, ...] = tuple(MEANINGS)
 """All verdicts on claims, in the order of the tables."""
 _CLAIMS = (
-    "Difference: mean of the paired differences over clips and its 95 % interval; positive values agree with the "
-    "paper. p: by sign flips (by Welch's test where clips do not pair), after Holm's correction for all printed "
-    "statements of the paper with the same version of the methods (as printed, ours). The text under a claim gives "
-    "the reason for its verdict. Kind: the paper prints a printed statement; a derived one follows from those or is "
+    "Difference: mean of the paired differences over units (performers, or clips where a note says so) and its 95 % "
+    "interval; positive values agree with the paper. p: by sign flips (by Welch's test where units do not pair), after "
+    "Holm's correction for all printed statements of the paper with the same version of the methods (as printed, ours). "
+    "The text under a claim gives the reason for its verdict. Kind: the paper prints a printed statement; a derived one follows from those or is "
     "our interpretation of a word; a repeated one asks one more method; speed compares today's machines with the "
     "paper's. Only printed statements count in the headline."
 )
 _STATEMENTS = (
     "As printed: the equations of the paper, without additions. Ours: the methods of this project that extend them. "
-    "Errors are means over clips. The headline counts these verdicts. The next table adds differences, intervals and "
+    "Errors are means over units. The headline counts these verdicts. The next table adds differences, intervals and "
     "reasons."
 )
 _VARIANT = re.compile(r":(literal|chai2005)\b")

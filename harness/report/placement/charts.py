@@ -86,7 +86,7 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
         axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", fontsize=8.5, color=FAINT)
         label_rows(axes, [set_name(row.stations) for row in rows])
         axes.margins(x=0.06)
-        axes.set_xlabel(f"difference to the first [{findings.unit}], paired over clips")
+        axes.set_xlabel(f"difference to the first [{findings.unit}], paired over units")
 
     more = f" Shown: the first {len(rows)} of {len(ranking.rows)}." if len(rows) < len(ranking.rows) else ""
     first, ties = ranking.rows[0], sum(row.tied for row in ranking.rows) - 1
@@ -124,7 +124,7 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
         f"worth_{number}_{to_file_name(contributions[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
         "Blue: sets with the station err less; orange: they err more; grey: neither is significant. Whiskers: 95 % "
-        "interval over clips.",
+        "interval over units.",
         f"Contribution of candidates, {title}: {values}.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),

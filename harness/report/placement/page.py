@@ -152,9 +152,9 @@ def _best_table(findings: PlacementFindings) -> DataTable:
             ]
         )
     caption = (
-        "The best set of each size and its mean error with the 95 % interval over clips. "
+        "The best set of each size and its mean error with the 95 % interval over units of statistics. "
         + ("Held out: the error on clips that did not take part in the choice. " if held_out else "")
-        + "Best of: the number of sets of this size, and in how many resamples of the clips the set stays best. "
+        + "Best of: the number of sets of this size, and in how many resamples of the units the set stays best. "
         "Ties: other sets of this size that are as good."
     )
     head = ["stations", "best set", "error", *(["held out"] if held_out else []), "rate", "best of", "ties"]
@@ -202,7 +202,7 @@ def _worth_table(findings: PlacementFindings) -> DataTable:
         for place in findings.candidates
         if any((place.name, label) in found for label in labels)
     ]
-    caption = f"Error without the station minus error with it [{findings.unit}], with 95 % intervals over clips."
+    caption = f"Error without the station minus error with it [{findings.unit}], with 95 % intervals over units."
     return DataTable(["candidate", *labels], rows, caption=caption, label="worth", fold="Numbers of these charts")
 
 
@@ -233,7 +233,7 @@ def _conditions(findings: PlacementFindings) -> list[Block]:
     sizes = sorted({int(size) for condition in findings.conditions for size in condition.best})
     rows = [
         [
-            Stack(c.name, f"{c.kind}, {c.clips} clips{_stability_note(c)}"),
+            Stack(c.name, f"{c.kind}, {count_noun(c.clips, 'unit')}{_stability_note(c)}"),
             *(set_name(c.best[str(size)]) if str(size) in c.best else "" for size in sizes),
         ]
         for c in findings.conditions
@@ -263,7 +263,7 @@ def _agreement_table(findings: PlacementFindings, pairs: Sequence[RankAgreement]
     ]
     caption = (
         "A change of order is significant if the change of the difference between the two sets is: sign flips over "
-        "clips, corrected for all pairs of sets (Holm 1979)."
+        "units, corrected for all pairs of sets (Holm 1979)."
     )
     return DataTable(["pair", "Kendall's tau", "sets", "changes of order"], rows, caption=caption, label="agreement")
 

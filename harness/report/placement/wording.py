@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
-from harness.compare.units import count_clips
+from harness.compare.units import count_units
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_share
 from harness.report.kit.text import list_first
@@ -25,7 +25,7 @@ _SET_NOUNS = {1: "place", 2: "pair", 3: "triple"}
 _SIDES = ("left_", "right_")
 _IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
 TIE_NOTE = (
-    "A tied set is not significantly worse than the first one: sign-flip test over clips, corrected for all "
+    "A tied set is not significantly worse than the first one: sign-flip test over units, corrected for all "
     "comparisons (Holm 1979). Intervals are not corrected, so that the interval of a tied set may exclude zero."
 )
 """What tables and charts mean by a tie."""
@@ -72,9 +72,8 @@ def sentence(findings: PlacementFindings) -> str:
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
-    clips = {clip for tried in findings.tried for clip in tried.errors}
-    counted = count_clips(clips)
-    chosen = [f"Sets were chosen on {counted}."] if counted != count_noun(len(clips), "clip") else []
+    units = {unit for tried in findings.tried for unit in tried.errors}
+    chosen = [f"Sets were chosen on {count_units(units)}."] if units else []
     if findings.sizes:
         return " ".join([*(_size_sentence(findings, size) for size in findings.sizes), *chosen])
     best = smallest_sufficient_set(findings)
@@ -84,7 +83,7 @@ def sentence(findings: PlacementFindings) -> str:
     sentences = [f"{_recommendation(findings, best)}: {set_name(best.stations)}, {error}."]
     if best.held_out is not None:
         held_out = held_out_error(findings, best)
-        sentences.append(f"On {count_noun(best.held_out_clips, 'held-out clip')} the error is {held_out}.")
+        sentences.append(f"On {count_noun(best.held_out_clips, 'held-out unit')} the error is {held_out}.")
     if best.ties:
         sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
         sentences.append(f"{sets} tied with it.")
@@ -107,16 +106,17 @@ def _size_sentence(findings: PlacementFindings, size: int) -> str:
 def _size_error(findings: PlacementFindings, best: BestSet) -> str:
     """The error on held-out clips; where there are none, the one that favours the set."""
     if best.held_out is not None:
-        return f"{held_out_error(findings, best)} on {count_noun(best.held_out_clips, 'held-out clip')}"
+        return f"{held_out_error(findings, best)} on {count_noun(best.held_out_clips, 'held-out unit')}"
     return f"{set_error(findings, findings.of(best.stations))} on the clips on which it was chosen"
 
 
 def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
-    """Which sets of the same size are tied with the best, or that the clips are too few to tell."""
+    """Which sets of the same size are tied with the best, or that the units are too few to tell."""
     noun = _SET_NOUNS.get(len(best.stations), "set")
-    clips = len(measured_errors(tried)) if (tried := findings.of(best.stations)) else 0
-    if findings.power is not None and clips < findings.power.least_clips and len(best.ties) == best.of - 1 > 0:
-        return f"{count_noun(clips, 'clip')} cannot tell it from the other {best.of - 1:,} {noun}s"
+    units = len(measured_errors(tried)) if (tried := findings.of(best.stations)) else 0
+    if findings.power is not None and units < findings.power.least_clips and len(best.ties) == best.of - 1 > 0:
+        few = f"{count_noun(units, 'unit')} cannot tell it from the other {best.of - 1:,} {noun}s"
+        return f"{few} ({findings.power.least_clips} might)"
     if not best.ties:
         return f"no other {noun} is tied with it" if best.of > 1 else f"no other {noun} was tried"
     if best.of == 2:
@@ -130,19 +130,19 @@ def _number_word(number: int) -> str:
 
 
 def power_sentences(power: StatisticalPower) -> list[str]:
-    """What the clips of a study can show, and how long more of them take."""
-    clips, sets = count_noun(power.clips, "clip"), count_noun(power.sets, "set")
+    """What the units of a study can show, and how long more of them take."""
+    units, sets = count_noun(power.clips, "unit"), count_noun(power.sets, "set")
     took = f" The study takes {format_duration(power.duration_s)}." if power.duration_s is not None else ""
     if power.sets < 2:
-        return [f"One set is measured on {clips}: nothing is compared.{took}"]
+        return [f"One set is measured on {units}: nothing is compared.{took}"]
     if power.clips < power.least_clips:
         more = f" ({format_duration(power.least_duration_s)})" if power.least_duration_s is not None else ""
-        first = f"{clips} cannot show any difference between {sets}, {power.least_clips} might{more}.{took}"
+        first = f"{units} cannot show any difference between {sets}, {power.least_clips} might{more}.{took}"
     elif power.shown is None:
-        first = f"{clips} can show a difference between {sets}; how large it must be is unknown.{took}"
+        first = f"{units} can show a difference between {sets}; how large it must be is unknown.{took}"
     else:
         first = (
-            f"{clips} can show a difference of {Interval(power.shown, unit=power.unit)} between two of {sets} "
+            f"{units} can show a difference of {Interval(power.shown, unit=power.unit)} between two of {sets} "
             f"(power 80 %, p corrected for {power.sets - 1:,} comparisons).{took}"
         )
     if power.needed_clips is None or power.wanted is None or power.needed_clips <= power.clips:
@@ -150,7 +150,7 @@ def power_sentences(power: StatisticalPower) -> list[str]:
     more = f", about {format_duration(power.needed_duration_s)}" if power.needed_duration_s is not None else ""
     second = (
         f"A difference of {Interval(power.wanted, unit=power.unit)}, a tenth of the error, would need about "
-        f"{power.needed_clips:,} clips{more}. Spread and time are those of the first {power.pilot_sets} sets."
+        f"{power.needed_clips:,} units{more}. Spread and time are those of the first {power.pilot_sets} sets."
     )
     return [first, second]
 
@@ -171,9 +171,10 @@ def _recommendation(findings: PlacementFindings, best: BestSet) -> str:
     count = len(best.stations)
     most = max(len(other.stations) for other in findings.best)
     noun = count_noun(count, "station")
-    clips = max((len(measured_errors(tried)) for tried in findings.tried), default=0)
-    if clips < MIN_UNITS:
-        return f"The lowest error was measured with {noun}, but {count_noun(clips, 'clip')} are too few to compare sets"
+    units = max((len(measured_errors(tried)) for tried in findings.tried), default=0)
+    if units < MIN_UNITS:
+        few = f"at least {MIN_UNITS} units are needed to compare sets, instead of {units}"
+        return f"The lowest error was measured with {noun}, but {few}"
     if count == most:
         return f"Of 1 to {most} stations, {count} have the lowest error" if count > 1 else "One station"
     return f"{noun} {'is' if count == 1 else 'are'} as good as up to {most}"
@@ -193,7 +194,7 @@ def smallest_sufficient_set(findings: PlacementFindings) -> BestSet | None:
 
 
 def _is_worse(tried: StationSetResult, top: StationSetResult, sign: float) -> bool:
-    """Whether the whole paired interval is on the worse side of `top`; with too few clips a set counts as worse."""
+    """Whether the whole paired interval is on the worse side of `top`; with too few units a set counts as worse."""
     difference = compare_paired(tried.errors, top.errors)
     if difference.low is None or difference.high is None:
         return True
@@ -201,8 +202,8 @@ def _is_worse(tried: StationSetResult, top: StationSetResult, sign: float) -> bo
 
 
 def measured_errors(tried: StationSetResult) -> dict[str, float]:
-    """Clip -> error, for the clips on which it was measured."""
-    return {clip: value for clip, value in tried.errors.items() if value is not None}
+    """Unit -> error, for the units on which it was measured."""
+    return {unit: value for unit, value in tried.errors.items() if value is not None}
 
 
 def set_error(findings: PlacementFindings, tried: StationSetResult | None) -> Interval:
@@ -222,7 +223,7 @@ def search_gain_sentence(search: PlacementSearch, unit: str) -> str:
     if search.held_out is None:
         return ""
     gain = Interval.of(search.held_out, search.held_out_low, search.held_out_high, unit, signed=True)
-    return f"On {count_noun(search.held_out_clips, 'held-out clip')} the last set lowers the error by {gain}"
+    return f"On {count_noun(search.held_out_clips, 'held-out unit')} the last set lowers the error by {gain}"
 
 
 def ranks_by_condition(findings: PlacementFindings, most: int) -> list[tuple[StationNames, list[int | None]]]:
@@ -248,7 +249,7 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     first = pair.changed[0]
     before, after = (Interval(difference, signed=True).number for difference in first.differences)
     tested = first.significant is not None
-    shown = f", {pair.significant_changes:,} significantly" if tested else " (too few clips or too many sets to test)"
+    shown = f", {pair.significant_changes:,} significantly" if tested else " (too few units or too many sets to test)"
     verb = "changes its" if pair.changes == 1 else "change their"
     example = f"{set_name(first.first)} against {set_name(first.second)}, {before} to {after} {findings.unit}".rstrip()
     return f"{pair.changes:,} of {pairs:,} pairs {verb} order{shown}: first {example}"

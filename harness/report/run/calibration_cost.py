@@ -1,11 +1,12 @@
-"""How much calibration errors increase each method's error, paired by clip; nothing unless calibration is varied."""
+"""How much calibration errors increase each method's error, paired by unit; nothing unless calibration is varied."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from harness.compare.paired_statistics import compare_paired
+from harness.compare.paired_statistics import PairedDifference, compare_paired
+from harness.compare.units import Sampling, average_units
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, format_fixed
 from harness.core.text_table import Table
@@ -18,12 +19,12 @@ _METRICS = (("joint angle [deg]", "joint_angle_mean_deg", 2), ("mpjpe_pa [mm]", 
 """Title, metric and decimals; positions are Procrustes-aligned, which leaves out the error of the room."""
 _TITLE = "cost of calibration"
 _CAPTION = (
-    "error with exact calibration, then for each other calibration the mean increase over clips and its paired 95 % "
+    "error with exact calibration, then for each other calibration the mean increase over units and its paired 95 % "
     "interval (docs/studies.md)"
 )
 
 
-def cost_table(cells: Sequence[Mapping[str, Any]]) -> Table | None:
+def cost_table(cells: Sequence[Mapping[str, Any]], sampling: Sampling) -> Table | None:
     """A row for each method and metric; None unless both exact and other calibrations were measured."""
     groups: dict[tuple[str, ...], dict[str, list[Mapping[str, Any]]]] = {}
     for cell in cells:
@@ -43,29 +44,28 @@ def cost_table(cells: Sequence[Mapping[str, Any]]) -> Table | None:
         for title, metric, decimals in _METRICS:
             by_clip = {kind: {str(cell["clip"]): cell[metric] for cell in group.get(kind, [])} for kind in group}
             exact = by_clip.get(_EXACT, {})
-            errors = [error for error in exact.values() if error is not None]
-            mean = format_fixed(float(np.mean(errors)) if errors else None, decimals)
-            costs = [_format_cost(by_clip.get(kind, {}), exact) for kind in kinds]
+            errors = average_units({clip: error for clip, error in exact.items() if error is not None}, sampling)
+            mean = format_fixed(float(np.mean(list(errors.values()))) if errors else None, decimals)
+            costs = [_format_cost(compare_paired(by_clip.get(kind, {}), exact, sampling)) for kind in kinds]
             rows.append([*(names[i] for i in shown), title, mean, *costs])
     return Table(head, rows, text_columns=len(head))
 
 
 def text(summary: Mapping[str, Any]) -> list[str]:
     """The table as lines for the terminal."""
-    table = cost_table(summary.get("cells", []))
+    table = cost_table(summary.get("cells", []), Sampling.of_summary(summary))
     return [f"{_TITLE}: {_CAPTION}", "", *table.lines(), ""] if table else []
 
 
-def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
+def section(cells: Sequence[Mapping[str, Any]], sampling: Sampling) -> Markup:
     """The table for the page."""
-    table = cost_table(cells)
+    table = cost_table(cells, sampling)
     caption = join(tag("b", _TITLE.capitalize()), f": {_CAPTION}.")
     return html_table(table, caption, label=_TITLE) if table else Markup()
 
 
-def _format_cost(errors: Mapping[str, float | None], exact: Mapping[str, float | None]) -> str:
-    increase = compare_paired(errors, exact)
+def _format_cost(increase: PairedDifference) -> str:
     if increase.mean is None:
         return NOT_MEASURED
     number = Interval.of(increase.mean, increase.low, increase.high, signed=True)
-    return str(number) if increase.low is not None else f"{number} (too few clips)"
+    return str(number) if increase.low is not None else f"{number} ({increase.why})"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.units import count_clips
+from harness.compare.units import Sampling, count_clips
 from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_share
 from harness.report.kit.text import describe_motion_source, name_motion
@@ -91,7 +91,7 @@ def _motion(run: RunData) -> str:
     source = describe_motion_source(str(run.manifest.inputs.get("motion_source", "unknown")))
     clips = {str(row["clip"]) for row in run.cells}
     behaviours = ", ".join(name.replace("_", " ") for name in run.behaviours)
-    return f"{source}; {behaviours}; {count_clips(clips, run.full_summary.get('performers'))}"
+    return f"{source}; {behaviours}; {count_clips(clips, Sampling.of_summary(run.full_summary))}"
 
 
 def _tracker(run: RunData) -> str:

@@ -1,10 +1,11 @@
-"""Errors at each bone: means over clips of the leader and of the control, on the body and as numbers."""
+"""Errors at each bone: means over units of the leader and of the control, on the body and as numbers."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from harness.compare.units import Sampling
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
@@ -36,10 +37,11 @@ JointMeans = Mapping[str, tuple[Floats, Floats]]
 """Series -> mean rotation error [deg] and position error [mm] of each clip, (clips, 22) in the order of BONE_ROWS."""
 
 
-def means_by_clip(traces: Sequence[Trace]) -> tuple[Floats, Floats]:
-    """Mean rotation error [deg] and position error [mm] over the scored frames of each clip, (clips, 22) in BONE_ROWS.
+def means_by_unit(traces: Sequence[Trace], sampling: Sampling) -> tuple[Floats, Floats]:
+    """Mean rotation error [deg] and position error [mm] of each unit of statistics, (units, 22) in BONE_ROWS.
 
-    Cells of the same clip are averaged first. Clips without a scored frame are left out.
+    The scored frames of a cell, the cells of a clip and the clips of a unit are averaged. Clips without a scored frame
+    are left out.
     """
     skeleton = standard_skeleton()
     bones = [skeleton.names[bone] for bone in hinged_bones(skeleton)]
@@ -50,14 +52,18 @@ def means_by_clip(traces: Sequence[Trace]) -> tuple[Floats, Floats]:
         if len(trace.rotation_deg):
             rows = (trace.rotation_deg.mean(axis=0)[rotations], trace.position_mm.mean(axis=0)[positions])
             by_clip.setdefault(trace.clip, []).append(rows)
-    means = np.array([np.mean(cells, axis=0) for cells in by_clip.values()]).reshape(-1, 2, len(BONE_ROWS))
+    by_unit: dict[str, list[Floats]] = {}
+    for clip, cells in by_clip.items():
+        by_unit.setdefault(sampling.unit_of(clip), []).append(np.mean(cells, axis=0))
+    means = np.array([np.mean(clips, axis=0) for clips in by_unit.values()]).reshape(-1, 2, len(BONE_ROWS))
     return means[:, 0], means[:, 1]
 
 
 def highlighted_means(run: RunData, highlights: Highlights) -> JointMeans:
     """The means of the leader and of the control; a series without a scored frame is left out."""
     shown = [name for name in (highlights.leader, highlights.control) if name]
-    means = {name: means_by_clip([trace for trace in run.traces if trace.series == name]) for name in shown}
+    sampling = Sampling.of_summary(run.full_summary)
+    means = {name: means_by_unit([trace for trace in run.traces if trace.series == name], sampling) for name in shown}
     return {name: of for name, of in means.items() if len(of[0])}
 
 
@@ -77,7 +83,7 @@ def body_chart(means: JointMeans) -> Chart:
     return draw_chart(
         "joints_body",
         "Error by joint",
-        "Mean over clips, seen from the front: the body's left side is on the right. Left: rotation of each bone "
+        "Mean over units, seen from the front: the body's left side is on the right. Left: rotation of each bone "
         "relative to its parent, at the joint between them. Right: position of each bone's far end. Point at a joint "
         f"for its value. Largest errors: {'; '.join(largest)}.",
         f"The body with a coloured disc at each joint for the error of {' and '.join(means)}. {'; '.join(largest)}.",
@@ -97,7 +103,7 @@ def joint_table(means: JointMeans) -> Markup:
         [label, *(format_number(float(column[n]), unit) for column, unit in zip(columns, units, strict=True))]
         for n, label in enumerate(BONE_ROWS.values())
     ]
-    caption = "Mean over clips: rotation error relative to the parent [deg], position error of the far end [mm]."
+    caption = "Mean over units: rotation error relative to the parent [deg], position error of the far end [mm]."
     return html_table(Table(head, rows), caption, label="error by joint")
 
 

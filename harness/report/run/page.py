@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from harness.compare.units import Sampling
 from harness.core.files import to_json_types
 from harness.core.number_format import format_number
 from harness.core.text_table import Table
@@ -158,7 +159,14 @@ def _sections(content: RunContent) -> list[Section]:
         ("Error distribution", "cdf", chart_figure(charts.distribution) if charts.distribution else nothing),
         ("Stated uncertainty", "sigma", _sigma_section(content)),
         ("Recovery", "recovery", recovery.section(run.summary)),
-        ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
+        (
+            "Calibration",
+            "calibration",
+            join(
+                calibration_errors.section(cells),
+                calibration_cost.section(cells, Sampling.of_summary(run.full_summary)),
+            ),
+        ),
         ("Coverage", "coverage", tables.coverage_tables(run)),
         ("Stream health", "health", tables.health_tables(run) if measured else nothing),
         ("All metrics", "metrics", _every_metric(run) if measured else nothing),

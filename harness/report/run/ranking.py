@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
-from harness.compare.units import Performers, count_clips
+from harness.compare.units import Sampling, count_clips
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.run.data import Row, lag_of, last_varied, series_name
 from harness.results.cell import varied_text
@@ -56,11 +56,11 @@ def group_values(
     }
 
 
-def best_series(values: GroupedValues, metric: str, performers: Performers | None) -> set[str]:
+def best_series(values: GroupedValues, metric: str, sampling: Sampling) -> set[str]:
     """The series that is better than every other one by a metric, for each group that has one."""
     if metric in UNRANKED_METRICS or metric not in MARGINS:
         return set()
-    return {best for of_group in values.values() if (best := find_best(of_group, metric, performers))}
+    return {best for of_group in values.values() if (best := find_best(of_group, metric, sampling))}
 
 
 def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanking | None]:
@@ -68,8 +68,8 @@ def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanki
 
     Where the scenario varies keys, the last combination of values counts.
     """
-    performers = summary.get("performers")
-    return {group: rank_methods(of, PRIMARY_METRIC, performers) for group, of in _measured_groups(summary).items()}
+    sampling = Sampling.of_summary(summary)
+    return {group: rank_methods(of, PRIMARY_METRIC, sampling) for group, of in _measured_groups(summary).items()}
 
 
 def _measured_groups(summary: Mapping[str, Any]) -> GroupedValues:
@@ -95,7 +95,7 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
             if measured:
                 found.append((f"{', '.join(measured)} share no measured sequence, so they are not ranked.", None))
             continue
-        sequences = count_clips(ranking.clips, summary.get("performers"), "sequence")
+        sequences = count_clips(ranking.clips, Sampling.of_summary(summary), "sequence")
         if len(ranking.clips) < max(len(of[PRIMARY_METRIC]) for of in measured.values()):
             sequences = f"the {sequences} that all methods were measured on"
         where = f"{sequences} of {motion}" + (

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.compare.units import Sampling
 from harness.core.number_format import count_noun, format_number, format_share
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, bullet_list, details, join, tag
@@ -62,7 +63,7 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Group
     for column in values:
         by_name = {name: statistics[name, column] for name in run.series if (name, column) in statistics}
         counts[column] = max((s["sequences"] for s in by_name.values()), default=0)
-        best[column] = best_series(values[column], metric, run.full_summary.get("performers"))
+        best[column] = best_series(values[column], metric, Sampling.of_summary(run.full_summary))
 
     def cell(name: str, column: str | None) -> Markup:
         text = summary_cell(statistics.get((name, column)), unit, column_n=counts[column])

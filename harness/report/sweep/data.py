@@ -8,7 +8,7 @@ import numpy as np
 from harness.compare.margins import GATED_METRICS
 from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import ClipValues
-from harness.compare.units import average_units
+from harness.compare.units import Sampling, average_units
 from harness.core.arrays import Bools, Floats, Ints
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -59,8 +59,8 @@ class SweepData:
     """Lag of the method of each series [frames]; methods with different lags are never ranked together."""
     clips: tuple[str, ...]
     """Names as "scenario: clip", because clips of the same name may differ between scenarios."""
-    clip_performers: Mapping[str, str] | None
-    """Performer of each clip whose performer is known; None in sweeps of versions that did not store them."""
+    sampling: Sampling
+    """What is a unit of statistics."""
     keys: tuple[VariedKey, ...]
     scenario_of: Ints
     """(N,) index into `scenarios`."""
@@ -114,7 +114,7 @@ class SweepData:
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
         low, high = None, None
         if with_interval:
-            by_unit = average_units(self.clip_values(selected, (metric,))[metric], self.clip_performers)
+            by_unit = average_units(self.clip_values(selected, (metric,))[metric], self.sampling)
             if len(by_unit) >= MIN_UNITS:
                 low, high = mean_interval(np.array(list(by_unit.values())))
         return Statistic(float(means.mean()), len(means), sd, low, high)

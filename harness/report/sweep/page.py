@@ -214,7 +214,7 @@ def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]])
 
     def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
         values = {str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}
-        return find_best(values, metric, sweep.clip_performers)
+        return find_best(values, metric, sweep.sampling)
 
     # The gated metrics are read only where the lines of this metric alone leave a best row.
     candidates = [cells for cells in groups.values() if best(cells, (metric,))]

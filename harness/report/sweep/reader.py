@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.compare.units import BY_NAME, Sampling
 from harness.core.arrays import Ints
 from harness.core.estimate import name_with_lag
 from harness.core.training_data import training_note
@@ -38,7 +39,7 @@ def read_sweep(out: Path) -> SweepData:
             planned=counts.planned,
             failures=failures,
             command=str(facts.get("command", "")),
-            clip_performers=manifest.performers,
+            sampling=Sampling(manifest.performers, manifest.unit),
             training_data=manifest.training_data,
         )
 
@@ -51,13 +52,13 @@ def collect_cells(
     failures: Mapping[str, str],
     command: str = "",
     lags: Iterable[int] | None = None,
-    clip_performers: Mapping[str, str] | None = None,
+    sampling: Sampling = BY_NAME,
     training_data: Mapping[str, str] | None = None,
 ) -> SweepData:
     """The data of a sweep from its cells, each a row of the index's columns.
 
-    `lags` has the lag of the method of each cell [frames], by default 0. `clip_performers` and `training_data`
-    are those of the manifest.
+    `lags` has the lag of the method of each cell [frames], by default 0. `sampling` and `training_data` are
+    those of the manifest.
     """
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
@@ -83,7 +84,7 @@ def collect_cells(
         performers=tuple(group[-1] for group in groups.names),
         lags=tuple(lag_of_group[code] for code in range(len(groups.names))),
         clips=tuple(clips.names),
-        clip_performers=clip_performers,
+        sampling=sampling,
         keys=keys,
         scenario_of=scenario_of,
         series_of=series_of,

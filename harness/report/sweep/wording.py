@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.compare.margins import GATED_METRICS
 from harness.compare.ranking import ClipValues, rank_methods, split_by_lag
-from harness.compare.units import count_clips
+from harness.compare.units import Sampling, count_clips
 from harness.core.arrays import Floats
 from harness.core.number_format import format_change_percent, format_number
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
@@ -52,17 +52,15 @@ def _best(sweep: SweepData) -> str:
         return "Nothing was measured." if len(sweep) else ""
     lags = dict(zip(sweep.series, sweep.lags, strict=True))
     parts = [(lag, values) for group in groups.values() for lag, values in split_by_lag(group, lags).items()]
-    sentences = [
-        _best_of(values, lag, sweep.clip_performers) for lag, values in sorted(parts, key=lambda part: part[0])
-    ]
+    sentences = [_best_of(values, lag, sweep.sampling) for lag, values in sorted(parts, key=lambda part: part[0])]
     return " ".join([*sentences, *([LAG_NOTE] if len({lag for lag, _ in parts}) > 1 else [])])
 
 
-def _best_of(values: Mapping[str, ClipValues], lag: int, performers: Mapping[str, str] | None) -> str:
-    ranking = rank_methods(values, PRIMARY_METRIC, performers)
+def _best_of(values: Mapping[str, ClipValues], lag: int, sampling: Sampling) -> str:
+    ranking = rank_methods(values, PRIMARY_METRIC, sampling)
     if ranking is None:
         return f"{list_first(list(values))} share no measured clip, so they are not ranked."
-    where = count_clips(ranking.clips, performers) + (f", with {name_lag(lag)}" if lag else "")
+    where = count_clips(ranking.clips, sampling) + (f", with {name_lag(lag)}" if lag else "")
     return describe_ranking(ranking, where, _format_error)
 
 

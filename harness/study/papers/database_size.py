@@ -15,7 +15,7 @@ from harness.study.papers.leave_one_out import (
     differences,
 )
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, errors_by_clip, mean_bars, mean_table
+from harness.study.papers.tables import RMS, errors_by_unit, mean_bars, mean_table
 
 SIZE_RUN, ALL_RUN, KEY = "database_size", "one_database", "motion.example_share"
 METHODS = (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, LOCAL_PCA, "ik")
@@ -52,7 +52,7 @@ def database_size(study: PaperStudy) -> PaperExperiment:
         )
         title = f"Boxing, {INPUTS[inputs]}"
         tables.append(mean_table(f"{title} [deg]", "share of the database", groups, root_groups))
-        caption = "Mean joint-angle error over clips. Every smaller share is a part of every larger one."
+        caption = "Mean joint-angle error over units. Every smaller share is a part of every larger one."
         figures.append(mean_bars(f"{title}: error against the share of the database", "deg", groups, caption=caption))
     return PaperExperiment(
         name="database_size",
@@ -86,7 +86,7 @@ def one_database(study: PaperStudy) -> PaperExperiment:
             for name, run in (("own", whole_run(study)), ("all", ALL_RUN)):
                 where = {"behaviour": behaviour, "inputs": "pos+ori", "performer": "known"}
                 sides[-1][f"{behaviour_label(behaviour)}, database of {_DATABASES[name]}"] = {
-                    method: errors_by_clip(study.rows(run, method=method, **where), metric) for method in METHODS
+                    method: errors_by_unit(study.rows(run, method=method, **where), metric) for method in METHODS
                 }
     for behaviour in behaviours:
         label = behaviour_label(behaviour)
@@ -97,7 +97,7 @@ def one_database(study: PaperStudy) -> PaperExperiment:
             claims.append(claim_noninferior(text, *reversed(sides_of), published="scales up well", reading=reading))
             text = f"{label}: {method} errs less with a database of the behaviour than with one of all behaviours"
             claims.append(claim_lower_error(text, *sides_of, kind="derived", reading=reading))
-    caption = "Mean joint-angle error over clips, positions and orientations."
+    caption = "Mean joint-angle error over units, positions and orientations."
     return PaperExperiment(
         name="one_database",
         title="One database for each behaviour, or one of all behaviours",
@@ -122,10 +122,10 @@ def whole_run(study: PaperStudy) -> str:
 
 
 def _errors_by_share(study: PaperStudy, method: str, inputs: str, metric: str) -> dict[str, dict[str, float]]:
-    """Share in percent -> clip -> error, the whole database last."""
+    """Share in percent -> unit -> error, the whole database last."""
     where = {"method": method, "inputs": inputs, "behaviour": "boxing", "performer": "known"}
     errors = {
-        f"{100.0 * share:g}": errors_by_clip(study.rows(SIZE_RUN, varied={KEY: share}, **where), metric)
+        f"{100.0 * share:g}": errors_by_unit(study.rows(SIZE_RUN, varied={KEY: share}, **where), metric)
         for share in study.runs[SIZE_RUN].vary[KEY]
     }
-    return {**errors, "100": errors_by_clip(study.rows(whole_run(study), **where), metric)}
+    return {**errors, "100": errors_by_unit(study.rows(whole_run(study), **where), metric)}

@@ -10,7 +10,7 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, CellRow, errors_by_clip, mean_table
+from harness.study.papers.tables import RMS, CellRow, errors_by_unit, mean_table
 
 KERNEL_CCA, WEIGHTED_BLEND = "kernel_cca", "weighted_blend"
 KERNEL_CCA_LITERAL, WEIGHTED_BLEND_LITERAL = "kernel_cca:literal", "weighted_blend:literal"
@@ -28,7 +28,7 @@ _CONSTANTS_NOTE = (
     "methods as printed have the paper's k = 8."
 )
 _SYNTHETIC_NOTES = (
-    "The motion is synthetic: takes of eight performers, twelve for each experiment with claims and eight for "
+    "The motion is synthetic: a take of each of twelve performers for each experiment with claims, and of eight for "
     "`five_trackers`.",
     "Databases are cut to the paper's size: 7,200 frames of boxing, 4,272 of table tennis, 1,320 of walking, from "
     "other takes of all tested performers.",
@@ -36,7 +36,7 @@ _SYNTHETIC_NOTES = (
 _REAL_NOTES = (
     "The paper's recordings are not public; other clips are used. Walking is learnt from 1,314 frames of two people "
     "and tested on other takes of them; new people are listed separately. Several test takes were examples, never test "
-    "takes, while constants were chosen.",
+    "takes, while constants were chosen. Known performers are two, so that their clips are the units.",
     "Boxing is tested on twelve blocks of two bouts; the rest of the bouts are the examples. These are about 4,000 "
     "frames instead of 7,233, which the library lacks. Blocks of one bout are not independent.",
     "Two clips of swordplay by one performer stand in for table tennis, which the library lacks. They are tested on "
@@ -67,7 +67,7 @@ def five_stations(study: PaperStudy) -> PaperExperiment:
             continue
         tables += method_tables(shown, rows, _ROOT_RELATIVE_METRICS)
         gains += list(_gains(shown, rows))
-    columns = ("behaviour", "performers", "calibration", "against", "gain of kernel_cca [deg]", "95 %", "clips")
+    columns = ("behaviour", "performers", "calibration", "against", "gain of kernel_cca [deg]", "95 %", "units")
     return PaperExperiment(
         name="five_trackers",
         title="Five stations, full databases",
@@ -114,11 +114,11 @@ def performers(rows: Iterable[CellRow]) -> tuple[str, ...]:
 
 
 def errors_by_method(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
-    """Method -> clip -> error, of rows that differ in nothing else."""
+    """Method -> unit -> error, of rows that differ in nothing else."""
     by_method: dict[str, list[CellRow]] = {}
     for row in rows:
         by_method.setdefault(row["method"], []).append(row)
-    return {method: errors_by_clip(each, metric) for method, each in by_method.items()}
+    return {method: errors_by_unit(each, metric) for method, each in by_method.items()}
 
 
 def method_tables(title: str, rows: Sequence[CellRow], metrics: Mapping[str, str]) -> Iterator[FindingsTable]:
@@ -145,4 +145,4 @@ def _gains(behaviour: str, rows: Sequence[CellRow]) -> Iterator[tuple[str, ...]]
             gain = compare_paired(errors.get(other, {}), errors.get(KERNEL_CCA, {}))
             mean = "not measured" if gain.mean is None else f"{gain.mean:+.2f}"
             ends = "" if gain.low is None else f"{gain.low:+.2f} to {gain.high:+.2f}"
-            yield behaviour, performer, calibration, other, mean, ends, str(len(gain.clips))
+            yield behaviour, performer, calibration, other, mean, ends, str(len(gain.units))

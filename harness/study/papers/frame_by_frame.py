@@ -20,7 +20,7 @@ def frame_by_frame(study: PaperStudy) -> PaperExperiment:
         motion = study.runs[RUN].motion
         where = {"behaviour": behaviour, "inputs": INPUTS, "clip": motion.test[motion.behaviours.index(behaviour)]}
         title = f"{behaviour}, {where['clip']}"
-        cells = {cell.method: cell for cell in study.cells(RUN, **where)}
+        cells = {cell.method: cell for _, cell in study.cells(RUN, **where)}
         if cells:
             lines = error_lines(
                 title, {m: cells[m] for m in METHODS if m in cells}, caption="Joint angles, each frame."
@@ -56,7 +56,7 @@ def frame_by_frame(study: PaperStudy) -> PaperExperiment:
         ),
         figures=tuple(figures),
         runs=(RUN,),
-        notes=("This is a picture: one sequence decides nothing. The experiments above test the order over clips.",),
+        notes=("This is a picture: one sequence decides nothing. The experiments above test the order over units.",),
     )
 
 

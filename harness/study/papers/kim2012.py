@@ -1,7 +1,7 @@
 """Reproduction of Kim, Seol and Lee 2012: every experiment (docs/papers.md B; scenarios/papers/kim2012).
 
 The criteria of the claims were fixed before any run. The paper prints no errors as numbers. Its orders, and the sets
-that it calls suitable, are tested by intervals over clips.
+that it calls suitable, are tested by intervals over units.
 """
 
 from functools import partial

@@ -27,7 +27,7 @@ from harness.study.papers.other_approaches import other_approaches
 from harness.study.papers.paper import Paper
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import LIU2011, compare_speed
-from harness.study.papers.tables import RMS, errors_by_clip, errors_by_joint_group, mean_bars, mean_table
+from harness.study.papers.tables import RMS, errors_by_joint_group, errors_by_unit, mean_bars, mean_table
 
 PUBLISHED_DEG = {"pos+ori": 1.25, "pos+torso_ori": 2.25, "pos": 2.52, "mixed": 3.27}
 _READINGS: dict[str, Reading] = {DYNAMIC_MAP_LITERAL: "as printed", DYNAMIC_MAP: "ours", DYNAMIC_MAP_WINDOW: "ours"}
@@ -48,7 +48,7 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
     errors, roots = (
         {
             method: {
-                i: errors_by_clip(study.rows(run, behaviour="boxing", method=method, inputs=i), metric)
+                i: errors_by_unit(study.rows(run, behaviour="boxing", method=method, inputs=i), metric)
                 for i, run in runs.items()
             }
             for method in (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, DYNAMIC_MAP_WINDOW)
@@ -96,7 +96,7 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
         "Error by inputs",
         "deg",
         groups,
-        caption="Mean joint-angle error over clips.",
+        caption="Mean joint-angle error over units.",
         published={DYNAMIC_MAP: tuple(PUBLISHED_DEG.values())},
     )
     blocks = (

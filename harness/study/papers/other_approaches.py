@@ -7,7 +7,7 @@ from harness.results.findings import PaperExperiment
 from harness.study.papers.database_size import OWN, whole_run
 from harness.study.papers.leave_one_out import DYNAMIC_MAP_LITERAL, behaviour_label, differences
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, errors_by_clip, mean_bars, mean_table
+from harness.study.papers.tables import RMS, errors_by_unit, mean_bars, mean_table
 
 RUN = "other_approaches"
 OTHERS = {"best_match+ik": "interpolation generalises better", "kernel_ridge+ik": "local models are better"}
@@ -28,7 +28,7 @@ def other_approaches(study: PaperStudy) -> PaperExperiment:
     sides = tuple(
         {
             behaviour_label(behaviour): {
-                method: errors_by_clip(
+                method: errors_by_unit(
                     study.rows(run, behaviour=behaviour, method=method, inputs="pos+ori", performer="known"), metric
                 )
                 for run, methods in ((whole_run(study), tuple(OWN)), (RUN, (*OTHERS, GRAPH)))
@@ -58,7 +58,7 @@ def other_approaches(study: PaperStudy) -> PaperExperiment:
         )
         for label, errors in sides[0].items()
     ]
-    caption = "Mean joint-angle error over clips, positions and orientations."
+    caption = "Mean joint-angle error over units, positions and orientations."
     return PaperExperiment(
         name="other_approaches",
         title="Best match, a global model, and the neighbour graph",

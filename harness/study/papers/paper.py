@@ -109,7 +109,7 @@ def reproduce(
         for done, (name, evaluate) in enumerate(paper.experiments.items()):
             progress(name, cells + done, planned)
             try:
-                experiments.append(_with_failures(evaluate(study), study))
+                experiments.append(_with_notes(evaluate(study), study))
             except (OSError, SystemFault):
                 raise
             except Exception as error:  # the other experiments are still evaluated
@@ -139,11 +139,12 @@ def correct_experiments(experiments: Sequence[PaperExperiment]) -> tuple[PaperEx
     return tuple(replace(each, claims=tuple(islice(claims, len(each.claims)))) for each in experiments)
 
 
-def _with_failures(experiment: PaperExperiment, study: PaperStudy) -> PaperExperiment:
-    """Add a note for each failed cell of the runs that an experiment uses."""
+def _with_notes(experiment: PaperExperiment, study: PaperStudy) -> PaperExperiment:
+    """Add notes on the units of the runs that an experiment uses, and on each of their failed cells."""
+    units = [f"Units of the statistics: {counted}."] if (counted := study.counted_units(experiment.runs)) else []
     failed = [
         f"FAILED {cell}: {text.strip().splitlines()[-1]}"
         for cell, text in study.failures.items()
         if cell.partition(":")[0] in experiment.runs
     ]
-    return replace(experiment, notes=(*experiment.notes, *failed))
+    return replace(experiment, notes=(*experiment.notes, *units, *failed))

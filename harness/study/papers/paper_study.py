@@ -4,13 +4,15 @@ The folder has study.json (the identity of the study), a folder for each run, an
 """
 
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
+from harness.compare.units import Sampling, count_units
 from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
@@ -43,16 +45,37 @@ class PaperStudy:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
 
         `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer, clip, varied.
+        A row also has the `unit` of its clip, and `unit_clips`: how many clips of that unit and behaviour were planned.
         """
-        summary, wanted = self.out / run / "summary.json", to_json_types(where)
+        wanted, rows = to_json_types(where), self.summary_rows(run)
+        if not rows:
+            return []
+        motion, sampling = self.runs[run].motion, Sampling(unit=self.runs[run].unit)
+        shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
+        planned = Counter(zip(map(sampling.unit_of, motion.test), shown, strict=True))
+        selected = (row for row in rows if all(row[name] == value for name, value in wanted.items()))
+        units = ((row, sampling.unit_of(row["clip"])) for row in selected)
+        return [{**row, "unit": unit, "unit_clips": planned[unit, row["behaviour"]]} for row, unit in units]
+
+    def summary_rows(self, run: str) -> list[dict[str, Any]]:
+        """All rows of the summary of a run, [] as in `rows`."""
+        summary = self.out / run / "summary.json"
         if run not in self.runs or run in self.failures or not summary.is_file():
             return []
-        rows = _summary_rows(summary.parent, summary.stat().st_mtime_ns)
-        return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
+        return _summary_rows(summary.parent, summary.stat().st_mtime_ns)
 
-    def cells(self, run: str, **where: Any) -> Iterator[Cell]:
-        """Finished cells selected as in `rows`, with the errors of every frame and joint, read one at a time."""
-        return (read_cell(cell_folder(self.out / run, row["key"])) for row in self.rows(run, **where))
+    def cells(self, run: str, **where: Any) -> Iterator[tuple[dict[str, Any], Cell]]:
+        """Rows selected as in `rows`, each with its cell: the errors of every frame and joint, read one at a time."""
+        return ((row, read_cell(cell_folder(self.out / run, row["key"]))) for row in self.rows(run, **where))
+
+    def counted_units(self, runs: Iterable[str]) -> str:
+        """The units of the statistics of some runs in words, such as "boxing_inputs: 12 performers"."""
+        counted = {
+            name: count_units(map(Sampling(unit=run.unit).unit_of, run.motion.test))
+            for name, run in self.runs.items()
+            if name in runs
+        }
+        return "; ".join(f"{name}: {words}" for name, words in counted.items())
 
     def cached_measurement(self, name: str, measure: Callable[[], Any]) -> Any:
         """Result of `measure` in JSON types, cached on disk until the source of the package changes.

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
+from harness.compare.units import Sampling, count_units
 from harness.core.object_state import describe_state
 from harness.core.split import ClipPart, allowed_frames
 from harness.experiment.cells import open_scenario_motion
@@ -24,7 +25,14 @@ def provenance_tables(study: PaperStudy) -> tuple[FindingsTable, ...]:
         ),
         FindingsTable(
             "Test clips and examples",
-            ("run", "behaviour", "test clips", "examples (without the test clip)", "frames of examples, at most"),
+            (
+                "run",
+                "behaviour",
+                "test clips",
+                "units",
+                "examples (without the test clip)",
+                "frames of examples, at most",
+            ),
             tuple(chain.from_iterable(_database_rows(study, scenario) for scenario in study.runs.values())),
         ),
         FindingsTable(
@@ -68,7 +76,15 @@ def _database_rows(study: PaperStudy, scenario: Scenario) -> Iterator[tuple[str,
         examples = [name for name in motion.examples if not same_behaviour or source.behaviour(name) == behaviour]
         frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in examples)
         count = motion.thin_to or round(motion.example_share * sum(frames))
-        yield scenario.name, behaviour, ", ".join(tested), f"{len(examples)}: {', '.join(examples)}", f"{count:,}"
+        units = count_units(map(Sampling(unit=scenario.unit).unit_of, tested))
+        yield (
+            scenario.name,
+            behaviour,
+            ", ".join(tested),
+            units,
+            f"{len(examples)}: {', '.join(examples)}",
+            f"{count:,}",
+        )
 
 
 def _example_duration_s(study: PaperStudy, scenario: Scenario, name: str) -> float:

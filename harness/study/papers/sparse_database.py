@@ -21,7 +21,7 @@ from harness.study.papers.five_stations import (
 )
 from harness.study.papers.leave_one_out import Order
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, error_lines, errors_by_clip, errors_by_joint_group, mean_bars, mean_table
+from harness.study.papers.tables import RMS, error_lines, errors_by_joint_group, errors_by_unit, mean_bars, mean_table
 
 DATABASE_FRAMES = {"table_tennis": 31, "walking": 43}
 ONE_DATABASE_FRAMES = sum(DATABASE_FRAMES.values())
@@ -70,7 +70,7 @@ def sparse(study: PaperStudy) -> PaperExperiment:
             known = [row for row in rows if row["performer"] == performers(rows)[0]]
             longest = max(known, key=lambda row: int(row["frames_matched"]))["clip"]
             cells = study.cells(run, clip=longest)
-            curves = {cell.method: cell for cell in cells if cell.method in METHODS}
+            curves = {cell.method: cell for _, cell in cells if cell.method in METHODS}
             title = f"{shown}: error over time in {longest}, the longest take"
             figures.append(error_lines(title, curves, caption="Mean error of the 48 hinges in every frame."))
     return PaperExperiment(
@@ -116,7 +116,7 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
         {
             m: {
                 **errors_by_joint_group(study.cells(run, method=m + option), ARM_AND_SPINE, metric),
-                "whole body": errors_by_clip(study.rows(run, method=m + option), metric),
+                "whole body": errors_by_unit(study.rows(run, method=m + option), metric),
             }
             for pair in pairs.values()
             for m in pair
@@ -151,7 +151,7 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
         differences=(
             "Errors of joint groups over twelve takes or blocks are compared; the paper shows single frames.",
             *(
-                ("Two of the eight performers (p3, p6) are left-handed and hold the bat in the left hand.",)
+                ("Two of the twelve performers (p3, p6) are left-handed and hold the bat in the left hand.",)
                 if study.motion == "builtin"
                 else ()
             ),

@@ -1,11 +1,10 @@
 """Kim et al. 2012, Fig. 3: comparison of sets of stations, and reconstruction from a single station."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from harness.compare.claims import Errors, claim_lower_error
 from harness.results.benchmark_statement import BenchmarkStatement, Reading
-from harness.results.cell import Cell
 from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
@@ -26,7 +25,7 @@ from harness.study.papers.station_sets import (
     set_table,
     station_count_lines,
 )
-from harness.study.papers.tables import HINGE_GROUPS, RMS, errors_by_joint_group, mean_table
+from harness.study.papers.tables import HINGE_GROUPS, RMS, errors_by_joint_group, errors_by_unit, mean_table
 
 ALL_STATIONS, RIGHT_HAND = format_station_set(STATION_ABBREVIATIONS), "RH"
 PUBLISHED_SETS = {"walking": "RA+LA+PEL", "boxing": "RH+LH+PEL"}
@@ -93,7 +92,7 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
             ),
             *(
                 set_table(
-                    f"{b}, {METHODS[reading]}: all sets, mean ± sd, RMS over clips (clips)",
+                    f"{b}, {METHODS[reading]}: all sets, mean ± sd, RMS over units (units)",
                     errors[METRIC][b],
                     errors[RMS][b],
                     errors["mpjpe_mm"][b],
@@ -108,14 +107,14 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
                 ranked_bars(
                     f"{b}: mean joint-angle error of kernel_cca, by set of stations",
                     angles[b],
-                    f"The paper calls {PUBLISHED_SETS[b]} suitable. The intervals are those of the mean over clips.",
+                    f"The paper calls {PUBLISHED_SETS[b]} suitable. The intervals are those of the mean over units.",
                 )
                 for b in PUBLISHED_SETS
             ),
             station_count_lines(
                 "Error against the number of stations",
                 angles,
-                "Averaged over clips and over all sets of the same size.",
+                "Averaged over units and over all sets of the same size.",
             ),
         ),
         runs=tuple(f"sensors_{b}" for b in PUBLISHED_SETS),
@@ -199,14 +198,11 @@ def _body_part_table(behaviour: str, study: PaperStudy, run: str, sets: Sequence
     roots: dict[str, dict[str, Errors]] = {}
     stations = {format_station_set(row["stations"]): row["stations"] for row in study.rows(run)}
     for name in sets:
-        cells = list(study.cells(run, stations=stations.get(name, []), method=KERNEL_CCA))
+        where = {"stations": stations.get(name, []), "method": KERNEL_CCA}
+        cells = list(study.cells(run, **where))
         for side, metric in ((groups, METRIC), (roots, RMS)):
             for group, errors in errors_by_joint_group(cells, HINGE_GROUPS, metric).items():
                 side.setdefault(f"{group} [deg]", {})[name] = errors
         for metric, title in (("root_heading_deg", "root's heading [deg]"), ("root_position_mm", "root [mm]")):
-            groups.setdefault(title, {})[name] = _metric_by_clip(cells, metric)
+            groups.setdefault(title, {})[name] = errors_by_unit(study.rows(run, **where), metric)
     return mean_table(f"{behaviour}, {KERNEL_CCA}: error by body part", "body part", groups, roots)
-
-
-def _metric_by_clip(cells: Iterable[Cell], metric: str) -> dict[str, float]:
-    return {cell.clip: value for cell in cells if (value := cell.metrics[metric]) is not None}

@@ -16,7 +16,7 @@ from harness.compare.paired_statistics import (
 from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
-from harness.study.papers.tables import CellRow, errors_by_clip, format_mean, mean_sd
+from harness.study.papers.tables import CellRow, errors_by_unit, format_mean, mean_sd, number_of_units
 
 STATION_ABBREVIATIONS = {
     "right_hand": "RH",
@@ -29,7 +29,7 @@ STATION_ABBREVIATIONS = {
 _WITH_MORE = (4, 5)
 """Sizes of the sets that a suitable set of three is compared with."""
 ErrorsBySet = Mapping[str, Errors]
-"""Set of stations, such as "RH+LH+PEL" -> error by clip."""
+"""Set of stations, such as "RH+LH+PEL" -> error by unit."""
 
 
 def format_station_set(stations: Iterable[str]) -> str:
@@ -44,11 +44,11 @@ def count_stations(name: str) -> int:
 
 
 def errors_by_set(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
-    """Set -> clip -> error, of rows that differ only in clip and stations."""
+    """Set -> unit -> error, of rows that differ only in clip and stations."""
     by_set: dict[str, list[CellRow]] = {}
     for row in rows:
         by_set.setdefault(format_station_set(row["stations"]), []).append(row)
-    return {name: errors_by_clip(each, metric) for name, each in by_set.items()}
+    return {name: errors_by_unit(each, metric) for name, each in by_set.items()}
 
 
 def claim_best_of_size(behaviour: str, suitable: str, sets: ErrorsBySet, why: str = "") -> BenchmarkStatement:
@@ -131,9 +131,9 @@ def claim_most_movable(behaviour: str, ranges_deg: Mapping[str, float], sets: Er
 
 
 def _average(sides: Sequence[Errors]) -> dict[str, float]:
-    """Clip -> mean over several errors, for clips that all of them have."""
+    """Unit -> mean over several errors, for units that all of them have."""
     shared = set.intersection(*map(set, sides))
-    return {clip: float(np.mean([errors[clip] for errors in sides])) for clip in sorted(shared)}
+    return {unit: float(np.mean([errors[unit] for errors in sides])) for unit in sorted(shared)}
 
 
 def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> BenchmarkStatement:
@@ -146,13 +146,13 @@ def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> BenchmarkStateme
 
 
 def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> BenchmarkStatement:
-    """Claim that some clips are harder than others, tested by Welch's interval, since the clips are not paired."""
+    """Claim that some motion is harder than other motion, by Welch's interval, since the clips are not paired."""
     if not hard or not easy:
-        return BenchmarkStatement(text, "order", "not measured", "not run", "one side has no clips", unit="deg")
+        return BenchmarkStatement(text, "order", "not measured", "not run", "one side has no units", unit="deg")
     ours, fewest = f"{_mean_error(hard):.2f} against {_mean_error(easy):.2f} deg", min(len(hard), len(easy))
     difference = _mean_error(hard) - _mean_error(easy)
     if fewest < MIN_UNITS:
-        why = f"too few clips: {fewest}, of at least {MIN_UNITS}"
+        why = f"too few units: {fewest}, of at least {MIN_UNITS}"
         return BenchmarkStatement(text, "order", ours, "cannot tell", why, fewest, difference, unit="deg")
     welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False)
     interval = welch.confidence_interval(CONFIDENCE_LEVEL)
@@ -164,19 +164,19 @@ def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Be
 
 
 def average_by_size(sets: ErrorsBySet) -> dict[int, dict[str, float]]:
-    """Size -> clip -> error averaged over the sets of that size, for clips on which all of them were measured."""
+    """Size -> unit -> error averaged over the sets of that size, for units on which all of them were measured."""
     averages: dict[int, dict[str, float]] = {}
     for count in sorted({count_stations(name) for name in sets}):
         same_size = [errors for name, errors in sets.items() if count_stations(name) == count]
         shared = set.intersection(*(set(errors) for errors in same_size))
         averages[count] = {
-            clip: float(np.mean([e[clip] for e in same_size])) for clip in same_size[0] if clip in shared
+            unit: float(np.mean([e[unit] for e in same_size])) for unit in same_size[0] if unit in shared
         }
     return averages
 
 
 def ranked_bars(title: str, sets: ErrorsBySet, caption: str) -> BarChart:
-    """A bar for each set, the best first, with the 95 % interval of its mean where there are enough clips."""
+    """A bar for each set, the best first, with the 95 % interval of its mean where there are enough units."""
     order = sorted((name for name in sets if sets[name]), key=lambda name: _mean_error(sets[name]))
     enough = [np.array(list(sets[name].values())) if len(sets[name]) >= MIN_UNITS else None for name in order]
     ends = [(None, None) if values is None else mean_interval(values) for values in enough]
@@ -188,7 +188,7 @@ def ranked_bars(title: str, sets: ErrorsBySet, caption: str) -> BarChart:
         low={"kernel_cca": tuple(low for low, _ in ends)},
         high={"kernel_cca": tuple(high for _, high in ends)},
         horizontal=True,
-        caption=caption,
+        caption=f"{caption} {number_of_units(sets.values())}",
     )
 
 
@@ -197,7 +197,8 @@ def station_count_lines(title: str, behaviours: Mapping[str, ErrorsBySet], capti
     counts = {name: average_by_size(sets) for name, sets in behaviours.items()}
     sizes = sorted({n for each in counts.values() for n in each})
     series = {name: tuple(mean_sd(each.get(n, {}))[0] for n in sizes) for name, each in counts.items()}
-    return LineChart(title, "stations", "mean joint-angle error [deg]", tuple(map(float, sizes)), series, caption)
+    shown = f"{caption} {number_of_units(errors for each in counts.values() for errors in each.values())}"
+    return LineChart(title, "stations", "mean joint-angle error [deg]", tuple(map(float, sizes)), series, shown)
 
 
 def set_table(
@@ -224,5 +225,5 @@ def _ratio_text(ratio: float) -> str:
 
 
 def _mean_error(errors: Errors) -> float:
-    """Mean over clips; NaN without clips."""
+    """Mean over units; NaN without units."""
     return float(np.mean(list(errors.values()))) if errors else float("nan")

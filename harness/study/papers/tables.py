@@ -1,4 +1,4 @@
-"""Conversion of rows and cells of runs to errors by clip, tables and figures."""
+"""Conversion of rows and cells of runs to errors by unit, tables and figures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.results.cell import Cell
 from harness.results.expected_orders import METRIC
@@ -26,12 +27,13 @@ HINGE_GROUPS = {
 """Group -> bones; together they have the 48 hinges."""
 
 
-def errors_by_clip(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
-    """Clip -> error, of rows that differ only in the clip; clips without a measurement are left out.
+def errors_by_unit(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
+    """Unit of statistics -> mean error of its clips, of rows that differ only in the clip (see `PaperStudy.rows`).
 
-    BadInput for two rows of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
+    A unit of which a clip was not measured is left out, so that means of one unit can be paired. BadInput for two rows
+    of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
     """
-    errors: dict[str, float] = {}
+    errors: dict[str, tuple[CellRow, float | None]] = {}
     kinds: dict[str, Any] = {}
     for row in rows:
         for name in (*GROUP_KEYS, "behaviour"):
@@ -41,21 +43,29 @@ def errors_by_clip(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, f
                 )
         if row["clip"] in errors:
             raise BadInput(f"Two errors on {row['clip']} cannot be pooled.", "Select one value of what varies.")
-        if row[metric] is not None:
-            errors[row["clip"]] = float(row[metric])
-    return errors
+        errors[row["clip"]] = row, row[metric]
+    return _average(errors.values())
+
+
+def _average(values: Iterable[tuple[CellRow, float | None]]) -> dict[str, float]:
+    """Unit -> mean of the values of its clips, of units all of whose clips have one."""
+    of_unit: dict[tuple[str, int], list[float]] = {}
+    for row, value in values:
+        if value is not None:
+            of_unit.setdefault((row["unit"], row["unit_clips"]), []).append(value)
+    return {unit: float(np.mean(each)) for (unit, planned), each in of_unit.items() if len(each) == planned}
 
 
 def mean_sd(errors: Mapping[str, float]) -> tuple[float | None, float | None]:
-    """Mean and standard deviation over clips; None without clips, and no deviation for one clip."""
+    """Mean and standard deviation over units; None without units, and no deviation for one unit."""
     values = np.array(list(errors.values()))
     return float(values.mean()) if len(values) else None, float(values.std(ddof=1)) if len(values) > 1 else None
 
 
 def format_mean(errors: Mapping[str, float], decimals: int = 2, rms: Mapping[str, float] | None = None) -> str:
-    """Format mean, standard deviation over clips and number of clips, such as "1.23 ± 0.45 (8)".
+    """Format mean, standard deviation over units and number of units, such as "1.23 ± 0.45 (8)".
 
-    With `rms` (clip -> root mean square error) its mean over clips follows: "1.23 ± 0.45, RMS 1.98 (8)".
+    With `rms` (unit -> root mean square error) its mean over units follows: "1.23 ± 0.45, RMS 1.98 (8)".
     """
     mean, sd = mean_sd(errors)
     if mean is None:
@@ -66,7 +76,7 @@ def format_mean(errors: Mapping[str, float], decimals: int = 2, rms: Mapping[str
 
 
 ErrorGroups = Mapping[str, Mapping[str, Mapping[str, float]]]
-"""Group -> column -> error by clip."""
+"""Group -> column -> error by unit."""
 
 
 def mean_table(title: str, first_column: str, groups: ErrorGroups, rms: ErrorGroups | None = None) -> FindingsTable:
@@ -81,7 +91,14 @@ def mean_table(title: str, first_column: str, groups: ErrorGroups, rms: ErrorGro
         for group, each in groups.items()
     ]
     shown = "mean ± sd, RMS" if rms else "mean ± sd"
-    return FindingsTable(f"{title}: {shown} over clips (clips)", (first_column, *columns), tuple(rows))
+    return FindingsTable(f"{title}: {shown} over units (units)", (first_column, *columns), tuple(rows))
+
+
+def number_of_units(sides: Iterable[Mapping[str, float]]) -> str:
+    """A sentence on the numbers of units with an error, such as "12 units." or "5 to 13 units."; "" without any."""
+    counts = sorted({len(errors) for errors in sides} - {0})
+    several = f"{counts[0]} to " if len(counts) > 1 else ""
+    return f"{several}{count_noun(counts[-1], 'unit')}." if counts else ""
 
 
 def mean_bars(
@@ -93,9 +110,9 @@ def mean_bars(
     horizontal: bool = False,
     published: Mapping[str, tuple[float | None, ...]] | None = None,
 ) -> BarChart:
-    """Bar chart of group -> column -> errors by clip.
+    """Bar chart of group -> column -> errors by unit.
 
-    A column is a series, the spread a standard deviation over clips.
+    A column is a series, the spread a standard deviation over units.
     """
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
     figures = {column: [mean_sd(each.get(column, {})) for each in groups.values()] for column in columns}
@@ -106,7 +123,7 @@ def mean_bars(
         {column: tuple(mean for mean, _ in each) for column, each in figures.items()},
         spread={column: tuple(sd for _, sd in each) for column, each in figures.items()},
         published=dict(published or {}),
-        caption=caption,
+        caption=f"{caption} {number_of_units(errors for each in groups.values() for errors in each.values())}".strip(),
         horizontal=horizontal,
     )
 
@@ -128,18 +145,20 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
 
 
 def errors_by_joint_group(
-    cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = HINGE_GROUPS, metric: str = METRIC
+    cells: Iterable[tuple[CellRow, Cell]],
+    groups: Mapping[str, Sequence[str]] = HINGE_GROUPS,
+    metric: str = METRIC,
 ) -> dict[str, dict[str, float]]:
-    """Group of hinges -> clip -> error [deg], of cells that differ only in the clip.
+    """Group of hinges -> unit -> error [deg], of cells that differ only in the clip (see `errors_by_unit`).
 
     It is the mean over the hinges of the group; for the metric `RMS`, the root of the mean square.
     """
-    by_group: dict[str, dict[str, float]] = {name: {} for name in groups}
-    for cell in cells:
+    by_group: dict[str, list[tuple[CellRow, float]]] = {name: [] for name in groups}
+    for row, cell in cells:
         errors = cell.scores.per_joint.get(metric, {})
         for group, bones in groups.items():
             values = np.array([error for hinge, error in errors.items() if hinge.partition(".")[0] in bones])
             if len(values):
                 mean = np.sqrt(np.mean(values**2)) if metric == RMS else np.mean(values)
-                by_group[group][cell.clip] = float(mean)
-    return by_group
+                by_group[group].append((row, float(mean)))
+    return {group: _average(values) for group, values in by_group.items()}

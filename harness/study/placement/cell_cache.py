@@ -6,17 +6,20 @@ set is run twice, in whichever mode, in this run or a later one.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from harness.compare.units import Sampling
 from harness.core.files import content_key, to_json_types
 from harness.core.line_loss import BAUD, describe_line_loss
 from harness.core.progress import ProgressCallback
+from harness.core.split import ClipPart
 from harness.errors import BadInput
+from harness.experiment.cells import open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names
@@ -112,12 +115,17 @@ class CellCache:
     def errors(
         self, request: SetRequest, metric: str, methods: tuple[str, ...] = ()
     ) -> dict[StationSet, dict[str, float | None]]:
-        """Set -> clip -> mean error over `methods`, by default those of the scenario.
+        """Set -> unit -> mean error over its clips and `methods`, by default those of the scenario.
 
-        The error is None where one of the methods was not measured. Sets are run where necessary.
+        The error is None where one of the methods was not measured on one of the clips. Sets are run where necessary.
         """
         self.run_missing([request])
-        return {stations: self._errors(request, stations, metric, methods) for stations in request.sets}
+        units = clips_of_units(request.scenario, self.folder)
+        errors = {stations: self._errors(request, stations, metric, methods) for stations in request.sets}
+        return {
+            stations: {unit: _mean([by_clip[clip] for clip in clips]) for unit, clips in units.items()}
+            for stations, by_clip in errors.items()
+        }
 
     def _errors(
         self, request: SetRequest, stations: StationSet, metric: str, methods: tuple[str, ...]
@@ -129,9 +137,7 @@ class CellCache:
                 self._rows.get((scenario.name, _variant_key(varied), method, clip))
                 for method in methods or scenario.methods
             ]
-            values = [row[metric] if row is not None else None for row in rows]
-            measured = [float(value) for value in values if value is not None]
-            by_clip[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
+            by_clip[clip] = _mean([row[metric] if row is not None else None for row in rows])
         return by_clip
 
     def _add(self, scenarios: Iterable[Scenario], cells: BatchResults) -> None:
@@ -166,6 +172,23 @@ class CellCache:
             scenario = replace(scenario, worn=tuple(names))
         name = f"{scenario.name}_{content_key(scenario.content())[:8]}"  # names are unique by content
         return replace(scenario, name=name), {"stations": moved} if moved else {"worn": names}
+
+
+def clips_of_units(scenario: Scenario, folder: LibraryFolders | None) -> dict[str, list[str]]:
+    """Unit of statistics -> its test clips in a scenario, sorted (see `compare.units`)."""
+    source = open_scenario_motion(scenario.motion, folder, scenario.seed)
+    takes = {clip: ClipPart.parse(clip).clip for clip in scenario.motion.test}
+    performers = {take: known for take in takes.values() if (known := source.performer(take))}
+    sampling, units = Sampling(performers, scenario.unit), dict[str, list[str]]()
+    for clip in sorted(takes):
+        units.setdefault(sampling.unit_of(clip), []).append(clip)
+    return dict(sorted(units.items()))
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean; None where a value is missing."""
+    measured = [float(value) for value in values if value is not None]
+    return float(np.mean(measured)) if len(measured) == len(values) else None
 
 
 def _variant_key(varied: Mapping[str, Any]) -> str:

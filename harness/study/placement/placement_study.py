@@ -14,6 +14,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
 from harness.compare.significance import count_needed
+from harness.compare.units import count_units
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
@@ -119,13 +120,14 @@ def _run_plan(
         if shorten is not None and cell_s is not None:
             plan, note = shorten(cell_s)
             notes = (note,)
+        units, clips = len(plan.units(plan.scenario)), len(plan.scenario.motion.test)
         power = estimate_power(
             pilot,
-            clips=len(plan.scenario.motion.test),
+            units=units,
             sets=len(plan.first_sets()),
             unit=DEFINITIONS[plan.study.metric].unit,
             cell_s=cell_s,
-            duration_s=lambda clips: None if cell_s is None else plan.cell_count(clips) * cell_s / jobs,
+            duration_s=lambda n: None if cell_s is None else plan.cell_count(-(-n * clips // units)) * cell_s / jobs,
         )
         announce(power, notes)
         findings = _PlacementRun(plan, cache).findings(cache.command, power, notes)
@@ -220,7 +222,7 @@ class _PlacementRun:
         if study.refine:
             groups = select_groups(study.refine.set, units, "refine.set") if study.refine.set else ()
             start = station_set(groups, units) or search.best_measured_set(study.refine.size, self.costs)
-            steps, end = refine_set(study.refine, start, self.measure, len(self.plan.scenario.motion.test))
+            steps, end = refine_set(study.refine, start, self.measure, len(self.plan.units(self.plan.scenario)))
             searches.append(steps)
             ends = [start, end]
         return searches, ends
@@ -268,9 +270,9 @@ class _PlacementRun:
     def _claims(
         self, alternatives: Sequence[StationSet], held: Mapping[StationNames, Costs]
     ) -> Iterator[BenchmarkStatement]:
-        clips = len(self.study.held_out)
-        basis, costs = f"tested on {clips} held-out clips", held
-        if clips < MIN_UNITS:
+        units = self.plan.units(self.plan.held_out) if self.plan.held_out else ()
+        basis, costs = f"tested on held-out clips of {count_units(units)}", held
+        if len(units) < MIN_UNITS:
             basis = "tested on the clips on which the best other set was chosen, which favours that set"
             costs = {names_of_places(stations): costs for stations, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
@@ -288,21 +290,23 @@ class _PlacementRun:
 
     def _notes(self, modes: Sequence[ModeResult], held: Mapping[StationNames, Costs]) -> Iterator[str]:
         """Notes on how sets were chosen and tested, and what was left out."""
-        clips = len(self.plan.scenario.motion.test)
-        if held:
-            yield (f"Sets were chosen on {clips} clips and then tested on {len(self.study.held_out)} held-out clips.")
+        units = self.plan.units(self.plan.scenario)
+        counted = count_units(units)
+        if held and self.plan.held_out:
+            others = count_units(self.plan.units(self.plan.held_out))
+            yield f"Sets were chosen on {counted} and then tested on held-out clips of {others}."
         else:
             yield (
-                f"Sets were chosen and tested on the same {clips} clips, which favours the chosen sets. The "
-                "cross-validated error is given beside: on each clip, that of the set that the other clips choose."
+                f"Sets were chosen and tested on the same clips of {counted}, which favours the chosen sets. The "
+                "cross-validated error is given beside: of each unit, that of the set that the other units choose."
             )
         if slow := self.cache.line_loss:
             yield slow
         for ranking in (ranking for mode in modes for ranking in mode.rankings):
-            if clips < (least := count_needed(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
+            if len(units) < (least := count_needed(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (
-                    f"{ranking.title}: {clips} clips cannot show a significant difference between {len(ranking.rows)} "
-                    f"sets; at least {least} are needed."
+                    f"{ranking.title}: {counted} cannot show a significant difference between {len(ranking.rows)} "
+                    f"sets; at least {least} units are needed."
                 )
         _, left_out = complete_sets({names_of_places(stations): costs for stations, costs in self.costs.items()})
         yield from left_out
@@ -336,5 +340,5 @@ def _with_held_out_gain(result: PlacementSearch, held: Mapping[StationNames, Cos
     if result.mode != "refine" or first is None or last is None or first is last:
         return result
     gain = compare_paired(first, last)
-    clips = len(gain.clips)
-    return replace(result, held_out=gain.mean, held_out_low=gain.low, held_out_high=gain.high, held_out_clips=clips)
+    units = len(gain.units)
+    return replace(result, held_out=gain.mean, held_out_low=gain.low, held_out_high=gain.high, held_out_clips=units)

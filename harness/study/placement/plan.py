@@ -19,7 +19,7 @@ from harness.mocap.sources import MotionSource
 from harness.results.placement_findings import StationPlacement
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
-from harness.study.placement.cell_cache import SetRequest, link_rate_hz
+from harness.study.placement.cell_cache import SetRequest, clips_of_units, link_rate_hz
 from harness.study.placement.config import (
     PlacementStudy,
     base_scenario,
@@ -28,7 +28,7 @@ from harness.study.placement.config import (
     load_scenario_beside,
 )
 from harness.study.placement.ranking import Costs
-from harness.study.placement.refinement import check_clip_count
+from harness.study.placement.refinement import check_unit_count
 from harness.study.placement.search import names_of_places
 
 
@@ -46,6 +46,12 @@ class PlacementPlan:
     """Condition -> its scenario."""
     motion: str
     """Title of the motion."""
+    folder: LibraryFolders | None = None
+    """Motion library; None for synthetic motion."""
+
+    def units(self, scenario: Scenario) -> tuple[str, ...]:
+        """The units of statistics in one of its scenarios, sorted."""
+        return tuple(clips_of_units(scenario, self.folder))
 
     @property
     def cost_sign(self) -> float:
@@ -152,7 +158,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     conditions = {c.name: expand_clips(base_scenario(study, load, c), folder) for c in study.condition}
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
     held_out = _held_out_scenario(study, scenario, source)
-    plan = PlacementPlan(study, study.groups(), scenario, held_out, conditions, source.title)
+    plan = PlacementPlan(study, study.groups(), scenario, held_out, conditions, source.title, folder)
     for checked in filter(None, (scenario, held_out, *conditions.values())):
         first = replace(checked, worn=names_of_places(station_set(plan.groups[:1], plan.groups)))
         check_names([first], folder)
@@ -160,7 +166,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
         search.check_cell_count(study.exhaustive, plan.groups, len(scenario.motion.test) * len(scenario.methods))
     if study.refine and study.refine.set:
         start = station_set(select_groups(study.refine.set, plan.groups, "refine.set"), plan.groups)
-        check_clip_count(start, len(scenario.motion.test))
+        check_unit_count(start, len(plan.units(scenario)))
     for size in {len(stations) for stations in plan.known_sets()}:
         plan.rate_hz(size)
     return plan

@@ -1,8 +1,9 @@
-"""Statistical power of a placement study: what its clips can show, before its cells run.
+"""Statistical power of a placement study: what its units can show, before its cells run.
 
-Sets are compared by sign flips over clips, corrected for the number of comparisons. With n clips no p is below 2/2^n,
-so too few clips show nothing, however large the differences. With enough clips a difference must exceed the spread of
-the paired differences between clips. Spread and duration are measured on a few sets of the study itself, the pilot.
+Sets are compared by sign flips over units (performers, see `compare.units`), corrected for the number of comparisons.
+With n units no p is below 2/2^n, so too few units show nothing, however large the differences. With enough units a
+difference must exceed the spread of the paired differences between units. Spread and duration are measured on a few
+sets of the study itself, the pilot.
 
 A difference *can be shown* if a study finds it with probability 0.8, where paired differences are normal.
 """
@@ -28,7 +29,7 @@ PILOT_SETS = 4
 WORTHWHILE = 0.1
 """A difference of this share of the mean error is worth showing; claims of papers have the same margin."""
 _MOST_FLIPPED, _DRAWS = 16, 200
-_MOST_CLIPS = 1_000_000
+_MOST_UNITS = 1_000_000
 
 
 def choose_pilot(sets: Sequence[StationSet]) -> list[StationSet]:
@@ -40,15 +41,15 @@ def choose_pilot(sets: Sequence[StationSet]) -> list[StationSet]:
 def estimate_power(
     pilot: Mapping[StationSet, Costs],
     *,
-    clips: int,
+    units: int,
     sets: int,
     unit: str,
     cell_s: float | None,
     duration_s: Callable[[int], float | None],
 ) -> StatisticalPower:
-    """The power of a study with `clips` clips that compares `sets` sets, from the costs of its pilot.
+    """The power of a study with `units` units that compares `sets` sets, from the costs of its pilot.
 
-    `cell_s` is the duration of a cell on one worker [s], and `duration_s` that of the study with so many clips [s].
+    `cell_s` is the duration of a cell on one worker [s], and `duration_s` that of the study with so many units [s].
     """
     comparisons = max(sets - 1, 1)
     least = count_needed(comparisons)
@@ -56,14 +57,14 @@ def estimate_power(
     shown = wanted = needed = None
     if spread is not None and mean is not None:
         wanted = WORTHWHILE * abs(mean)
-        shown = spread * smallest_effect(clips, comparisons) if clips >= least else None
-        needed = clips_needed(wanted / spread, comparisons) if spread > 0.0 and wanted > 0.0 else None
+        shown = spread * smallest_effect(units, comparisons) if units >= least else None
+        needed = units_needed(wanted / spread, comparisons) if spread > 0.0 and wanted > 0.0 else None
     return StatisticalPower(
-        clips=clips,
+        clips=units,
         sets=sets,
         unit=unit,
         least_clips=least,
-        duration_s=duration_s(clips),
+        duration_s=duration_s(units),
         least_duration_s=duration_s(least),
         cell_s=cell_s,
         spread=spread,
@@ -79,7 +80,7 @@ def _pooled_spread(pilot: Sequence[Costs]) -> float | None:
     """Root mean square, over pairs of sets, of the standard deviation of the paired differences; None if unknown."""
     variances = []
     for a, b in combinations(pilot, 2):
-        both = [(x, y) for clip, x in a.items() if x is not None and (y := b.get(clip)) is not None]
+        both = [(x, y) for unit, x in a.items() if x is not None and (y := b.get(unit)) is not None]
         if len(both) > 1:
             variances.append(np.var([x - y for x, y in both], ddof=1))
     return math.sqrt(float(np.mean(variances))) if variances else None
@@ -91,50 +92,50 @@ def _mean(pilot: Sequence[Costs]) -> float | None:
 
 
 @cache
-def smallest_effect(clips: int, comparisons: int) -> float:
-    """Smallest difference, in standard deviations of the paired differences, that `clips` clips can show.
+def smallest_effect(units: int, comparisons: int) -> float:
+    """Smallest difference, in standard deviations of the paired differences, that `units` units can show.
 
-    It is infinite with fewer than `count_needed` clips. With that many, or up to two more, few flips may be more
+    It is infinite with fewer than `count_needed` units. With that many, or up to two more, few flips may be more
     extreme, and the test is simulated on fixed draws. With more, the t-test with the same correction differs by 7 % at
     most.
     """
     least, level = count_needed(comparisons), SIGNIFICANCE / comparisons
-    if clips < least:
+    if units < least:
         return math.inf
-    return _sign_flip_effect(clips, level) if clips < min(least + 3, _MOST_FLIPPED) else _t_effect(clips, level)
+    return _sign_flip_effect(units, level) if units < min(least + 3, _MOST_FLIPPED) else _t_effect(units, level)
 
 
-def _sign_flip_effect(clips: int, level: float) -> float:
+def _sign_flip_effect(units: int, level: float) -> float:
     """Quantile `POWER`, over normal samples, of the shift from which a sample is significant.
 
-    A sign flip of the clips S gives a sum as large as the observed one exactly if the sum over S is not positive. The
+    A sign flip of the units S gives a sum as large as the observed one exactly if the sum over S is not positive. The
     two-sided p is at most `level` if at most `most` subsets, with the empty one, are such. So the sample z + shift is
     significant from the `most`-th largest of the means of -z over the other subsets on.
     """
-    most = int(level * 2.0**clips / 2.0)
-    rng = generator(0, "placement", "power", str(clips))
-    subsets = (np.arange(1, 2**clips)[:, None] >> np.arange(clips) & 1).astype(np.float32)
+    most = int(level * 2.0**units / 2.0)
+    rng = generator(0, "placement", "power", str(units))
+    subsets = (np.arange(1, 2**units)[:, None] >> np.arange(units) & 1).astype(np.float32)
     size = subsets.sum(axis=1)
     shifts = [
-        np.partition(subsets @ -rng.normal(size=clips).astype(np.float32) / size, -most)[-most] for _ in range(_DRAWS)
+        np.partition(subsets @ -rng.normal(size=units).astype(np.float32) / size, -most)[-most] for _ in range(_DRAWS)
     ]
     return float(np.quantile(shifts, POWER))
 
 
-def _t_effect(clips: int, level: float) -> float:
+def _t_effect(units: int, level: float) -> float:
     """The effect that the two-sided paired t-test finds with probability `POWER`, by shifting its critical value."""
-    critical, margin = special.stdtrit(clips - 1, [1.0 - level / 2.0, POWER])
-    return float((critical + margin) / math.sqrt(clips))
+    critical, margin = special.stdtrit(units - 1, [1.0 - level / 2.0, POWER])
+    return float((critical + margin) / math.sqrt(units))
 
 
 @cache
-def clips_needed(effect: float, comparisons: int) -> int:
-    """Least number of clips that show a difference of `effect` standard deviations; at most a million."""
+def units_needed(effect: float, comparisons: int) -> int:
+    """Least number of units that show a difference of `effect` standard deviations; at most a million."""
     least = count_needed(comparisons)
-    for clips in range(least, least + 3):
-        if smallest_effect(clips, comparisons) <= effect:
-            return clips
-    low, high = least + 3, _MOST_CLIPS
+    for units in range(least, least + 3):
+        if smallest_effect(units, comparisons) <= effect:
+            return units
+    low, high = least + 3, _MOST_UNITS
     while low < high:
         middle = (low + high) // 2
         low, high = (low, middle) if _t_effect(middle, SIGNIFICANCE / comparisons) <= effect else (middle + 1, high)

@@ -51,12 +51,12 @@ def evaluate_claim(
     unit: str,
     basis: str,
 ) -> tuple[BenchmarkStatement, BenchmarkStatement]:
-    """Evaluate both claims by costs on the test clips, which `basis` describes in words."""
+    """Evaluate both claims by costs of the units of the test clips, which `basis` describes in words."""
     measured = {
-        names: {clip: value for clip, value in costs.get(names, {}).items() if value is not None}
+        names: {name: value for name, value in costs.get(names, {}).items() if value is not None}
         for names in (claimed, other, full)
     }
-    allowed = {clip: (1.0 + claim.margin) * value for clip, value in measured[full].items()}
+    allowed = {name: (1.0 + claim.margin) * value for name, value in measured[full].items()}
     best_of_size = f"{claim.text}: no other {len(claimed)} stations err less (against the best, {join_names(other)})"
     within = f"{claim.text}: {join_names(claimed)} err at most {claim.margin:.0%} more than all {len(full)}"
     published = f"stated by {claim.source}"
@@ -64,7 +64,7 @@ def evaluate_claim(
     suffices = claim_lower_error(within, measured[claimed], allowed, published=published, unit=unit, why=why)
     if suffices.verdict != "not run":
         shared = measured[claimed].keys() & measured[full].keys()
-        mean, mean_of_all = (mean_cost({clip: measured[names][clip] for clip in shared}) for names in (claimed, full))
+        mean, mean_of_all = (mean_cost({name: measured[names][name] for name in shared}) for names in (claimed, full))
         limit = f"limit {(1.0 + claim.margin) * mean_of_all:.2f} {unit}, {1.0 + claim.margin:.0%} of {mean_of_all:.2f}"
         suffices = replace(suffices, measured=f"{mean:.2f} {unit}; {limit} of all {len(full)}")
     return (

@@ -2,12 +2,13 @@
 
     harness placement --stations 3 --behaviour table_tennis
 
-Sets are chosen on some clips of the behaviours, tested on others, and methods learn from a third part. The budget of
-time decides how sets are searched and on how many clips: see `plan_within_budget`.
+Sets are chosen on some clips of the behaviours, tested on others, and methods learn from a third part. Clips to choose
+on are of as many performers as there are, since a performer is the unit of statistics. The budget of time decides how
+sets are searched and on how many clips: see `plan_within_budget`.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,7 +19,6 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
-from harness.mocap.synthetic import REFERENCE_PERFORMERS, SOURCE
 from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig
@@ -95,12 +95,15 @@ def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -
             f"Ask for 1 to {most}, the smaller number first; --places names more places, `harness list places` all.",
         )
     source = open_motion_source("builtin" if folder is None else "cmu", folder, seed=question.seed, rate_hz=None)
-    parts = [_deal_clips(behaviour, source) for behaviour in dict.fromkeys(question.behaviours)]
     wanted = question.clips or DEFAULT_CLIPS
+    asked = list(dict.fromkeys(question.behaviours))
+    parts = [_deal_clips(name, source, at * wanted // len(asked), wanted) for at, name in enumerate(asked)]
     test, held_out, examples = (list(_interleave([part[role] for part in parts])) for role in range(_ROLES))
     if question.clips > len(test):
         raise BadInput(f"{question.clips} clips of {len(test)} to choose on.", f"Ask for {len(test)} clips or fewer.")
     test, held_out = test[:wanted], held_out[:DEFAULT_CLIPS]
+    if folder is None:
+        examples = _one_of_each(examples, {source.subject(name) for name in (*test, *held_out)}, source)
     scenario = Scenario(
         name=question.name,
         motion=ScenarioMotion(
@@ -148,26 +151,45 @@ def _thinned_frames(examples: Sequence[str], source: MotionSource) -> int:
     return 0
 
 
-def _deal_clips(behaviour: str, source: MotionSource) -> tuple[list[str], list[str], list[str]]:
+def _deal_clips(behaviour: str, source: MotionSource, first: int, wanted: int) -> tuple[list[str], ...]:
     """Clips of a behaviour to choose on, to hold out and to learn from; each performer's takes are dealt in turn.
 
-    Built-in takes are those of the reference performers.
+    Performers alternate, from the one with the index `first` on. The held-out clips begin `wanted` performers later, so
+    that they are of other performers where there are enough.
     """
-    is_library = source.title != SOURCE
     by_subject: dict[str, list[str]] = {}
     for name in source.names():
-        if source.behaviour(name) == behaviour and (is_library or source.subject(name) in REFERENCE_PERFORMERS):
+        if source.behaviour(name) == behaviour:
             by_subject.setdefault(source.subject(name), []).append(name)
     if not by_subject:
         raise UnknownName("behaviour", behaviour, dict.fromkeys(filter(None, map(source.behaviour, source.names()))))
-    dealt: tuple[list[str], list[str], list[str]] = ([], [], [])
-    for at, name in enumerate(name for takes in by_subject.values() for name in takes):
-        dealt[at % _ROLES].append(name)
+    dealt: tuple[dict[str, list[str]], ...] = ({}, {}, {})
+    takes = [(subject, name) for subject, names in by_subject.items() for name in names]
+    for at, (subject, name) in enumerate(takes):
+        dealt[at % _ROLES].setdefault(subject, []).append(name)
     if not all(dealt):
-        raise BadInput(
-            f"{behaviour} has {sum(map(len, dealt))} clips.", "Three are needed: to choose on, to test, to learn from."
-        )
-    return dealt
+        advice = "Three are needed: to choose on, to test, to learn from."
+        raise BadInput(f"{behaviour} has {len(takes)} clips.", advice)
+    starts = (first, first + wanted, first)
+    return tuple(
+        list(_interleave([role[subject] for subject in _rotate(list(role), start)]))
+        for role, start in zip(dealt, starts, strict=True)
+    )
+
+
+def _rotate(items: Sequence[str], start: int) -> list[str]:
+    """The items from index `start` on, which wraps around."""
+    at = start % len(items)
+    return [*items[at:], *items[:at]]
+
+
+def _one_of_each(clips: Sequence[str], subjects: Collection[str], source: MotionSource) -> list[str]:
+    """The first of the clips of each behaviour and each of these performers: the generator has thousands of takes."""
+    first: dict[tuple[str, str], str] = {}
+    for name in clips:
+        if source.subject(name) in subjects:
+            first.setdefault((source.behaviour(name), source.subject(name)), name)
+    return list(first.values())
 
 
 def _interleave(lists: Sequence[Sequence[str]]) -> Iterator[str]:

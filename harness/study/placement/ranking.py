@@ -1,13 +1,14 @@
 """Rankings of sets of stations, with their uncertainty.
 
-Errors are costs: one value for each clip; lower is better. Sets are compared on the same clips and ranked by the mean.
+Errors are costs: one value for each unit of statistics; lower is better. Sets are compared on the same units and ranked
+by the mean.
 
-The rank of a set is given as a range. The set is compared with each other set by sign flips over clips; p is corrected
+The rank of a set is given as a range. The set is compared with each other set by sign flips over units; p is corrected
 for the number of comparisons (Holm 1979). The numbers of significantly better and worse sets bound its rank. This is a
 confidence interval for the rank of each set by itself (Mogstad, Romano, Shaikh and Wilhelm 2024, Inference for ranks
 with applications to mobility across neighbourhoods, Rev. Econ. Stud. 91).
 
-The mean of the best of many sets is biased downwards on the clips on which it was chosen: see `cross_validated_cost`.
+The mean of the best of many sets is biased downwards on the units on which it was chosen: see `cross_validated_cost`.
 """
 
 import math
@@ -29,26 +30,26 @@ from harness.results.placement_findings import (
 )
 
 Costs = Mapping[str, float | None]
-"""Clip -> cost; None where it was not measured."""
+"""Unit of statistics -> cost (see `compare.units`); None where it was not measured."""
 _RESAMPLES = 2000
 
 
 def complete_sets(sets: Mapping[StationNames, Costs]) -> tuple[dict[StationNames, dict[str, float]], list[str]]:
-    """Sets that were measured on every clip on which any was; and a sentence about each of the others."""
-    clips = sorted({clip for costs in sets.values() for clip, value in costs.items() if value is not None})
+    """Sets that were measured on every unit on which any was; and a sentence about each of the others."""
+    units = sorted({unit for costs in sets.values() for unit, value in costs.items() if value is not None})
     complete: dict[StationNames, dict[str, float]] = {}
     left_out = []
     for names, costs in sets.items():
-        measured = {clip: value for clip in clips if (value := costs.get(clip)) is not None}
-        if clips and len(measured) == len(clips):
+        measured = {unit: value for unit in units if (value := costs.get(unit)) is not None}
+        if units and len(measured) == len(units):
             complete[names] = measured
         else:
-            left_out.append(f"not ranked: {'+'.join(names)} was measured on {len(measured)} of {len(clips)} clips")
+            left_out.append(f"not ranked: {'+'.join(names)} was measured on {len(measured)} of {len(units)} units")
     return complete, left_out
 
 
 def rank_sets(mode: PlacementMode, title: str, sets: Mapping[StationNames, Costs], base: StationNames = ()) -> Ranking:
-    """Rank sets, best first; sets that were not measured on every clip are left out (see `complete_sets`)."""
+    """Rank sets, best first; sets that were not measured on every unit are left out (see `complete_sets`)."""
     complete, _ = complete_sets(sets)
     order = sort_by_cost(complete)
     better, worse = significant_differences(order, complete)
@@ -80,7 +81,7 @@ def sort_by_cost(costs: Mapping[StationNames, Mapping[str, float]]) -> list[Stat
 
 
 def mean_cost(costs: Mapping[str, float]) -> float:
-    """Mean over clips."""
+    """Mean over units."""
     return math.fsum(costs.values()) / len(costs)
 
 
@@ -105,14 +106,14 @@ def significant_differences(
 
 
 def _cost_matrix(order: Sequence[StationNames], costs: Mapping[StationNames, Mapping[str, float]]) -> Floats:
-    """(sets, clips)"""
-    clips = sorted(costs[order[0]]) if order else []
-    return np.array([[costs[names][clip] for clip in clips] for names in order]).reshape(len(order), len(clips))
+    """(sets, units)"""
+    units = sorted(costs[order[0]]) if order else []
+    return np.array([[costs[names][unit] for unit in units] for names in order]).reshape(len(order), len(units))
 
 
 def summarise_set(names: StationNames, rate_hz: float, errors: Costs) -> StationSetResult:
-    """Summarise a set, with the interval of the mean where there are enough clips."""
-    measured = {clip: value for clip, value in errors.items() if value is not None}
+    """Summarise a set, with the interval of the mean where there are enough units."""
+    measured = {unit: value for unit, value in errors.items() if value is not None}
     low, high = mean_interval(np.array(list(measured.values()))) if len(measured) >= MIN_UNITS else (None, None)
     return StationSetResult(names, rate_hz, dict(errors), mean_cost(measured) if measured else None, low, high)
 
@@ -139,9 +140,9 @@ def best_by_size(sets: Mapping[StationNames, Costs], sign: float = 1.0) -> tuple
 
 
 def cross_validated_cost(costs: Mapping[StationNames, Mapping[str, float]]) -> float:
-    """Leave-one-out cross-validated cost: the mean over clips of the cost of the set that the other clips choose.
+    """Leave-one-out cross-validated cost: the mean over units of the cost of the set that the other units choose.
 
-    It exceeds the mean of the best set by the bias of choosing that set on the same clips.
+    It exceeds the mean of the best set by the bias of choosing that set on the same units.
     """
     order = sorted(costs)
     values = _cost_matrix(order, costs)
@@ -150,7 +151,7 @@ def cross_validated_cost(costs: Mapping[StationNames, Mapping[str, float]]) -> f
 
 
 def selection_stability(costs: Mapping[StationNames, Mapping[str, float]]) -> float:
-    """Share of resamples of the clips in which the best set remains the best."""
+    """Share of resamples of the units in which the best set remains the best."""
     order = sort_by_cost(costs)
     values = _cost_matrix(order, costs)
     draws = generator(0, "placement", "stays").integers(0, values.shape[1], (_RESAMPLES, values.shape[1]))

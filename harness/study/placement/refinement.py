@@ -1,7 +1,7 @@
 """Refinement of a set: stations are moved along and around their bones as long as the improvement is significant.
 
 In each iteration the search measures all places one step along or around the bone, for each station; a mirrored pair
-moves together. It takes the best of them if that is significantly better: sign flips over clips, corrected for the
+moves together. It takes the best of them if that is significantly better: sign flips over units, corrected for the
 number of places (Holm). Otherwise it continues with the next smaller step, and ends after the smallest.
 """
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import compare_paired
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
+from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.results.placement_findings import PlacementSearch, SearchStep, StationPlacement
 from harness.study.placement.candidates import StationSet, mirror_place, placement_fault, station_name
@@ -24,10 +25,10 @@ MoveGroup = tuple[int, ...]
 
 
 def refine_set(
-    table: RefineOptions, start: StationSet, measure: Measure, clips: int
+    table: RefineOptions, start: StationSet, measure: Measure, units: int
 ) -> tuple[PlacementSearch, StationSet]:
-    """Refine a set; returns the steps and the final set. BadInput with too few clips."""
-    check_clip_count(start, clips)
+    """Refine a set; returns the steps and the final set. BadInput with too few units."""
+    check_unit_count(start, units)
     groups = find_move_groups(start)
     origin = {station_name(place): place for place in start}
     current, steps, measured = start, [SearchStep(names_of_places(start), "")], 0
@@ -52,12 +53,12 @@ def refine_set(
     return PlacementSearch("refine", title, tuple(steps), f"{end}; {measured} places were measured"), current
 
 
-def check_clip_count(start: StationSet, clips: int) -> None:
-    """BadInput when the clips are too few for any move to be significant."""
+def check_unit_count(start: StationSet, units: int) -> None:
+    """BadInput when the units are too few for any move to be significant."""
     moves = 4 * len(find_move_groups(start))
-    if clips < (least := count_needed(moves)):
-        fault = f"refine: with {clips} clips, none of {moves} moves can be significantly better."
-        raise BadInput(fault, f"Use {least} clips or more, or refine a smaller set.")
+    if units < (least := count_needed(moves)):
+        fault = f"refine: with {count_noun(units, 'unit')}, none of {moves} moves can be significantly better."
+        raise BadInput(fault, f"Use {least} units (performers) or more, or refine a smaller set.")
 
 
 def find_move_groups(start: StationSet) -> tuple[MoveGroup, ...]:
@@ -128,7 +129,7 @@ def _best_move(
         return current, None
     order = sort_by_cost(complete)
     best = compare_paired(before, complete[order[0]])
-    p = holm([sign_flip_p(np.array([before[clip] - complete[name][clip] for clip in before])) for name in order])
+    p = holm([sign_flip_p(np.array([before[unit] - complete[name][unit] for unit in before])) for name in order])
     if best.mean is None or best.mean <= 0.0 or p[0] > SIGNIFICANCE:
         return current, None
     target = by_name[order[0]]

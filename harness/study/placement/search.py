@@ -25,7 +25,7 @@ from harness.study.placement.config import (
 from harness.study.placement.ranking import Costs, complete_sets, join_names, rank_sets, sort_by_cost
 
 Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
-"""Measures sets: set -> clip -> cost."""
+"""Measures sets: set -> unit of statistics -> cost."""
 
 
 @dataclass(frozen=True)
@@ -210,13 +210,13 @@ def names_of_places(stations: StationSet) -> StationNames:
 
 
 def _measured_costs(costs: Costs) -> Costs:
-    return {clip: value for clip, value in costs.items() if value is not None}
+    return {unit: value for unit, value in costs.items() if value is not None}
 
 
 def _make_worth(
     name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, gain: PairedDifference
 ) -> MarginalContribution:
-    return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.clips))
+    return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.units))
 
 
 def _shapley_worth(
@@ -236,9 +236,9 @@ def _shapley_worth(
         for stations in costs:
             if not set(unit) & set(stations) and (extended := station_set([stations, unit], order)) in costs:
                 sizes.setdefault(len(stations), []).append((stations, extended))
-        without = _mean_by_clip([_mean_by_clip([costs[stations] for stations, _ in pairs]) for pairs in sizes.values()])
-        with_unit = _mean_by_clip(
-            [_mean_by_clip([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
+        without = _mean_by_unit([_mean_by_unit([costs[stations] for stations, _ in pairs]) for pairs in sizes.values()])
+        with_unit = _mean_by_unit(
+            [_mean_by_unit([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
         )
         gain = compare_paired(without, with_unit)
         yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
@@ -251,15 +251,15 @@ def _worth_at_one_size(
     for unit in units:
         having = [costs[stations] for stations in costs if set(unit) <= set(stations)]
         lacking = [costs[stations] for stations in costs if not set(unit) & set(stations)]
-        gain = compare_paired(_mean_by_clip(lacking), _mean_by_clip(having))
+        gain = compare_paired(_mean_by_unit(lacking), _mean_by_unit(having))
         yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
 
 
-def _mean_by_clip(each: Sequence[Costs]) -> dict[str, float | None]:
-    """Clip -> mean of several costs; None where one of them is missing."""
+def _mean_by_unit(each: Sequence[Costs]) -> dict[str, float | None]:
+    """Unit -> mean of several costs; None where one of them is missing."""
     out: dict[str, float | None] = {}
-    for clip in dict.fromkeys(clip for costs in each for clip in costs):
-        values = [costs.get(clip) for costs in each]
+    for unit in dict.fromkeys(unit for costs in each for unit in costs):
+        values = [costs.get(unit) for costs in each]
         measured = [value for value in values if value is not None]
-        out[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
+        out[unit] = float(np.mean(measured)) if len(measured) == len(values) else None
     return out

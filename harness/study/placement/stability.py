@@ -1,4 +1,4 @@
-"""Stability of a ranking of sets: over behaviours, methods and noise, and over the clips that it was made on."""
+"""Stability of a ranking of sets: over behaviours, methods and noise, and over the units that it was made on."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -6,21 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.paired_statistics import CONFIDENCE_LEVEL, MIN_UNITS
-from harness.compare.rank_correlation import tau_b
+from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.arrays import Floats
-from harness.core.seeds import generator
 from harness.results.placement_findings import ChangedOrder, PlacementCondition, RankAgreement, StationNames
 from harness.study.placement.ranking import (
     Costs,
     complete_sets,
+    join_names,
     mean_cost,
     selection_stability,
     sort_by_cost,
 )
 
-_RESAMPLES = 2000
 _MOST_TESTED_SETS = 24
 """Most sets whose changes of order are tested: the correction for all pairs of more would leave nothing significant."""
 _MOST_CHANGES = 10
@@ -47,16 +45,16 @@ def rank_by_condition(
         for names in reversed(sort_by_cost(complete)):
             best[str(len(names))] = names
         means = tuple(sign * mean_cost(complete[names]) if names in complete else None for names in compared)
-        clips = len(next(iter(complete.values()), {}))
+        units = len(next(iter(complete.values()), {}))
         stability = selection_stability(complete) if complete else None
-        ranked.append(PlacementCondition(condition.name, condition.kind, best, means, clips, stability))
+        ranked.append(PlacementCondition(condition.name, condition.kind, best, means, units, stability))
     return tuple(ranked)
 
 
 def rank_agreements(
     conditions: Sequence[ConditionCosts], compared: Sequence[StationNames]
 ) -> tuple[RankAgreement, ...]:
-    """Rank correlation of every two conditions, over the sets that both measured on all their clips."""
+    """Rank correlation of every two conditions, over the sets that both measured on all their units."""
     agreements = []
     for a, b in itertools.combinations(conditions, 2):
         sides = [complete_sets({names: one.costs.get(names, {}) for names in compared})[0] for one in (a, b)]
@@ -65,10 +63,11 @@ def rank_agreements(
         if len(shared) < 2:
             agreements.append(RankAgreement(a.name, b.name, None, len(shared)))
             continue
-        same_clips = list(sides[0][shared[0]]) == list(sides[1][shared[0]])
-        low, high = _interval(tables, same_clips)
         tau = float(tau_b(tables[0].mean(axis=1), tables[1].mean(axis=1)))
-        changes = changed_orders(shared, tables[0], tables[1], paired=same_clips)
+        pairs = compare_orders(list(map(join_names, shared)), tables, (a.name, b.name)) if np.isfinite(tau) else ()
+        low, high = tau_interval(pairs)
+        same_units = list(sides[0][shared[0]]) == list(sides[1][shared[0]])
+        changes = changed_orders(shared, tables[0], tables[1], paired=same_units)
         agreements.append(
             RankAgreement(
                 *(a.name, b.name, tau if np.isfinite(tau) else None, len(shared), low, high),
@@ -81,10 +80,10 @@ def rank_agreements(
 
 
 def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paired: bool) -> list[ChangedOrder]:
-    """Pairs of sets in opposite order under two conditions, from (sets, clips) costs under each.
+    """Pairs of sets in opposite order under two conditions, from (sets, units) costs under each.
 
-    The change of the difference between two sets is tested by sign flips over clips, corrected for all pairs of sets
-    (Holm). That needs the same clips on both sides (`paired`), as many as can show a change among all pairs, and few
+    The change of the difference between two sets is tested by sign flips over units, corrected for all pairs of sets
+    (Holm). That needs the same units on both sides (`paired`), as many as can show a change among all pairs, and few
     sets; elsewhere `significant` is None. Significant changes come first, then the largest.
     """
     pairs = list(itertools.combinations(range(len(names)), 2))
@@ -99,18 +98,3 @@ def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paire
             significant = None if p is None else p <= SIGNIFICANCE
             changes.append(ChangedOrder(names[first], names[second], (before, after), significant))
     return sorted(changes, key=lambda c: (not c.significant, c.differences[1] - c.differences[0]))
-
-
-def _interval(tables: Sequence[Floats], same_clips: bool) -> tuple[float | None, float | None]:
-    """Percentile interval over resamples of the clips; both sides share the draws where they have the same clips."""
-    counts = [table.shape[1] for table in tables]
-    if min(counts) < MIN_UNITS:
-        return None, None
-    rng = generator(0, "placement", "tau")
-    first = rng.integers(0, counts[0], (_RESAMPLES, counts[0]))
-    second = first if same_clips else rng.integers(0, counts[1], (_RESAMPLES, counts[1]))
-    taus = tau_b(*(table[:, draws].mean(axis=2).T for table, draws in zip(tables, (first, second), strict=True)))
-    if np.isnan(taus).all():
-        return None, None
-    low, high = np.nanquantile(taus, [(1.0 - CONFIDENCE_LEVEL) / 2.0, (1.0 + CONFIDENCE_LEVEL) / 2.0])
-    return float(low), float(high)

@@ -2,88 +2,85 @@
 
 Both sides perform the same motions. What a motion does to the difference of two arms is therefore no error of the
 comparison, and the order is judged on these motions alone. The noise of a simulated difference is read off its seeds.
-That of the device is read off the scatter, clip by clip, of device minus simulation. The scatter is a little too large:
-it also holds the simulation's noise, and whatever the simulation gets wrong from clip to clip.
+That of the device is read off the scatter, unit by unit, of device minus simulation. The scatter is a little too large:
+it also holds the simulation's noise, and whatever the simulation gets wrong from unit to unit. A unit is a clip, or a
+performer where the plan declares performers.
 
-Two arms agree or contradict only where both sides show a difference in the direction of their means. The p of a pair is
-the larger of two one-sided p values, and Holm's method corrects it for the number of pairs. Where a contradiction is
-false, one of two opposite signs is wrong, so that at most the share `level` of the plans has a false one.
+Two arms agree or contradict only where both sides show a difference (see `compare.rank_correlation`), so that at most
+the share `level` of the plans has a false contradiction.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy import special
 
 from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.rank_correlation import tau_b
+from harness.compare.rank_correlation import decide_pairs, side_difference, tau_b, tau_interval
 from harness.compare.ranking import shared_clips
-from harness.compare.significance import holm
+from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.trust_findings import PairAgreement, PairVerdict, RankCorrelation, SideDifference
+from harness.results.trust_findings import PairAgreement, RankCorrelation, SideDifference
 
 ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
-"""Arm -> clip -> errors: one for each capture of the device, or for each seed of the simulation; None: not measured."""
+"""Arm -> unit (a clip or a performer) -> errors: one for each capture of the device or each seed of the simulation.
+
+None: not measured.
+"""
 RESAMPLES = 2000
 MIN_ARMS = 3
 """Least number of arms with a rank correlation: two are always correlated by 1 or -1."""
 
 
+def unit_of(clip: str, performers: Mapping[str, str]) -> str:
+    """The unit of statistics of a clip: its performer where one is declared, else the clip."""
+    return f"performer {performers[clip]}" if clip in performers else clip
+
+
+def average_performers(errors: ArmErrors, performers: Mapping[str, str], *, paired: bool) -> ArmErrors:
+    """Arm -> unit -> errors: the clips of a performer count once, with the mean over them.
+
+    With `paired` the values of the clips belong together one by one, as those of seeds do. Else each clip has one
+    value, its mean. A value that a clip lacks is None in the mean.
+    """
+    averaged: dict[str, dict[str, list[float | None]]] = {}
+    for arm, by_clip in errors.items():
+        units: dict[str, list[Sequence[float | None]]] = {}
+        for clip, values in by_clip.items():
+            units.setdefault(unit_of(clip, performers), []).append(values)
+        averaged[arm] = {unit: _average(rows, paired=paired) for unit, rows in units.items()}
+    return averaged
+
+
+def _average(rows: Sequence[Sequence[float | None]], *, paired: bool) -> list[float | None]:
+    if len(rows) == 1:
+        return list(rows[0])
+    return [_mean(row) for row in zip(*rows, strict=True)] if paired else [_mean([_mean(row) for row in rows])]
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean; None where a value is missing."""
+    measured = [value for value in values if value is not None]
+    return sum(measured) / len(measured) if len(measured) == len(values) else None
+
+
 def judge_pairs(
     device: ArmErrors, simulated: ArmErrors, level: float, pairs: Sequence[tuple[str, str]] | None = None
 ) -> list[PairAgreement]:
-    """Judge pairs of arms, by default all, over the clips on which both arms have errors on both sides.
+    """Judge pairs of arms, by default all, over the units on which both arms have errors on both sides.
 
     *Agree* and *contradict*: p after Holm is at most `level`, and the signs of the mean differences are equal or
-    opposite. Anything else, and fewer than `MIN_UNITS` clips, is undecided.
+    opposite. Anything else, and fewer than `MIN_UNITS` units, is undecided.
     """
     chosen = list(combinations(device, 2)) if pairs is None else list(pairs)
     return decide_pairs(chosen, [_compare_sides(device, simulated, pair, level) for pair in chosen], level)
 
 
-def decide_pairs(
-    pairs: Sequence[tuple[str, str]],
-    compared: Sequence[tuple[int, tuple[SideDifference, SideDifference]]],
-    level: float,
-    *,
-    sides: tuple[str, str] = ("device", "simulation"),
-    unit: str = "clips",
-) -> list[PairAgreement]:
-    """Decide on pairs that are tested together, from their numbers of units and the differences of both sides.
-
-    `sides` and `unit` name the two sides and what was counted in the reasons.
-    """
-    tested = [at for at, (_, found) in enumerate(compared) if all(side.p is not None for side in found)]
-    p = {at: max(side.p or 0.0 for side in compared[at][1]) for at in tested}
-    corrected = dict(zip(tested, holm([p[at] for at in tested]), strict=True))
-    judged = []
-    for at, ((a, b), (count, found)) in enumerate(zip(pairs, compared, strict=True)):
-        if at in corrected:
-            verdict, why = _verdict(dict(zip(sides, found, strict=True)), corrected[at], level, len(tested))
-        else:
-            verdict, why = "cannot tell", f"too few {unit}: {count}, of at least {MIN_UNITS}"
-        judged.append(PairAgreement(a, b, count, *found, p.get(at), corrected.get(at), verdict, why))
-    return judged
-
-
-def _verdict(sides: Mapping[str, SideDifference], p_holm: float, level: float, pairs: int) -> tuple[PairVerdict, str]:
-    first, second = (np.sign(side.mean or 0.0) for side in sides.values())
-    if p_holm <= level:
-        if first == second:
-            return "agree", "both sides show the same order"
-        return "contradict", "each side shows the other order"
-    weak = [name for name, side in sides.items() if side.p is not None and side.p > level]
-    if weak:
-        return "cannot tell", f"no significant difference on the {' and the '.join(weak)}"
-    return "cannot tell", f"not significant among {pairs} pairs"
-
-
 def _compare_sides(
     device: ArmErrors, simulated: ArmErrors, pair: tuple[str, str], level: float
 ) -> tuple[int, tuple[SideDifference, SideDifference]]:
-    """Number of clips, and the differences of both sides."""
+    """Number of units, and the differences of both sides."""
     found = [_differences(side, pair) for side in (device, simulated)]
     clips = sorted(set(found[0]) & set(found[1]))
     rows = [[side[clip] for clip in clips] for side in found]
@@ -101,55 +98,50 @@ def _compare_sides(
 
 
 def _differences(side: ArmErrors, pair: tuple[str, str]) -> dict[str, Floats]:
-    """Clip -> differences of the captures or seeds in which both arms were measured; clips without any are left out."""
+    """Unit -> differences of the captures or seeds in which both arms were measured; units without any are left out."""
     first, second = (side.get(arm, {}) for arm in pair)
     rows = {clip: np.array(first[clip], float) - np.array(second[clip], float) for clip in first if clip in second}
     return {clip: row[np.isfinite(row)] for clip, row in rows.items() if np.isfinite(row).any()}
 
 
 def clip_means(errors: Mapping[str, Sequence[float | None]]) -> dict[str, float]:
-    """Clip -> mean over the captures or seeds that were measured; clips without any are left out."""
+    """Unit -> mean over the captures or seeds that were measured; units without any are left out."""
     known = {clip: [value for value in values if value is not None] for clip, values in errors.items()}
     return {clip: sum(values) / len(values) for clip, values in known.items() if values}
-
-
-def side_difference(values: Floats, variance: float, free: int, level: float) -> SideDifference:
-    """The mean of (n,) differences, whose noise has this variance, known with `free` degrees of freedom."""
-    mean, deviation = float(values.mean()), float(np.sqrt(variance / len(values)))
-    half = float(special.stdtrit(free, 1.0 - level)) * deviation
-    p = 0.0 if mean else 1.0
-    if deviation > 0.0:
-        p = float(special.stdtr(free, -abs(mean) / deviation))
-    return SideDifference(mean, mean - half, mean + half, p)
 
 
 def correlate_ranks(device: ArmErrors, simulated: ArmErrors) -> tuple[RankCorrelation, RankCorrelation]:
     """Kendall's tau-b and the sim-to-real correlation of the arms' mean errors.
 
-    The second is Pearson's correlation of performance in simulation and reality (SRCC, Kadian et al. 2020). Intervals
-    are percentiles of 95 % over clips that are drawn again; resamples without a value are left out.
+    The second is Pearson's correlation of performance in simulation and reality (SRCC, Kadian et al. 2020). The 95 %
+    interval of tau is what the decided pairs of arms leave. That of the correlation has percentiles over units that are
+    drawn again; resamples without a value are left out.
     """
     names = ("Kendall's tau-b", "sim-to-real correlation")
     means = [{arm: clip_means(side.get(arm, {})) for arm in device} for side in (device, simulated)]
     arms = [arm for arm in device if means[0][arm] and means[1][arm]]
     clips = shared_clips(side[arm] for side in means for arm in arms)
     if len(arms) < MIN_ARMS or len(clips) < MIN_UNITS:
-        why = f"{len(arms)} arms and {len(clips)} clips, of at least {MIN_ARMS} and {MIN_UNITS}"
+        why = f"{len(arms)} arms and {len(clips)} units, of at least {MIN_ARMS} and {MIN_UNITS}"
         first, second = (RankCorrelation(name, None, None, None, why) for name in names)
         return first, second
     sides = [np.array([[side[arm][clip] for clip in clips] for arm in arms]) for side in means]
     drawn = generator(0, "rank correlation").integers(0, len(clips), (RESAMPLES, len(clips)))
+    resampled = np.array([_pearson(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
+    finite = resampled[np.isfinite(resampled)]
+    low, high = np.quantile(finite, (0.025, 0.975)) if len(finite) else (np.nan, np.nan)
+    intervals = (
+        tau_interval(judge_pairs(device, simulated, SIGNIFICANCE, list(combinations(arms, 2)))),
+        (float(low), float(high)),
+    )
     measures: tuple[Callable[[Floats, Floats], Floats | float], ...] = (tau_b, _pearson)
     found = []
-    for name, measure in zip(names, measures, strict=True):
+    for name, measure, ends in zip(names, measures, intervals, strict=True):
         value = float(measure(sides[0].mean(axis=1), sides[1].mean(axis=1)))
-        resampled = np.array([measure(sides[0][:, k].mean(axis=1), sides[1][:, k].mean(axis=1)) for k in drawn])
-        finite = resampled[np.isfinite(resampled)]
-        if not np.isfinite(value) or not len(finite):
+        if np.isfinite(value):
+            found.append(RankCorrelation(name, value, *ends))
+        else:
             found.append(RankCorrelation(name, None, None, None, "all arms have the same error on one side"))
-            continue
-        low, high = np.quantile(finite, (0.025, 0.975))
-        found.append(RankCorrelation(name, value, float(low), float(high)))
     return found[0], found[1]
 
 

@@ -56,6 +56,8 @@ class Plan:
     """Metric by which arms are ranked; by default the first one with a margin."""
     level: Annotated[float, Range(0.001, 0.2)] = 0.05
     """Level of each one-sided test of equivalence, and of the ranks after Holm's correction."""
+    performers: dict[Name, Text] = field(default_factory=dict)
+    """Clip -> who performs it. Clips of one performer are then one unit of statistics; any other clip is its own."""
     seeds: tuple[Annotated[int, Range(0, 2**63 - 1)], ...] = (1, 2, 3, 4, 5)
     """Seeds of the simulated errors; their errors are averaged clip by clip."""
 

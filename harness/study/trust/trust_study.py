@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from harness.compare.significance import holm
+from harness.compare.units import count_units
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
@@ -42,7 +43,14 @@ from harness.study.trust.energy_distance import (
     correlation_samples,
 )
 from harness.study.trust.equivalence import judge_equivalence
-from harness.study.trust.pair_agreement import ArmErrors, clip_means, correlate_ranks, judge_pairs
+from harness.study.trust.pair_agreement import (
+    ArmErrors,
+    average_performers,
+    clip_means,
+    correlate_ranks,
+    judge_pairs,
+    unit_of,
+)
 from harness.study.trust.plan import Plan, load_plan, parameter_variants, plan_digest, scenario_file, unit_file
 from harness.study.trust.reading_errors import FEATURES, HealthCounts
 
@@ -175,10 +183,10 @@ def judge_study(
     head: TrustFindings, plan: Plan, arms: Sequence[Arm], results: Sequence[CaptureResult]
 ) -> TrustFindings:
     """The findings with both sides compared, and the outcome."""
-    device, simulated = collect_errors(results, plan.ranked_metric)
+    device, simulated = collect_errors(results, plan.ranked_metric, plan.performers)
     equivalences = []
     for metric, margin in plan.margins.items():
-        sides = collect_errors(results, metric)
+        sides = collect_errors(results, metric, plan.performers)
         for arm in map(str, arms):
             means = [clip_means(side.get(arm, {})) for side in sides]
             equivalences.append(judge_equivalence(arm, metric, means[0], means[1], margin, plan.level))
@@ -191,7 +199,7 @@ def judge_study(
         for cell in (*result.device.values(), *(each for seeds in result.simulated.values() for each in seeds))
         for value in cell.values()
     )
-    notes = [*head.notes, *(note for result in results for note in result.notes)]
+    notes = [*head.notes, _describe_units(plan, results), *(note for result in results for note in result.notes)]
     if unmeasured:
         notes.append(f"{unmeasured} errors were not measured: too few frames have an estimate.")
     return replace(
@@ -208,15 +216,31 @@ def judge_study(
     )
 
 
-def collect_errors(results: Sequence[CaptureResult], metric: str) -> tuple[ArmErrors, ArmErrors]:
-    """Errors of both sides; captures of one clip are values of that clip, and its simulations count once."""
+def _describe_units(plan: Plan, results: Sequence[CaptureResult]) -> str:
+    """The units of the statistics, in a sentence or two."""
+    captured = dict.fromkeys(result.clip for result in results)
+    counted = f"Units of the statistics: {count_units(unit_of(clip, plan.performers) for clip in captured)}."
+    if not plan.performers:
+        return f"{counted} The plan declares no performers, so that each motion is a unit, whoever performed it."
+    alone = [clip for clip in captured if clip not in plan.performers]
+    return f"{counted} No performer is declared for {', '.join(alone)}." if alone else counted
+
+
+def collect_errors(
+    results: Sequence[CaptureResult], metric: str, performers: Mapping[str, str] | None = None
+) -> tuple[ArmErrors, ArmErrors]:
+    """Errors of both sides; captures of one clip are values of that clip, and its simulations count once.
+
+    Clips of one of the `performers` (clip -> performer) become one unit (see `average_performers`).
+    """
     device: dict[str, dict[str, list[float | None]]] = {}
     simulated: dict[str, dict[str, list[float | None]]] = {}
     for result in results:
         for arm, seeds in result.simulated.items():
             device.setdefault(arm, {}).setdefault(result.clip, []).append(result.device.get(arm, {}).get(metric))
             simulated.setdefault(arm, {})[result.clip] = [errors.get(metric) for errors in seeds]
-    return device, simulated
+    known = performers or {}
+    return average_performers(device, known, paired=False), average_performers(simulated, known, paired=True)
 
 
 def comparable_pairs(arms: Sequence[Arm]) -> list[tuple[str, str]]:

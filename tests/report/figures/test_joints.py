@@ -50,7 +50,7 @@ def test_bars_are_means_over_clips(framed: Path, width_mm: int, panels: int) -> 
 def test_one_clip_has_no_interval(framed: Path) -> None:
     run = read_conditions(framed)
     clip = run.conditions[0].clips[0]
-    assert "Whiskers: 95 % interval over clips." in joints_figure(run, FigureSelection()).caption
+    assert "Whiskers: 95 % interval over units." in joints_figure(run, FigureSelection()).caption
     figure = joints_figure(run, FigureSelection(clip=clip))
     assert "Whiskers" not in figure.caption
     assert clip in figure.caption

@@ -23,7 +23,7 @@ from tests.report.reading import text_of
 NO_PICTURE = "the renderer was ended by SIGABRT"
 ANSWER = (
     "Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis, 2.40 deg (2.01 to 2.79). "
-    "On 6 held-out clips the error is 2.52 deg (2.12 to 2.92)."
+    "On 6 held-out units the error is 2.52 deg (2.12 to 2.92). Sets were chosen on 8 takes."
 )
 
 
@@ -79,7 +79,7 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
 
 def test_too_few_clips_are_said_to_be_too_few() -> None:
     few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "but 3 clips are too few to compare sets: head + pelvis" in sentence(few)
+    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended() -> None:

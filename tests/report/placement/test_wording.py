@@ -38,8 +38,8 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
     assert sentence(asked) == (
-        "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out clips; tied with 2 of the "
-        "54 other pairs that were tried: head + pelvis; sternum + pelvis."
+        "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of the "
+        "54 other pairs that were tried: head + pelvis; sternum + pelvis. Sets were chosen on 8 takes."
     )
     assert placement_text(asked).startswith("Best two stations for walking: both ankles")
     assert placement_page(asked).headline == sentence(asked)
@@ -50,7 +50,7 @@ def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindi
     said = sentence(asked)
     assert said.startswith("Best station for walking and table tennis: ")
     assert "Best three stations for walking and table tennis: both ankles + pelvis, " in said
-    assert said.endswith("No set of 4 stations was measured.")
+    assert said.endswith("No set of 4 stations was measured. Sets were chosen on 8 takes.")
 
 
 def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
@@ -64,7 +64,9 @@ def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFinding
     best = findings.best[0]
     others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
     asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=11),))
-    assert sentence(asked).endswith("8 clips cannot tell it from the other 10 places.")
+    assert sentence(asked).endswith(
+        " 8 units cannot tell it from the other 10 places (13 might). Sets were chosen on 8 takes."
+    )
     enough = replace(asked, power=replace(POWER, least_clips=8))
     assert "tied with 10 of the 10 other places that were tried: " in sentence(enough)
     two = replace(enough, best=(replace(best, ties=others[:1], of=2),))
@@ -74,11 +76,11 @@ def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFinding
 def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> None:
     first, second = power_sentences(POWER)
     assert first == (
-        "16 clips can show a difference of 1.02 deg between two of 165 sets (power 80 %, p corrected for 164 "
+        "16 units can show a difference of 1.02 deg between two of 165 sets (power 80 %, p corrected for 164 "
         "comparisons). The study takes 10 min."
     )
     assert second == (
-        "A difference of 0.3 deg, a tenth of the error, would need about 190 clips, about 1.9 h. Spread and time are "
+        "A difference of 0.3 deg, a tenth of the error, would need about 190 units, about 1.9 h. Spread and time are "
         "those of the first 4 sets."
     )
     assert power_sentences(replace(POWER, needed_clips=16)) == [first]
@@ -87,12 +89,12 @@ def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> N
 def test_too_few_clips_are_said_before_anything_else() -> None:
     few = replace(POWER, clips=3, sets=3, least_clips=7, duration_s=20.0, least_duration_s=44.0, needed_clips=None)
     assert power_sentences(few) == [
-        "3 clips cannot show any difference between 3 sets, 7 might (44 s). The study takes 20 s."
+        "3 units cannot show any difference between 3 sets, 7 might (44 s). The study takes 20 s."
     ]
     unknown = replace(few, duration_s=None, least_duration_s=None)
-    assert power_sentences(unknown) == ["3 clips cannot show any difference between 3 sets, 7 might."]
+    assert power_sentences(unknown) == ["3 units cannot show any difference between 3 sets, 7 might."]
     assert power_sentences(replace(few, sets=1)) == [
-        "One set is measured on 3 clips: nothing is compared. The study takes 20 s."
+        "One set is measured on 3 units: nothing is compared. The study takes 20 s."
     ]
     assert "unknown" in power_sentences(replace(few, clips=7, shown=None))[0]
 
@@ -139,12 +141,12 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
     assert said in page_html(placement_page(replace(findings, agreements=(pair,))), with_charts=False)
     untested = replace(pair, changes=1, changed=(replace(change, significant=None),))
     assert changes_sentence(findings, untested).startswith(
-        "1 of 10 pairs changes its order (too few clips or too many sets to test): first"
+        "1 of 10 pairs changes its order (too few units or too many sets to test): first"
     )
     assert changes_sentence(findings, replace(pair, changes=0, changed=())) == "no pair of 10 changes its order"
 
 
 def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
-    clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
+    clips = [f"performer {k}" for k in range(1, 7)]
     for sizes in ((), (2,)):
-        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on 6 clips of 3 performers.")
+        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from harness.compare.units import BY_NAME, Sampling
 from harness.report.run import calibration_cost
 from harness.report.run.calibration_errors import calibration_table, section, text
 
@@ -55,25 +56,29 @@ def judged(kind: str, clip: str, error: float | None) -> dict[str, Any]:
     return cell(kind, clip) | same | {"mpjpe_pa_mm": error}
 
 
-def test_what_calibrating_costs_is_paired_by_clip() -> None:
+def test_what_calibrating_costs_is_paired_by_unit() -> None:
     clips = "abcdef"
     exact = [judged("exact", clip, float(n)) for n, clip in enumerate(clips)]
     cost = [judged("poses", clip, n + 0.5) for n, clip in enumerate(clips)]
     few = [judged("tpose", clip, n + 1.0 if n else None) for n, clip in enumerate(clips)]
-    table = calibration_cost.cost_table([*exact, *cost, *few])
+    table = calibration_cost.cost_table([*exact, *cost, *few], BY_NAME)
     assert table is not None
     angle, place = table.rows
     assert table.head == ["behaviour", "method", "error", "exact", "poses", "tpose"]
-    assert angle[2:] == ["joint angle [deg]", "2.50", "+0.5", "+1 (too few clips)"]
+    assert angle[2:] == ["joint angle [deg]", "2.50", "+0.5", "+1 (too few units: 5, of at least 6)"]
     assert place[2:4] == ["mpjpe_pa [mm]", "2.5"]
     assert "+0.5" in "\n".join(calibration_cost.text({"cells": [*exact, *cost]}))
-    assert "<td>+0.5</td>" in calibration_cost.section([*exact, *cost])
+    of_two = Sampling({clip: "Anna" if clip < "d" else "Bert" for clip in clips})
+    few_performers = calibration_cost.cost_table([*exact, *cost], of_two)
+    assert few_performers is not None
+    assert few_performers.rows[0][-1] == "+0.5 (too few units: 2, of at least 6)"
+    assert "<td>+0.5</td>" in calibration_cost.section([*exact, *cost], BY_NAME)
 
 
 def test_no_cost_is_told_without_something_to_hold_it_against() -> None:
-    assert calibration_cost.cost_table([judged("poses", "a", 1.0)]) is None
+    assert calibration_cost.cost_table([judged("poses", "a", 1.0)], BY_NAME) is None
     assert calibration_cost.text({"cells": [judged("exact", "a", 1.0)]}) == []
-    assert calibration_cost.section([]) == ""
+    assert calibration_cost.section([], BY_NAME) == ""
 
 
 def test_what_an_equation_does_not_give_is_none() -> None:

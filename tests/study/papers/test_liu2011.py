@@ -39,10 +39,10 @@ class Told(PaperStudy):
     errors: Mapping[str, float] = field(default_factory=dict)
     made: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
-    def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
+    def summary_rows(self, run: str) -> list[dict[str, Any]]:
         if run not in self.made:
             self.made[run] = self.make(run) if run in self.runs else []
-        return [row for row in self.made[run] if all(row[name] == value for name, value in where.items())]
+        return self.made[run]
 
     def make(self, run: str) -> list[dict[str, Any]]:
         found = []
@@ -62,7 +62,7 @@ class Told(PaperStudy):
                         found.append({**row, "joint_angle_mean_deg": mean, "joint_angle_rms_deg": 1.5 * mean})
         return found
 
-    def cells(self, run: str, **where: Any) -> Iterator[Cell]:
+    def cells(self, run: str, **where: Any) -> Iterator[tuple[dict[str, Any], Cell]]:
         return iter(())
 
 
@@ -120,9 +120,9 @@ def test_on_real_motion_known_and_new_performers_stand_apart_and_what_is_absent_
     clips = {claim.text.split(": ")[0]: claim.clips for claim in found.claims}
     for behaviour in ("walking", "jumping", "boxing", "swordplay (for table tennis)"):
         assert clips[f"{behaviour}, positions"] == 12
-    assert clips["walking, new performers, positions"] == 55
-    assert clips["jumping, new performers, positions"] == 20
-    assert clips["boxing, new performers, positions"] == 18
+    assert clips["walking, new performers, positions"] == 13  # performers; their walks are 55
+    assert clips["jumping, new performers, positions"] == 6
+    assert clips["boxing, new performers, positions"] == 5
     absent = {claim.text.split(":")[0]: claim.why for claim in found.claims if claim.verdict == "not run"}
     assert set(absent) == {"golf"}  # one swing is not judged; swordplay stands in for table tennis
     assert all("use synthetic motion" in why for why in absent.values())
@@ -138,13 +138,16 @@ def test_new_performers_have_one_vote_each() -> None:
 
 @pytest.mark.parametrize("motion", ["builtin", "cmu"])
 def test_what_is_true_of_every_clip_stands_holms_correction(motion: Motion) -> None:
-    """Every condition has enough clips for the number of statements that the paper prints."""
+    """Every condition has enough units for the number of printed statements, or says how many would do."""
     study = told(motion, {**THEIRS, "all": -1.0, "share": 5.0, "pos": 9.0, "mixed": 12.0, "pos+torso_ori": 6.0})
     experiments = [PAPER.experiments[name](study) for name in PAPER.experiments if name not in ("eigenmodes", "speed")]
     claims = [claim for experiment in correct_experiments(experiments) for claim in experiment.claims]
     tested = [claim for claim in claims if claim.kind == "printed" and claim.p_holm is not None]
     assert len(tested) > 30
-    assert {claim.verdict for claim in tested} == {"reproduced"}
+    assert {claim.verdict for claim in tested if claim.clips >= 12} == {"reproduced"}
+    few = [claim for claim in tested if claim.clips < 12]
+    assert all(claim.verdict == "cannot tell" and "a difference needs 1" in claim.why for claim in few)
+    assert {claim.text.partition(":")[0].rpartition(", ")[0] for claim in few} <= {"jumping, new performers"}
 
 
 @pytest.mark.parametrize("motion", ["builtin", "cmu"])

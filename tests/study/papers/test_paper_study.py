@@ -21,7 +21,7 @@ from harness.results.findings import BarChart, LineChart, PaperExperiment, read_
 from harness.results.lock import folder_lock
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
-from harness.study.papers.tables import errors_by_clip
+from harness.study.papers.tables import errors_by_unit
 from tests.interrupts import heeding_interrupts
 from tests.results.finish import folder_bytes
 from tests.study.papers.tiny import BOUTS, TINY, WALKS
@@ -40,24 +40,24 @@ def test_findings_hold_what_the_cells_say(finished: Path) -> None:
     findings = read_findings(finished / "findings.json")
     walks, bouts = findings.experiments
     study = PaperStudy(finished, "builtin", 1, TINY.plan("builtin", 1))
-    errors = {method: errors_by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
-    assert {clip for each in errors.values() for clip in each} == set(WALKS.motion.test)
-    for cell in study.cells("walks"):
+    errors = {method: errors_by_unit(study.rows("walks", method=method)) for method in WALKS.methods}
+    assert {unit for each in errors.values() for unit in each} == {"performer p1", "performer p2"}
+    for row, cell in study.cells("walks"):
         of_frames = float(np.mean(cell.errors["joint_angle_mean_deg"][cell.scores.scored]))
-        assert of_frames == pytest.approx(errors[cell.method][cell.clip], rel=1e-4)
+        assert of_frames == pytest.approx(errors[cell.method][row["unit"]], rel=1e-4)
     claim = walks.claims[0]
     assert (claim.clips, claim.verdict, claim.low) == (2, "cannot tell", None)
-    off = [errors["ik:previous"][clip] - errors["mean_pose"][clip] for clip in WALKS.motion.test]
+    off = [errors["ik:previous"][unit] - errors["mean_pose"][unit] for unit in errors["mean_pose"]]
     assert claim.value == pytest.approx(np.mean(off))
     bars, lines = walks.figures
     assert isinstance(bars, BarChart)
     assert isinstance(lines, LineChart)
     assert list(bars.series["mean_pose"]) == pytest.approx([np.mean(list(errors["mean_pose"].values()))])
     drawn = np.array(lines.series["mean_pose"], float)
-    assert np.mean(drawn) == pytest.approx(errors["mean_pose"]["walking_p1_01"], rel=1e-4)
+    assert np.mean(drawn) == pytest.approx(errors["mean_pose"]["performer p1"], rel=1e-4)
     assert lines.x[0] >= 1.0  # the warm-up is not drawn
     assert bouts.claims[0].clips == 1
-    assert walks.notes == ("4 cells",)
+    assert walks.notes == ("4 cells", "Units of the statistics: walks: 2 performers.")
 
 
 def test_the_study_says_what_it_rests_on(finished: Path) -> None:
@@ -65,7 +65,8 @@ def test_the_study_says_what_it_rests_on(finished: Path) -> None:
     (left_out,) = {row[1:] for row in tables["Left out"].rows}
     assert left_out == ("walking_p3_01", "two clips are enough")
     databases = {row[0]: row for row in tables["Test clips and examples"].rows}
-    assert databases["walks"][2:] == ("walking_p1_01, walking_p2_01", "2: walking_p1_02, walking_p2_02", "1,600")
+    tested, learnt = "walking_p1_01, walking_p2_01", "2: walking_p1_02, walking_p2_02"
+    assert databases["walks"][2:] == (tested, "2 performers", learnt, "1,600")
     constants = {row[0]: row[1] for row in tables["Constants of the methods"].rows}
     assert set(constants) == set(WALKS.methods)
     manifest = json.loads((finished / "walks" / "manifest.json").read_text())
@@ -196,7 +197,7 @@ def test_what_fails_is_told_and_stops_nothing(tmp_path: Path) -> None:
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert seen[-1] == (8, 8)
     study = PaperStudy(tmp_path / "tiny", "builtin", 1, {"walks": broken})
-    assert errors_by_clip(study.rows("walks", method="tests.experiment.test_engine:Broken")) == {}
+    assert errors_by_unit(study.rows("walks", method="tests.experiment.test_engine:Broken")) == {}
     failures = run_scenarios({"walks": broken}, tmp_path / "tiny")
     assert len(failures) == 2
     assert all("on purpose" in text for text in failures.values())
@@ -204,13 +205,13 @@ def test_what_fails_is_told_and_stops_nothing(tmp_path: Path) -> None:
 
 def test_known_and_new_performers_are_never_pooled(finished: Path) -> None:
     rows = PaperStudy(finished, "builtin", 1, {"walks": WALKS}).rows("walks", method="mean_pose")
-    assert len(errors_by_clip(rows)) == 2
+    assert len(errors_by_unit(rows)) == 2
     with pytest.raises(BadInput, match="performer"):
-        errors_by_clip([rows[0], {**rows[1], "performer": "new"}])
+        errors_by_unit([rows[0], {**rows[1], "performer": "new"}])
     with pytest.raises(BadInput, match="method"):
-        errors_by_clip([rows[0], {**rows[1], "method": "ik"}])
+        errors_by_unit([rows[0], {**rows[1], "method": "ik"}])
     with pytest.raises(BadInput, match="Two errors"):
-        errors_by_clip([rows[0], rows[0]])
+        errors_by_unit([rows[0], rows[0]])
 
 
 def test_a_paper_without_runs_on_a_motion_says_so(tmp_path: Path) -> None:

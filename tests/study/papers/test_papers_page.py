@@ -44,7 +44,7 @@ def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     imports = (
         "from harness.results.findings import PaperExperiment\nfrom harness.compare.claims import claim_lower_error\n"
         "from harness.study.papers.paper_study import PaperStudy\n"
-        "from harness.study.papers.tables import errors_by_clip, mean_bars\n\n\n"
+        "from harness.study.papers.tables import errors_by_unit, mean_bars\n\n\n"
     )
     file = tmp_path / "swords.py"
     file.write_text(imports + code)

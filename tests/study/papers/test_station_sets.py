@@ -43,9 +43,9 @@ def test_a_set_is_named_in_the_papers_order() -> None:
 
 def test_rows_are_put_together_by_what_is_worn() -> None:
     kind = {"method": "kernel_cca", "inputs": "pos+ori", "split": "sequence", "performer": "known", "lag": 0}
-    kind |= {"behaviour": "walking"}
+    kind |= {"behaviour": "walking", "unit_clips": 1}
     rows = [
-        {**kind, "varied": {"worn": worn}, "stations": worn, "clip": clip, "joint_angle_mean_deg": error}
+        {**kind, "varied": {"worn": worn}, "stations": worn, "clip": clip, "unit": clip, "joint_angle_mean_deg": error}
         for clip, worn, error in (("a", ["pelvis"], 1.0), ("b", ["pelvis"], 2.0), ("a", ["pelvis", "right_hand"], 3.0))
     ]
     assert errors_by_set(rows) == {"PEL": {"a": 1.0, "b": 2.0}, "RH+PEL": {"a": 3.0}}

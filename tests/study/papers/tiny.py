@@ -11,7 +11,7 @@ from harness.results.findings import PaperExperiment
 from harness.study.papers import paper as papers
 from harness.study.papers.paper import Paper
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import error_lines, errors_by_clip, errors_by_joint_group, mean_bars, mean_table
+from harness.study.papers.tables import error_lines, errors_by_joint_group, errors_by_unit, mean_bars, mean_table
 
 WALKS = Scenario(
     name="walks",
@@ -36,8 +36,8 @@ BOUTS = replace(
 
 
 def walks(study: PaperStudy) -> PaperExperiment:
-    errors = {method: errors_by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
-    cells = {cell.method: cell for cell in study.cells("walks", clip="walking_p1_01")}
+    errors = {method: errors_by_unit(study.rows("walks", method=method)) for method in WALKS.methods}
+    cells = {cell.method: cell for _, cell in study.cells("walks", clip="walking_p1_01")}
     groups = {method: errors_by_joint_group(study.cells("walks", method=method)) for method in WALKS.methods}
     kept = study.cached_measurement("count", lambda: len(list((study.out / "walks" / "cells").iterdir())))
     return PaperExperiment(
@@ -54,7 +54,7 @@ def walks(study: PaperStudy) -> PaperExperiment:
 
 
 def bouts(study: PaperStudy) -> PaperExperiment:
-    errors = {method: errors_by_clip(study.rows("bouts", method=method)) for method in ("mean_pose", "ik:previous")}
+    errors = {method: errors_by_unit(study.rows("bouts", method=method)) for method in ("mean_pose", "ik:previous")}
     claim = claim_lower_error("mean_pose errs less", errors["mean_pose"], errors["ik:previous"])
     return PaperExperiment("bouts", "A bout", "Which is less?", (), claims=(claim,), runs=("bouts",))
 

@@ -10,6 +10,7 @@ import pytest
 
 import harness
 from harness.cli import main
+from harness.compare.units import Sampling
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.scenario import load_scenario
 from harness.experiment.status import read_status
@@ -26,6 +27,7 @@ from tests.results.finish import folder_bytes
 
 SCENARIO = """
 schema = 1
+unit = "clip"
 methods = ["ik"]
 noise = "clean"
 [motion]
@@ -215,7 +217,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
         (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base has 'knee'"),
         (["[add]\nbase = ['pelvis']\nof = ['pelvis']"], "add.of: 0 stations"),
         (["[refine]\nset = ['pelvis']\nalong = []"], "equally many of both"),
-        (["[refine]\nset = ['pelvis']"], "with 2 clips, none of 4 moves .* 8 clips or more"),
+        (["[refine]\nset = ['pelvis']"], "with 2 units, none of 4 moves .* 8 units"),
         (["[refine]\nset = ['pelvis']\nalong = [0.1, 0.0]"], "steps above 0"),
         (["[ablate]\n[changes]\nmethods = ['ik']"], "The study defines these keys"),
         (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
@@ -309,7 +311,7 @@ def test_what_was_chosen_is_judged_on_clips_that_chose_nothing(
     one, two = findings.best
     assert (one.held_out_clips, one.of, two.of) == (1, 3, 3)
     assert one.held_out is not None
-    chosen_on = set(load_scenario(folder / "walk.toml").motion.test)
+    chosen_on = set(map(Sampling(unit="clip").unit_of, load_scenario(folder / "walk.toml").motion.test))
     assert all(set(tried.errors) == chosen_on for tried in findings.tried)
     assert len(list((folder / "out" / "cells").iterdir())) == 2 * (2 * 6 + 2)
 
@@ -417,3 +419,17 @@ def test_the_pilot_is_announced_before_the_other_cells_and_is_part_of_the_study(
     assert findings.power == power
     assert len(list((tmp_path / "out" / "cells").iterdir())) == 3 * 2
     assert findings.sizes == (1,)
+
+
+def test_clips_of_one_performer_are_one_unit(tmp_path: Path) -> None:
+    path = written(tmp_path, "[exhaustive]", "fewest = 1", "most = 1")
+    scenario = tmp_path / "walk.toml"
+    scenario.write_text(scenario.read_text().replace('unit = "clip"', 'unit = "performer"'))
+    findings, _ = run_placement(path, tmp_path / "out")
+    cells = [json.loads((cell / "cell.json").read_text()) for cell in (tmp_path / "out" / "cells").iterdir()]
+    for tried in findings.tried:
+        errors = [cell["metrics"]["root_angle_deg"] for cell in cells if cell["stations"] == list(tried.stations)]
+        assert len(errors) == 2
+        assert tried.errors == {"performer p1": pytest.approx(sum(errors) / 2.0)}
+    assert findings.power is not None
+    assert findings.power.clips == 1

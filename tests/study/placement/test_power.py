@@ -10,9 +10,9 @@ from harness.results.placement_findings import StationPlacement
 from harness.study.placement.power import (
     POWER,
     choose_pilot,
-    clips_needed,
     estimate_power,
     smallest_effect,
+    units_needed,
 )
 
 SETS = [(StationPlacement(f"place_{n}", "head", 0.5, 0.0),) for n in range(10)]
@@ -46,9 +46,9 @@ def test_more_clips_show_smaller_differences(comparisons: int) -> None:
 
 def test_the_clips_that_are_needed_are_the_fewest_that_show_it() -> None:
     for effect in (2.5, 1.0, 0.3):
-        clips = clips_needed(effect, 9)
+        clips = units_needed(effect, 9)
         assert smallest_effect(clips, 9) <= effect < smallest_effect(clips - 1, 9)
-    assert clips_needed(1e-9, 9) == 1_000_000
+    assert units_needed(1e-9, 9) == 1_000_000
 
 
 def test_the_pilot_is_spread_evenly() -> None:
@@ -64,18 +64,18 @@ def test_spread_is_that_of_paired_differences_and_the_whole_is_scaled_by_it(rng:
         for stations in SETS[:3]
     }
     options = {"sets": 10, "unit": "deg", "cell_s": 0.5, "duration_s": lambda clips: 2.0 * clips}
-    power = estimate_power(costs, clips=20, **options)  # type: ignore[arg-type]
+    power = estimate_power(costs, units=20, **options)  # type: ignore[arg-type]
     assert power.spread == pytest.approx(0.1 * math.sqrt(2.0), rel=0.1)
     assert power.wanted == pytest.approx(0.5, rel=0.1)
     assert power.shown == pytest.approx((power.spread or 0.0) * smallest_effect(20, 9))
     assert (power.least_clips, power.duration_s, power.least_duration_s) == (9, 40.0, 18.0)
-    assert power.needed_clips == clips_needed((power.wanted or 0.0) / (power.spread or 1.0), 9)
+    assert power.needed_clips == units_needed((power.wanted or 0.0) / (power.spread or 1.0), 9)
     assert power.needed_duration_s == 2.0 * (power.needed_clips or 0)
-    assert estimate_power(costs, clips=8, **options).shown is None  # type: ignore[arg-type]
+    assert estimate_power(costs, units=8, **options).shown is None  # type: ignore[arg-type]
 
 
 def test_without_a_pilot_only_the_least_number_of_clips_is_known() -> None:
-    power = estimate_power({}, clips=7, sets=10, unit="deg", cell_s=None, duration_s=lambda clips: None)
+    power = estimate_power({}, units=7, sets=10, unit="deg", cell_s=None, duration_s=lambda clips: None)
     assert (power.least_clips, power.spread, power.shown, power.needed_clips, power.pilot_sets) == (
         *(9, None, None, None, 0),
     )

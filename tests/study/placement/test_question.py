@@ -15,10 +15,12 @@ TRIPLES = PlacementQuestion(3, 3, ("table_tennis",))
 def test_clips_to_choose_on_to_test_and_to_learn_from_are_disjoint_and_of_all_performers() -> None:
     study, scenario = question_study(TRIPLES, None)
     roles = scenario.motion.test, study.held_out, scenario.motion.examples
-    assert [len(role) for role in roles] == [16, 16, 16]
-    assert len(set().union(*roles)) == 48
-    for role in roles:
-        assert {name.split("_")[2] for name in role} == {f"p{n}" for n in range(1, 9)}
+    assert [len(role) for role in roles] == [16, 16, 32]
+    assert len(set().union(*roles)) == 64
+    performers = [{name.split("_")[2] for name in role} for role in roles]
+    assert performers[0] == {f"p{n}" for n in range(1, 17)}
+    assert performers[1] == {f"p{n}" for n in range(17, 33)}  # the choice is tested on others
+    assert performers[2] == performers[0] | performers[1]  # of each, methods have learnt another take
     assert scenario.motion.behaviours == ("table_tennis",)
 
 
@@ -27,6 +29,7 @@ def test_several_behaviours_have_equal_shares() -> None:
     study, scenario = question_study(question, None)
     assert scenario.motion.behaviours == ("walking", "boxing") * 8
     assert [clip.startswith("walking") for clip in scenario.motion.test] == [True, False] * 8
+    assert len({clip.split("_")[1] for clip in (*scenario.motion.test, *study.held_out)}) == 32
     plan = plan_study(study, lambda name: scenario, None)
     assert plan.held_out is not None
     assert plan.held_out.motion.behaviours == ("walking", "boxing") * 8
@@ -86,7 +89,7 @@ def test_clips_that_are_asked_for_are_not_reduced() -> None:
         ({"fewest": 4}, BadInput, "4 to 3 stations of 11 places"),
         ({"most": 12}, BadInput, "Ask for 1 to 11"),
         ({"fewest": 0}, BadInput, "0 to 3 stations"),
-        ({"clips": 17}, BadInput, "17 clips of 16 to choose on"),
+        ({"clips": 200}, BadInput, "200 clips of 128 to choose on"),
     ],
 )
 def test_what_is_refused_says_why(changes: dict[str, object], error: type[Exception], said: str) -> None:

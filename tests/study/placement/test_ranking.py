@@ -93,7 +93,7 @@ def test_a_set_that_misses_a_clip_is_not_ranked_but_named() -> None:
     sets["a",]["clip_05"] = None
     whole, left_out = complete_sets(sets)
     assert list(whole) == [("b",), ("c",)]
-    assert left_out == ["not ranked: a was measured on 10 of 11 clips"]
+    assert left_out == ["not ranked: a was measured on 10 of 11 units"]
     assert [row.stations for row in rank_sets("add", "", sets).rows] == [("b",), ("c",)]
     nothing: Sets = {("a",): {"clip": None}}
     assert complete_sets(nothing)[0] == {}

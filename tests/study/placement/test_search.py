@@ -212,7 +212,7 @@ def test_refining_ends_after_as_many_moves_as_asked_for() -> None:
 
 
 def test_refining_on_too_few_clips_is_refused_with_how_many_it_takes() -> None:
-    with pytest.raises(BadInput, match="9 clips or more"):
+    with pytest.raises(BadInput, match="9 units"):
         refine_set(RefineOptions(), START, Measured([], 0.1), 8)
 
 

@@ -59,7 +59,7 @@ def test_few_clips_and_clips_of_one_side_are_undecided() -> None:
     few = dict(list(simulated.items())[:5])
     found = judge_equivalence("ik", "mpjpe_mm", device, few, MARGIN, LEVEL)
     assert (found.clips, found.verdict, found.low) == (5, "cannot tell", None)
-    assert "too few clips: 5" in found.why
+    assert "too few units: 5" in found.why
     empty = judge_equivalence("ik", "mpjpe_mm", device, {"another": 1.0}, MARGIN, LEVEL)
     assert (empty.clips, empty.difference, empty.verdict) == (0, None, "cannot tell")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.study.trust.pair_agreement import ArmErrors, clip_means, correlate_ranks, judge_pairs
+from harness.study.trust.pair_agreement import ArmErrors, average_performers, clip_means, correlate_ranks, judge_pairs
 
 LEVEL, CLIPS, SEEDS = 0.05, 12, 5
 
@@ -128,7 +128,7 @@ def test_five_clips_are_too_few() -> None:
     few = {arm: dict(list(clips.items())[:5]) for arm, clips in device.items()}
     (found,) = judge_pairs(few, simulated, LEVEL)
     assert (found.verdict, found.p, found.device.low) == ("cannot tell", None, None)
-    assert "too few clips: 5" in found.why
+    assert "too few units: 5" in found.why
     (none,) = judge_pairs({"a": {}, "b": {}}, simulated, LEVEL)
     assert (none.clips, none.device.mean) == (0, None)
 
@@ -178,7 +178,7 @@ def test_rank_correlations_of_equal_and_of_reversed_orders() -> None:
 def test_rank_correlations_need_three_arms_six_clips_and_a_difference() -> None:
     two = {"a": 1.0, "b": 2.0}
     tau, _ = correlate_ranks(side("d", two, 1), side("s", two, 1))
-    assert (tau.value, tau.reason) == (None, "2 arms and 12 clips, of at least 3 and 6")
+    assert (tau.value, tau.reason) == (None, "2 arms and 12 units, of at least 3 and 6")
     equal: ArmErrors = {arm: {f"{k}": [1.0] for k in range(6)} for arm in "abc"}
     for found in correlate_ranks(equal, equal):
         assert found.value is None
@@ -187,3 +187,15 @@ def test_rank_correlations_need_three_arms_six_clips_and_a_difference() -> None:
 
 def test_means_leave_out_what_was_not_measured() -> None:
     assert clip_means({"x": [1.0, None, 3.0], "y": [None], "z": []}) == {"x": 2.0}
+
+
+def test_clips_of_a_performer_are_one_unit() -> None:
+    errors: ArmErrors = {"ik": {"a": [1.0, 3.0], "b": [5.0, 7.0], "c": [2.0, None]}}
+    both = {"a": "Anna", "b": "Anna"}
+    seeds = average_performers(errors, both, paired=True)
+    assert seeds == {"ik": {"performer Anna": [3.0, 5.0], "c": [2.0, None]}}
+    captures = average_performers(errors, both, paired=False)
+    assert captures == {"ik": {"performer Anna": [4.0], "c": [2.0, None]}}
+    missing = average_performers(errors, {"a": "Anna", "c": "Anna"}, paired=True)
+    assert missing["ik"]["performer Anna"] == [1.5, None]
+    assert average_performers(errors, {}, paired=False) == errors

@@ -229,7 +229,7 @@ def test_a_changed_plan_is_not_comparable_unless_exploratory(small_study: SmallS
     assert not (tmp_path / "refused").exists()
     found = run_trust_study(changed, small_study.captures[:1], tmp_path / "out", exploratory=True).findings
     assert found.exploratory
-    assert (found.outcome, found.equivalences[0].why) == (Outcome.NOT_COMPARABLE, "too few clips: 1, of at least 6")
+    assert (found.outcome, found.equivalences[0].why) == (Outcome.NOT_COMPARABLE, "too few units: 1, of at least 6")
 
 
 def test_a_renewed_plan_is_not_that_of_the_capture(small_study: SmallStudy, tmp_path: Path) -> None:
