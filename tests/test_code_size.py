@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from tests.code_size import ROOT, budget_line, budgeted_sizes, code_lines, read_budget
+from tests.code_size import budget_line, budgeted_sizes, code_lines, read_budget
+from tests.test_prose import ROOT
 
 
 def test_only_code_counts() -> None:
