@@ -61,10 +61,10 @@ KINDS: tuple[Verdict, ...] = tuple(MEANINGS)
 _CLAIMS = (
     "Difference: mean of the paired differences over units (performers, or clips where a note says so) and its 95 % "
     "interval; positive values agree with the paper. p: by sign flips (by Welch's test where units do not pair), after "
-    "Holm's correction for all printed statements of the paper with the same version of the methods (as printed, ours). "
-    "The text under a claim gives the reason for its verdict. Kind: the paper prints a printed statement; a derived one follows from those or is "
-    "our interpretation of a word; a repeated one asks one more method; speed compares today's machines with the "
-    "paper's. Only printed statements count in the headline."
+    "Holm's correction for all printed statements of the paper with the same version of the methods (as printed, "
+    "ours). The text under a claim gives the reason for its verdict. Kind: the paper prints a printed statement; a "
+    "derived one follows from those or is our interpretation of a word; a repeated one asks one more method; speed "
+    "compares today's machines with the paper's. Only printed statements count in the headline."
 )
 _STATEMENTS = (
     "As printed: the equations of the paper, without additions. Ours: the methods of this project that extend them. "
