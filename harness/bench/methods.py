@@ -61,7 +61,7 @@ MAX_P99_RATIO, MAX_MEMORY_RATIO, MAX_LARGE_RATIO = 3.0, 1.5, 1.3
 MAX_LEARNING_UNITS = 400.0
 """Most CPU time to learn from a million frames (see `cpu_time`)."""
 MIN_RECALL = 0.95
-_COST_KEYS = ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio", "large_learning_s")
+_COST_KEYS = ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio", "large_learning_units")
 """Keys of the rows of a method's other costs in the JSON output, in their order."""
 
 

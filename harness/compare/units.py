@@ -50,14 +50,6 @@ def average_units(values: Mapping[str, float], sampling: Sampling = BY_NAME) -> 
     return {unit: float(np.mean(of_unit[unit])) for unit in sorted(of_unit)}
 
 
-def average_complete_units(
-    values: Mapping[str, float], planned: Iterable[str], sampling: Sampling = BY_NAME
-) -> dict[str, float]:
-    """`average_units` without the units of which a planned clip has no value, so that unit means can be paired."""
-    incomplete = {sampling.unit_of(clip) for clip in planned if clip not in values}
-    return {unit: value for unit, value in average_units(values, sampling).items() if unit not in incomplete}
-
-
 def count_units(units: Iterable[str]) -> str:
     """The number of units in words: "12 performers", "3 takes", or "9 units" of both kinds.
 

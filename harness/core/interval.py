@@ -134,7 +134,8 @@ class Interval:
         half = 0.5 * (self.high - self.low)
         if not (self.has_interval and math.isfinite(half)):
             text = f"{self.value:.{4 if self.low == self.high else 3}g}"
-            return len(text.partition(".")[2]) if "e" not in text else 0
+            digits, _, exponent = text.partition("e")
+            return max(len(digits.partition(".")[2]) - int(exponent or 0), 0)
         most = decimals_for(self.value or half, digits=_MOST_DIGITS, most=_MOST_DECIMALS)
         decimals = min(decimals_for(half, digits=2, most=_MOST_DECIMALS), most)
         texts = [f"{number:.{decimals}f}" for number in (self.value, self.low, self.high)]

@@ -110,8 +110,8 @@ def hold_to_limit(
     """
     target = f">= {least:g}" if least is not None else "" if most is None else f"<= {most:g}" if most else "0"
     known = math.isfinite(value)
-    met = (least is None or value >= least) and (most is None or value <= most)
-    measured = f"{f'{value:,.3g}' if value < 100 else f'{value:,.0f}'} {unit}".rstrip() if known else NOT_MEASURED
+    met = _is_within(value, least, most)
+    measured = f"{_write_beside(value, least, most)} {unit}".rstrip() if known else NOT_MEASURED
     why = doubt or ("" if known or not target else "nothing was measured")
     return state_verdict(
         *(text, target, measured, met if known and not doubt else None, reference, why if target else ""),
@@ -119,6 +119,19 @@ def hold_to_limit(
         unit=unit,
         more=dict(more or {}),
     )
+
+
+def _is_within(value: float, least: float | None, most: float | None) -> bool:
+    return (least is None or value >= least) and (most is None or value <= most)
+
+
+def _write_beside(value: float, least: float | None, most: float | None) -> str:
+    """A value with three digits, or with as many as show on which side of its limit it lies."""
+    for digits in range(3, 17):
+        text = f"{value:,.0f}" if abs(value) >= 100.0 and digits == 3 else f"{value:,.{digits}g}"
+        if _is_within(float(text.replace(",", "")), least, most) == _is_within(value, least, most):
+            return text
+    return repr(value)
 
 
 def outcome_of(statements: Sequence[BenchmarkStatement]) -> Outcome:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.compare.units import BY_NAME, Sampling, average_complete_units, average_units, count_clips, count_units
+from harness.compare.units import BY_NAME, Sampling, average_units, count_clips, count_units
 
 
 @pytest.mark.parametrize(
@@ -41,10 +41,3 @@ def test_clips_are_units_where_a_scenario_says_so_and_hold_for_these_performers_
     counted = "3 clips of 2 performers, these performers only"
     assert count_units(average_units(BLOCKS, CLIPS)) == count_clips(BLOCKS, CLIPS) == counted
     assert count_clips(["mine@0.2-0.4"], CLIPS, "sequence") == "1 sequence of 1 take, this take only"
-
-
-def test_a_unit_without_one_of_its_clips_is_left_out() -> None:
-    """Its mean would be over other clips than that of what it is paired with."""
-    planned = [*BLOCKS, "14_03"]
-    assert average_complete_units(BLOCKS, planned) == {"performer 13": 1.5}
-    assert len(average_complete_units(BLOCKS, planned, CLIPS)) == 3

@@ -33,6 +33,24 @@ def test_a_value_is_met_missed_or_has_no_verdict(
     assert found.why == ("nothing was measured" if verdict == "no verdict" else "")
 
 
+@pytest.mark.parametrize(
+    ("value", "least", "most", "measured"),
+    [
+        (7.996, 8.0, None, "7.996 x"),
+        (1.0004, None, 1.0, "1.0004 x"),
+        (99.99999, 100.0, None, "99.99999 x"),
+        (100.4, None, 100.0, "100.4 x"),
+        (8.004, 8.0, None, "8 x"),
+        (1234.4, None, 2000.0, "1,234 x"),
+        (0.0125, None, 1.0, "0.0125 x"),
+    ],
+)
+def test_a_value_has_the_digits_that_show_its_verdict(
+    value: float, least: float | None, most: float | None, measured: str
+) -> None:
+    assert hold_to_limit("a", value, "x", least=least, most=most).measured == measured
+
+
 def test_a_doubt_takes_the_verdict_of_targets_alone() -> None:
     assert hold_to_limit("a", 9.0, most=5.0, doubt="busy").verdict == "no verdict"
     assert hold_to_limit("a", 9.0, most=5.0, doubt="busy").why == "busy"

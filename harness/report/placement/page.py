@@ -137,6 +137,7 @@ def _drawn(chart: Chart) -> Chart:
 def _best_table(findings: PlacementFindings) -> DataTable:
     """The best set of each size."""
     held_out = any(best.held_out is not None for best in findings.best)
+    crossed = not held_out and any(best.crossed is not None for best in findings.best)
     rows = []
     for best in findings.best:
         tried = findings.of(best.stations)
@@ -146,6 +147,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
                 Stack(set_name(best.stations), "" if best.on_front else "a smaller set is better"),
                 set_error(findings, tried),
                 *([held_out_error(findings, best)] if held_out else []),
+                *([Interval.of(best.crossed, None, None, findings.unit)] if crossed else []),
                 f"{tried.rate_hz:g} Hz" if tried else "",
                 Stack(best.of or "", f"stays best in {format_stays(best.stays)}" if best.stays else ""),
                 list_sets(best.ties) if best.ties else "none",
@@ -154,10 +156,20 @@ def _best_table(findings: PlacementFindings) -> DataTable:
     caption = (
         "The best set of each size and its mean error with the 95 % interval over units of statistics. "
         + ("Held out: the error on clips that did not take part in the choice. " if held_out else "")
+        + ("Cross-validated: of each unit, the error of the set that the other units choose. " if crossed else "")
         + "Best of: the number of sets of this size, and in how many resamples of the units the set stays best. "
         "Ties: other sets of this size that are as good."
     )
-    head = ["stations", "best set", "error", *(["held out"] if held_out else []), "rate", "best of", "ties"]
+    head = [
+        "stations",
+        "best set",
+        "error",
+        *(["held out"] if held_out else []),
+        *(["cross-validated"] if crossed else []),
+        "rate",
+        "best of",
+        "ties",
+    ]
     return DataTable(head, rows, caption=caption, label="best sets")
 
 

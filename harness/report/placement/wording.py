@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
-from harness.compare.units import count_units
+from harness.compare.units import count_clips, count_units
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_share
 from harness.report.kit.text import list_first
@@ -73,7 +73,9 @@ def sentence(findings: PlacementFindings) -> str:
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
     units = {unit for tried in findings.tried for unit in tried.errors}
-    chosen = [f"Sets were chosen on {count_units(units)}."] if units else []
+    # Findings of earlier versions have the errors of clips, whose names tell their performers.
+    counted = count_units(units) if any(unit.startswith("performer ") for unit in units) else count_clips(units)
+    chosen = [f"Sets were chosen on {counted}."] if units else []
     if findings.sizes:
         return " ".join([*(_size_sentence(findings, size) for size in findings.sizes), *chosen])
     best = smallest_sufficient_set(findings)

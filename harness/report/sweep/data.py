@@ -21,13 +21,13 @@ READ_METRICS = tuple(dict.fromkeys((*METRICS, *GATED_METRICS)))
 
 @dataclass(frozen=True)
 class Statistic:
-    """Mean over clips; each clip is first averaged over all other varied values."""
+    """Mean over clips, or over units where it has an interval; a clip is first averaged over other varied values."""
 
     mean: float | None
     clips: int
     sd: float | None = None
     low: float | None = None
-    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` clips, or if it was not requested."""
+    """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` units, or if it was not requested."""
     high: float | None = None
     """Upper end of the 95 % interval."""
 
@@ -106,18 +106,19 @@ class SweepData:
         }
 
     def statistic(self, metric: str, selected: Bools, *, with_interval: bool = False) -> Statistic:
-        """Statistic over clips; `with_interval` adds the 95 % interval if there are at least `MIN_UNITS` units."""
+        """Statistic over clips; `with_interval` takes units and their interval, if there are `MIN_UNITS` or more."""
         means = self.by_clip(metric, selected)
         means = means[np.isfinite(means)]
         if not len(means):
             return Statistic(None, 0)
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
-        low, high = None, None
+        mean, low, high = float(means.mean()), None, None
         if with_interval:
             by_unit = average_units(self.clip_values(selected, (metric,))[metric], self.sampling)
             if len(by_unit) >= MIN_UNITS:
-                low, high = mean_interval(np.array(list(by_unit.values())))
-        return Statistic(float(means.mean()), len(means), sd, low, high)
+                of_units = np.array(list(by_unit.values()))
+                mean, (low, high) = float(of_units.mean()), mean_interval(of_units)
+        return Statistic(mean, len(means), sd, low, high)
 
 
 def unit_of(metric: str) -> str:

@@ -107,8 +107,8 @@ def _varied(sweep: SweepData, *, with_intervals: bool) -> list[Block]:
     if not sweep.keys:
         return []
     text = (
-        f"Mean {PRIMARY_METRIC} over clips; each clip is first averaged over all other varied values. Bars: 95 % "
-        f"interval, if there are at least {MIN_UNITS} clips."
+        f"Mean {PRIMARY_METRIC}; each clip is first averaged over all other varied values. Bars: 95 % interval over "
+        f"units (performers, or what the scenarios declare), if there are at least {MIN_UNITS}."
     )
     charts, tables = [], []
     for key in sweep.keys:
@@ -133,7 +133,7 @@ def _value_tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequ
 def _value_table(sweep: SweepData, key: VariedKey, scenario: int, lines: Sequence[Curve], metric: str) -> DataTable:
     """The numbers of a chart: a row for each curve, a column for each value of the key."""
     titles = [f"{key.name}={text}" for text in key.labels]
-    over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or with its 95 % interval"
+    over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or over units with their 95 % interval"
     series = [curve.colour_index for curve in lines]
     best = [
         _best_rows(sweep, metric, ((s, sweep.select(scenario, s, **{key.name: value})) for s in series))

@@ -23,7 +23,7 @@ from tests.report.reading import text_of
 NO_PICTURE = "the renderer was ended by SIGABRT"
 ANSWER = (
     "Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis, 2.40 deg (2.01 to 2.79). "
-    "On 6 held-out units the error is 2.52 deg (2.12 to 2.92). Sets were chosen on 8 takes."
+    "On 6 held-out units the error is 2.52 deg (2.12 to 2.92). Sets were chosen on 8 clips."
 )
 
 
@@ -257,3 +257,12 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     assert at[0, names.index("left_hand"), 0] > at[0, names.index("right_hand"), 0], "the left is on the right"
     assert at[1, names.index("left_hand"), 0] < at[1, names.index("right_hand"), 0]
     assert at[0, names.index("pelvis"), 2] < 0.0 < at[1, names.index("pelvis"), 2], "the sacrum is seen from behind"
+
+
+def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(findings: PlacementFindings) -> None:
+    best = tuple(replace(each, held_out=None, crossed=3.21) for each in findings.best)
+    lines = placement_text(replace(findings, best=best)).splitlines()
+    head = next(line for line in lines if line.startswith("stations  best set"))
+    assert "cross-validated" in head
+    assert "3.21 deg" in lines[lines.index(head) + 2]
+    assert "cross-validated" not in placement_text(findings)

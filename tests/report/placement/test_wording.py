@@ -39,7 +39,7 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
     assert sentence(asked) == (
         "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of the "
-        "54 other pairs that were tried: head + pelvis; sternum + pelvis. Sets were chosen on 8 takes."
+        "54 other pairs that were tried: head + pelvis; sternum + pelvis. Sets were chosen on 8 clips."
     )
     assert placement_text(asked).startswith("Best two stations for walking: both ankles")
     assert placement_page(asked).headline == sentence(asked)
@@ -50,7 +50,7 @@ def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindi
     said = sentence(asked)
     assert said.startswith("Best station for walking and table tennis: ")
     assert "Best three stations for walking and table tennis: both ankles + pelvis, " in said
-    assert said.endswith("No set of 4 stations was measured. Sets were chosen on 8 takes.")
+    assert said.endswith("No set of 4 stations was measured. Sets were chosen on 8 clips.")
 
 
 def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
@@ -65,7 +65,7 @@ def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFinding
     others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
     asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=11),))
     assert sentence(asked).endswith(
-        " 8 units cannot tell it from the other 10 places (13 might). Sets were chosen on 8 takes."
+        " 8 units cannot tell it from the other 10 places (13 might). Sets were chosen on 8 clips."
     )
     enough = replace(asked, power=replace(POWER, least_clips=8))
     assert "tied with 10 of the 10 other places that were tried: " in sentence(enough)
@@ -147,6 +147,9 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
 
 
 def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
-    clips = [f"performer {k}" for k in range(1, 7)]
+    units = [f"performer {k}" for k in range(1, 7)]
+    clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
     for sizes in ((), (2,)):
-        assert sentence(replace(made_up(clips), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")
+        assert sentence(replace(made_up(units), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")
+        earlier = sentence(replace(made_up(clips), sizes=sizes))
+        assert earlier.endswith(" Sets were chosen on 6 clips of 3 performers.")

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 
 from harness.cli import main
 from harness.compare.paired_statistics import mean_interval
+from harness.compare.units import Sampling
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html, page_table
@@ -161,6 +163,21 @@ def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
     assert sentence(sweep).count("has the lowest mean joint-angle error") == 2
+
+
+def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",))))
+    first, *others = sweep.clips
+    takes = [name.rpartition(": ")[2].partition("@")[0] for name in sweep.clips]
+    owner = {take: "Anna" if take == takes[0] else f"performer of {take}" for take in takes} | {takes[1]: "Anna"}
+    shared, selected = replace(sweep, sampling=Sampling(owner)), sweep.select(0, 0)
+    means = sweep.by_clip(PRIMARY_METRIC, selected)
+    units = np.array([means[:2].mean(), *means[2:]])
+    found = shared.statistic(PRIMARY_METRIC, selected, with_interval=True)
+    assert found.mean == pytest.approx(units.mean())
+    assert (found.low, found.high) == pytest.approx(mean_interval(units))
+    assert shared.statistic(PRIMARY_METRIC, selected).mean == pytest.approx(means.mean())
+    assert first != others[0]
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
