@@ -103,7 +103,7 @@ def test_a_working_folder_that_is_gone_is_a_fault(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
 
-    def leave() -> None:
+    def leave(**options: object) -> None:
         os.chdir(gone)
         gone.rmdir()
 
@@ -179,7 +179,7 @@ def test_a_folder_that_vanishes_is_named(
 def test_a_defect_of_the_program_is_a_fault(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    def fail() -> None:
+    def fail(**options: object) -> None:
         raise TypeError("two\nlines " + 1000 * "x")
 
     monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
@@ -199,7 +199,7 @@ def test_a_defect_of_the_program_is_a_fault(
 def test_a_part_that_asks_to_exit_does_not_choose_the_code(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def leave() -> None:
+    def leave(**options: object) -> None:
         sys.exit(1)
 
     monkeypatch.setattr("harness.commands.catalogue.build_catalogue", leave)
@@ -222,7 +222,7 @@ def test_a_traceback_that_cannot_be_saved_is_said(
 def test_a_broken_pipe_inside_the_program_is_no_reader_who_left(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def fail() -> None:
+    def fail(**options: object) -> None:
         raise BrokenPipeError(32, "Broken pipe")
 
     monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)

@@ -113,5 +113,5 @@ def test_a_missed_row_of_a_truth_table_ends_with_1(
     assert main(["bench", what, "--truth", "--seeds", "1", "--out", str(tmp_path)]) == Outcome.REGRESSED.exit_code
     lines = capsys.readouterr().out.splitlines()
     assert lines[-2:] == ["1 of 2 targets missed", "regressed"]
-    assert lines[1].split("  ")[-1] == "1.5 mm (Gilson et al. 2006)"
+    assert lines[1].split("  ")[-1].strip() == "1.5 mm (Gilson et al. 2006)"
     assert (tmp_path / "report.html").exists() == (what == "physics")

@@ -101,7 +101,7 @@ def whole(lines: Sequence[Difference], why: str = "") -> Comparison:
 
 def _verdict(mean: float, low: float | None, high: float | None, margin: float, clips: int) -> tuple[Verdict, str]:
     if low is None or high is None:
-        return "cannot tell", f"too few clips: {clips}, of at least 6"
+        return "cannot tell", f"too few units: {clips}, of at least 6"
     if low >= -margin and high <= margin:
         return "same", "within the margin"
     if (low > 0.0 or high < 0.0) and abs(mean) > margin:

@@ -143,7 +143,7 @@ def _order(n: int, less: str, more: str, errors: Mapping[str, tuple[float, ...]]
         target="order",
         measured=f"{ours:.2f} against {theirs:.2f} deg",
         verdict="cannot tell" if few else "reproduced",
-        why="too few clips: 2, of at least 6" if few else "",
+        why="too few units: 2, of at least 6" if few else "",
         clips=2 if few else 8,
         value=theirs - ours,
         low=None if few else theirs - ours - 0.1,

@@ -35,7 +35,7 @@ def test_too_few_clips_give_no_verdict() -> None:
     few = {"ours": errors(1.0, clips=1), "ik": errors(2.0, clips=1)}
     found = compare_methods("ours", few)
     assert {statement.verdict for statement in found} == {"no verdict"}
-    assert all("clips" in statement.why for statement in found)
+    assert all("too few units" in statement.why for statement in found)
 
 
 def test_a_method_is_not_compared_with_itself() -> None:

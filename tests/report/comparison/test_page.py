@@ -159,8 +159,8 @@ def test_names_of_an_interval_chart_do_not_meet() -> None:
 def test_too_few_clips_are_shown_and_not_told(clips: int, tmp_path: Path) -> None:
     shown = whole([line("ik", "mpjpe_mm", clips, 0.05)])
     said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-    assert f"too few clips: {clips}, of at least 6" in said
-    assert f"cannot tell, too few clips: {clips}, of at least 6: ik mpjpe_mm" in comparison_text(shown)
+    assert f"too few units: {clips}, of at least 6" in said
+    assert f"cannot tell, too few units: {clips}, of at least 6: ik mpjpe_mm" in comparison_text(shown)
     assert "nan" not in said.lower().split()
 
 

@@ -35,7 +35,7 @@ def test_the_quick_form_is_another_study(tmp_path: Path) -> None:
     findings, outcome = reproduce(paper, tmp_path / "out", quick=True)
     assert outcome is Outcome.PASS
     assert findings.motion == "built-in performer, quick form"
-    assert findings.experiments[0].notes == ("4 cells",)  # two of the three clips
+    assert findings.experiments[0].notes == ("4 cells", "Units of the statistics: walks: 2 performers.")  # of three
     with pytest.raises(BadInput, match="quick form"):
         reproduce(paper, tmp_path / "out")
 
