@@ -56,12 +56,12 @@ def test_a_question_is_answered_alike_on_the_terminal_the_page_and_in_json(
     answer = ended.out.splitlines()[-2]
     best = findings.best[0]
     assert answer.startswith(f"Best station for boxing: {best.stations[0].replace('_', ' ')}, ")
-    assert "on 16 held-out clips" in answer
+    assert "on 16 held-out units" in answer
     assert " ".join(ended.out.split()).startswith(answer)
     assert f"<h1>{answer}</h1>" in (out / "report.html").read_text(encoding="utf-8")
     announced = ended.err.splitlines()
     assert announced[0] == "Within 10 minutes: every one of 3 sets, on 7 clips."
-    assert announced[1].startswith("7 clips can show a difference of ")
+    assert announced[1].startswith("7 units can show a difference of ")
     assert announced[-1] == f"next: harness plot {out}"
     assert findings.power is not None
     assert (findings.power.clips, findings.power.sets, findings.sizes) == (7, 3, (1,))
@@ -83,7 +83,7 @@ def test_without_the_time_for_every_set_stations_are_added_one_after_another(
     assert main([*words, "--minutes", "0.001", "--method", ONE_STATION, "--noise", "clean", "--jobs", "1"]) == 0
     ended = capsys.readouterr()
     assert "one station after another, the best next one each time, on 6 clips" in ended.err
-    assert "6 clips cannot show any difference between 7 sets, 8 might" in ended.err
+    assert "6 units cannot show any difference between 7 sets, 8 might" in ended.err
     findings = read_placement(Path("results/placement_golf_2/findings.json"))
     assert [len(step.stations) for step in findings.searches[0].steps] == [1, 2]
     assert not findings.rankings

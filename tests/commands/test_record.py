@@ -218,7 +218,7 @@ def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Pl
     start = next(i for i, frame in enumerate(replayed) if frame.received_s == live[1][0].received_s)
     again = replayed[start : start + 60]
     assert [f.received_s for f in again] == [f.received_s for f in live[1]]
-    assert all((a.position_m == b.position_m).all() for a, b in zip(again, live[1], strict=True))
+    assert all(np.array_equal(a.position_m, b.position_m, equal_nan=True) for a, b in zip(again, live[1], strict=True))
 
 
 def test_a_device_that_was_gone_replays_as_it_was_live(played: Playback, tmp_path: Path) -> None:

@@ -78,4 +78,4 @@ def test_the_note_stands_beside_name_and_rank(
     assert last_varied(read_summary(Path("out")))["methods"][0]["training_data"] == "examples"
     for pair, noted in (("mean_pose,theirs:Silent", "B"), ("theirs:Silent,mean_pose", "A")):
         main(["compare", "out", "--methods", pair])
-        assert f"note: {noted}: theirs:Silent: training data unknown\n" in capsys.readouterr().out
+        assert f"training data: {noted}: theirs:Silent: training data unknown\n" in capsys.readouterr().out
