@@ -22,7 +22,6 @@ from harness.view.page import ViewedMotion
 if TYPE_CHECKING:
     from harness.stream.frame import TrackerFrame
 
-_MANIFEST = "manifest.json"
 _SEED = 1
 """Seed of built-in motion that is named by its take, as in the shipped scenarios."""
 _KINDS = "a folder of `harness run`, a recording, a motion file, or the name of a clip"

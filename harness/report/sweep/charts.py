@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.core.number_format import format_number
+from harness.core.number_format import count_noun, format_number
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import GRID, Chart, series_style
@@ -74,14 +74,21 @@ def scenarios_varying(sweep: SweepData, key: VariedKey) -> list[int]:
     ]
 
 
+def _count_range(counts: Sequence[int], noun: str) -> str:
+    least, most = min(counts), max(counts)
+    return count_noun(most, noun) if least == most else f"{least} to {count_noun(most, noun)}"
+
+
 def sweep_chart(sweep: SweepData, key: VariedKey, scenario: int, measured: Sequence[Curve]) -> Chart:
     """The chart of one key and scenario."""
     shown = select_curves(measured)
     omitted = len(shown) < len(measured)
     note = f" Only the {len(shown)} of {len(measured)} methods with the lowest errors are shown." if omitted else ""
-    counts = sorted({point.clips for curve in shown for point in curve.points if point.clips})
-    clips = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    caption = f"Mean over {clips} clip{'s'[: counts[-1] != 1]}.{note}"
+    points = [point for curve in shown for point in curve.points if point.clips]
+    over = _count_range([point.clips for point in points], "clip")
+    if all(point.units for point in points):
+        over = f"{_count_range([point.units for point in points], 'unit')} ({over})"
+    caption = f"Mean over {over}.{note}"
     values = "; ".join(f"{curve.name} {_curve_values_text(curve, key)}" for curve in shown)
     name = f"{to_file_name(key.name)}_{to_file_name(sweep.scenarios[scenario])}"
     return draw_chart(

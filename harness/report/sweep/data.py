@@ -30,6 +30,8 @@ class Statistic:
     """Lower end of the 95 % interval; None with fewer than `MIN_UNITS` units, or if it was not requested."""
     high: float | None = None
     """Upper end of the 95 % interval."""
+    units: int = 0
+    """Number of units that the mean and its interval are over; 0 without an interval."""
 
 
 @dataclass(frozen=True)
@@ -112,13 +114,13 @@ class SweepData:
         if not len(means):
             return Statistic(None, 0)
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
-        mean, low, high = float(means.mean()), None, None
+        mean, low, high, units = float(means.mean()), None, None, 0
         if with_interval:
             by_unit = average_units(self.clip_values(selected, (metric,))[metric], self.sampling)
             if len(by_unit) >= MIN_UNITS:
                 of_units = np.array(list(by_unit.values()))
-                mean, (low, high) = float(of_units.mean()), mean_interval(of_units)
-        return Statistic(mean, len(means), sd, low, high)
+                mean, (low, high), units = float(of_units.mean()), mean_interval(of_units), len(of_units)
+        return Statistic(mean, len(means), sd, low, high, units)
 
 
 def unit_of(metric: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from harness.compare.margins import GATED_METRICS
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.ranking import find_best
+from harness.compare.units import count_clips
 from harness.core.arrays import Bools
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_number
@@ -57,7 +58,7 @@ def sweep_page(sweep: SweepData) -> Page:
         headline=sentence(sweep),
         facts={
             "Scenarios": list_first(sweep.scenarios, 8),
-            "Clips": f"{len(sweep.clips):,}",
+            "Clips": count_clips(sweep.clips, sweep.sampling),
             "Methods": list_first(sweep.series, 12),
             **{f"Varied: {key.name}": f"{list_values(key)}: {describe_effect(sweep, key)}" for key in sweep.keys},
             "Made by": sweep.command,

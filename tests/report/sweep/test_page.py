@@ -25,6 +25,7 @@ from harness.report.sweep.charts import (
     curves,
     scenarios_varying,
     select_curves,
+    sweep_chart,
 )
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
@@ -166,7 +167,7 @@ def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
 
 
 def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",))))
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), vary={NOISE: ("clean", "default")})))
     first, *others = sweep.clips
     takes = [name.rpartition(": ")[2].partition("@")[0] for name in sweep.clips]
     owner = {take: "Anna" if take == takes[0] else f"performer of {take}" for take in takes} | {takes[1]: "Anna"}
@@ -177,6 +178,10 @@ def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
     assert found.mean == pytest.approx(units.mean())
     assert (found.low, found.high) == pytest.approx(mean_interval(units))
     assert shared.statistic(PRIMARY_METRIC, selected).mean == pytest.approx(means.mean())
+    assert (found.units, found.clips) == (6, 7)
+    assert sweep_page(shared).facts["Clips"] == "7 clips of 6 performers"
+    drawn = sweep_chart(shared, shared.keys[0], 0, curves(shared, shared.keys[0], 0))
+    assert "Mean over 6 units (7 clips)." in drawn.caption
     assert first != others[0]
 
 
