@@ -31,7 +31,7 @@ StationNames = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class StationPlacement:
+class CandidatePlace:
     """A candidate: one tracker at one place (see `harness.body.mounts.Mount`). A moved candidate has a new name."""
 
     name: str
@@ -268,7 +268,7 @@ class PlacementFindings:
     """Text that says how many stations the line carries at which rate; "" if the rate is the same for all."""
     seed: int
     command: str
-    candidates: tuple[StationPlacement, ...]
+    candidates: tuple[CandidatePlace, ...]
     tried: tuple[StationSetResult, ...]
     best: tuple[BestSet, ...]
     """Best set for each number of stations, smallest first."""

@@ -22,7 +22,7 @@ from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
 from harness.report.kit.style import FAINT, INK, Chart
 from harness.report.placement.wording import plain_name
-from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
+from harness.results.placement_findings import CandidatePlace, MarginalContribution, StationNames
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,7 @@ class BodyMapValues:
 
 
 def draw_body_map(
-    places: Sequence[StationPlacement], shown: BodyMapValues, *, unit: str, number: int = 1
+    places: Sequence[CandidatePlace], shown: BodyMapValues, *, unit: str, number: int = 1
 ) -> tuple[Chart | None, str]:
     """The chart and "", or None and the reason in one line why there is none.
 
@@ -77,7 +77,7 @@ def draw_body_map(
 
 
 def render_body(
-    places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
+    places: Sequence[CandidatePlace], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
     report_step("rendered body")
@@ -106,7 +106,7 @@ def render_body(
 
 
 def _chart(
-    places: Sequence[StationPlacement],
+    places: Sequence[CandidatePlace],
     shown: BodyMapValues,
     views: Mapping[str, np.ndarray],
     ends: tuple[float, float],

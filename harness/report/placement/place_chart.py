@@ -14,7 +14,7 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import FAINT, Chart
 from harness.report.placement.body_map import label_places, render_body
 from harness.report.placement.wording import plain_name
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ _HEIGHT_IN = 4.6
 
 def draw_place_chart() -> Chart:
     """The body from the front and from behind with all named places; SystemFault if it cannot be rendered."""
-    places = [StationPlacement(p.name, p.bone, p.along, p.around_deg) for p in NAMED_PLACES.values()]
+    places = [CandidatePlace(p.name, p.bone, p.along, p.around_deg) for p in NAMED_PLACES.values()]
     views, reason = render_body(places, {}, (0.0, 1.0))
     if views is None:
         raise SystemFault(f"The body cannot be drawn ({reason}).", "Install the extra viz, and OpenGL of the system.")

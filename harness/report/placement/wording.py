@@ -9,12 +9,12 @@ from harness.core.number_format import NOT_MEASURED, count_noun, format_share
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
+    CandidatePlace,
     MarginalContribution,
     PlacementFindings,
     PlacementSearch,
     RankAgreement,
     StationNames,
-    StationPlacement,
     StationSetResult,
     StatisticalPower,
 )
@@ -45,7 +45,7 @@ def set_name(stations: StationNames) -> str:
     return " + ".join(sorted(parts, key=lambda part: not part.startswith("both "))) or "none"
 
 
-def original_candidates(findings: PlacementFindings) -> list[StationPlacement]:
+def original_candidates(findings: PlacementFindings) -> list[CandidatePlace]:
     """The candidates that the study names, without the positions that it derived by moving them."""
     return [place for place in findings.candidates if not place.moved_from]
 

@@ -11,7 +11,7 @@ DATABASE_SHARE = 0.05
 """Share of the paper's frames in the databases whose speed is measured."""
 
 
-def shorten(scenario: Scenario) -> Scenario:
+def shorten_scenario(scenario: Scenario) -> Scenario:
     """The scenario with the first `CLIPS` test clips of each behaviour, of `LONGEST_S` at most; its database stays."""
     motion, taken, kept = scenario.motion, Counter[str](), list[tuple[str, str]]()
     shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)

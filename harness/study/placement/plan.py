@@ -16,7 +16,7 @@ from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, expand_clips
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.cell_cache import SetRequest, clips_of_units, link_rate_hz
@@ -59,7 +59,7 @@ class PlacementPlan:
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
 
     @property
-    def places(self) -> tuple[StationPlacement, ...]:
+    def places(self) -> tuple[CandidatePlace, ...]:
         """All candidate places."""
         return tuple(dict.fromkeys(place for unit in self.groups for place in unit))
 

@@ -11,7 +11,7 @@ from harness.errors import BadInput, Outcome
 from harness.results.findings import read_findings
 from harness.study.papers.paper import PAPERS, load_paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells
-from harness.study.papers.quick_form import CLIPS, LONGEST_S, shorten
+from harness.study.papers.quick_form import CLIPS, LONGEST_S, shorten_scenario
 from tests.study.papers.tiny import TINY, WALKS
 
 
@@ -20,12 +20,12 @@ from tests.study.papers.tiny import TINY, WALKS
 def test_each_behaviour_keeps_two_short_clips_and_its_database(name: str, motion: str) -> None:
     plan = load_paper(name).plan("cmu" if motion == "cmu" else "builtin", 1)
     for scenario in plan.values():
-        full, quick = scenario.motion, shorten(scenario).motion
+        full, quick = scenario.motion, shorten_scenario(scenario).motion
         assert Counter(quick.behaviours) == dict.fromkeys(full.behaviours, CLIPS)
         assert set(quick.test) <= set(full.test)
         assert 0.0 < quick.longest_s <= LONGEST_S
         assert (quick.examples, quick.withheld, quick.split) == (full.examples, full.withheld, full.split)
-    quickly = count_cells({run: shorten(scenario) for run, scenario in plan.items()})
+    quickly = count_cells({run: shorten_scenario(scenario) for run, scenario in plan.items()})
     assert quickly < 0.25 * count_cells(plan)
 
 

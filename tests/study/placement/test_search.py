@@ -6,7 +6,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGroup,
@@ -219,7 +219,7 @@ def test_refining_on_too_few_clips_is_refused_with_how_many_it_takes() -> None:
 def test_stations_that_are_no_mirror_images_move_alone() -> None:
     right, left, pelvis = START
     assert find_move_groups(START) == ((0, 1), (2,))
-    assert find_move_groups((right, StationPlacement("left_ankle", "ltibia", 0.8, -90.0, side="left"), pelvis)) == (
+    assert find_move_groups((right, CandidatePlace("left_ankle", "ltibia", 0.8, -90.0, side="left"), pelvis)) == (
         (0,),
         (1,),
         (2,),
