@@ -109,6 +109,9 @@ def read_summary(out: Path) -> dict[str, Any]:
     advice = "Give the command of the run again."
     if missing := [name for name in _SUMMARY_KEYS if name not in content]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
+    for row in content["recovery"] if isinstance(content.get("recovery"), list) else ():
+        if isinstance(row, dict) and "judged" in row:  # its name in earlier versions
+            row["evaluated_frames"] = row.pop("judged")
     check_summary_types(path, content, advice)
     for row in content["cells"]:
         if found := find_impossible_metric(row) or find_impossible_sigma(row.get("sigma_scores", {})):

@@ -86,7 +86,7 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
         circumstances={"harness": "0.1.0", "commit": "0123456789abcdef", "dirty": False, "python": "3.11.2"},
         rankings=rankings,
         searches=(_greedy(best, errors),),
-        worth=(
+        contributions=(
             *(_worth(name, "ablate", names, whole[_without(names, name)], whole[names]) for name in names),
             *(_worth(name, "add", base, errors[base], more[stations]) for stations, name in added.items()),
         ),

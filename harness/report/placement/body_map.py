@@ -214,10 +214,10 @@ def interpolate_colours(points_m: Floats, places_m: Floats, colours: Floats) -> 
     return out
 
 
-def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValues]:
+def select_body_maps(contributions: Sequence[MarginalContribution]) -> list[BodyMapValues]:
     """The maps to draw: one that compares candidates with each other, and one of adding a station, if there are any."""
     groups: dict[tuple[str, StationNames], dict[str, float | None]] = {}
-    for contribution in worth:
+    for contribution in contributions:
         group = groups.setdefault((contribution.mode, contribution.base), {})
         group[contribution.candidate] = contribution.difference
     words = {

@@ -14,12 +14,12 @@ from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
 from harness.report.placement.wording import (
     TIE_NOTE,
+    contribution_label,
     format_rank_range,
     plain_name,
     search_gain_sentence,
     set_error,
     set_name,
-    worth_label,
 )
 from harness.results.placement_findings import (
     MarginalContribution,
@@ -101,10 +101,12 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
     )
 
 
-def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalContribution], number: int) -> Chart:
+def contribution_chart(
+    findings: PlacementFindings, contributions: Sequence[MarginalContribution], number: int
+) -> Chart:
     """The contribution of each candidate in one mode, the largest first."""
     rows = sorted((w for w in contributions if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    title = worth_label(findings, contributions[0])
+    title = contribution_label(findings, contributions[0])
 
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()

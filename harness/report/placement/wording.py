@@ -50,11 +50,11 @@ def original_candidates(findings: PlacementFindings) -> list[CandidatePlace]:
     return [place for place in findings.candidates if not place.moved_from]
 
 
-def worth_label(findings: PlacementFindings, worth: MarginalContribution) -> str:
+def contribution_label(findings: PlacementFindings, contribution: MarginalContribution) -> str:
     """How the contribution of a candidate was measured: "left out of all 5"."""
-    is_full = len(worth.base) == len(original_candidates(findings))
-    base = "" if not worth.base else f"all {len(worth.base)}" if is_full else set_name(worth.base)
-    return f"{_WORTH_LABELS[worth.mode]} {base}".strip()
+    is_full = len(contribution.base) == len(original_candidates(findings))
+    base = "" if not contribution.base else f"all {len(contribution.base)}" if is_full else set_name(contribution.base)
+    return f"{_WORTH_LABELS[contribution.mode]} {base}".strip()
 
 
 def plain_name(name: str) -> str:
@@ -257,7 +257,7 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     return f"{pair.changes:,} of {pairs:,} pairs {verb} order{shown}: first {example}"
 
 
-def format_stays(share: float | None) -> str:
+def format_stability(share: float | None) -> str:
     """The share of resamples in which a set stays best, in per cent; empty for None."""
     return "" if share is None else format_share(share)
 

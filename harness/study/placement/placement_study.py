@@ -192,7 +192,7 @@ class _PlacementRun:
             circumstances=manifest.current_circumstances(),
             rankings=tuple(ranking for mode in modes for ranking in mode.rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
-            worth=tuple(worth for mode in modes for worth in mode.worth),
+            contributions=tuple(contribution for mode in modes for contribution in mode.contributions),
             compared=tuple(map(names_of_places, compared)),
             conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),

@@ -132,9 +132,10 @@ def best_by_size(sets: Mapping[StationNames, Costs], sign: float = 1.0) -> tuple
         rows = rank_sets("exhaustive", "", same_size).rows
         best, ties = rows[0].stations, tuple(row.stations for row in rows[1:] if row.tied)
         cost = mean_cost(same_size[best])
-        crossed = sign * cross_validated_cost(same_size) if len(next(iter(same_size.values()))) > 1 else None
-        stays = selection_stability(same_size)
-        best_sets.append(BestSet(best, ties, cost < least, of=len(same_size), stays=stays, crossed=crossed))
+        error = sign * cross_validated_cost(same_size) if len(next(iter(same_size.values()))) > 1 else None
+        best_sets.append(
+            BestSet(best, ties, cost < least, len(same_size), selection_stability(same_size), error),
+        )
         least = min(least, cost)
     return tuple(best_sets)
 

@@ -45,7 +45,7 @@ def study_of(errors: dict[StationNames, list[float | None]], better: str = "lowe
         for stations, values in errors.items()
     ]
     best = tuple(BestSet(t.stations) for t in tried)
-    whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), worth=())
+    whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), contributions=())
     return replace(whole, compared=(), conditions=(), agreements=(), better="higher" if better == "higher" else "lower")
 
 
@@ -125,7 +125,9 @@ def test_ties_are_called_ties(findings: PlacementFindings) -> None:
 @pytest.mark.usefixtures("unseen")
 def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, findings: PlacementFindings) -> None:
     hostile = "<script>alert(1)</script>"
-    shown = replace(findings, notes=(hostile,), rankings=findings.rankings[1:], worth=findings.worth[:11])
+    shown = replace(
+        findings, notes=(hostile,), rankings=findings.rankings[1:], contributions=findings.contributions[:11]
+    )
     page = write_placement_page(write_made_up(tmp_path, shown))
     content, said = page.read_text(encoding="utf-8"), text_of(page)
     assert f"<h1>{ANSWER}</h1>" in content
@@ -150,7 +152,7 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
 
 @pytest.mark.usefixtures("unseen")
 def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = write_made_up(tmp_path, replace(made_up(at_most=1), worth=()))
+    folder = write_made_up(tmp_path, replace(made_up(at_most=1), contributions=()))
     first = write_placement_page(folder).read_bytes()
     assert main(["report", str(folder), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -161,7 +163,7 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
-    among, more = select_body_maps(findings.worth)
+    among, more = select_body_maps(findings.contributions)
     assert len(among.values) == len(PLACES)
     assert among.description == "error without it minus error with all 11 stations"
     assert among.base == ()
@@ -260,7 +262,7 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
 
 
 def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(findings: PlacementFindings) -> None:
-    best = tuple(replace(each, held_out=None, crossed=3.21) for each in findings.best)
+    best = tuple(replace(each, held_out=None, cross_validated_error=3.21) for each in findings.best)
     lines = placement_text(replace(findings, best=best)).splitlines()
     head = next(line for line in lines if line.startswith("stations  best set"))
     assert "cross-validated" in head

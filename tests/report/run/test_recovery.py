@@ -7,7 +7,7 @@ ROW = {
     "inputs": "pos+ori",
     "split": "none",
     "clip": "a",
-    "judged": 40,
+    "evaluated_frames": 40,
     "disturbed_deg": 3.0,
     "undisturbed_deg": 2.0,
     "ratio": 1.5,
@@ -23,7 +23,7 @@ def test_ratios_that_are_too_large_or_unknown_are_marked() -> None:
         ROW | {"disturbance": "all_lost", "disturbed_deg": 3.1, "ratio": 1.55},
         ROW | {"disturbance": "one_off", "disturbed_deg": None, "ratio": None, "back_after_s": None},
     ]
-    rows.append(ROW | {"disturbance": "start_off", "judged": 0, "ratio": None, "status_right": None})
+    rows.append(ROW | {"disturbance": "start_off", "evaluated_frames": 0, "ratio": None, "status_right": None})
     found = text({"recovery": rows})
     head, line = found[3], found[4]
     for word in ("method", "split", "clips", "undisturbed [deg]", "one_lost", "all_lost", "one_off", "status right"):

@@ -121,7 +121,7 @@ def test_the_front_is_of_sets_that_no_smaller_one_beats() -> None:
         (("a", "c"), False, 2),
         (("a", "b", "c"), True, 1),
     ]
-    assert [best.crossed for best in best_by_size(sets, -1.0)] == pytest.approx([-3.0, -3.2, -1.0])
+    assert [best.cross_validated_error for best in best_by_size(sets, -1.0)] == pytest.approx([-3.0, -3.2, -1.0])
 
 
 def test_a_mean_has_an_interval_where_clips_suffice() -> None:

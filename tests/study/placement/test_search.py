@@ -71,7 +71,7 @@ def test_ablation_finds_what_is_necessary_and_what_is_useless() -> None:
     assert ranking.base == tuple(names(UNITS))
     assert "head" not in ranking.rows[0].stations
     assert "pelvis" not in ranking.rows[-1].stations
-    worth = {each.candidate: each for each in found.worth}
+    worth = {each.candidate: each for each in found.contributions}
     assert worth["head"].difference == 0.0
     low = worth["pelvis"].low
     assert low is not None
@@ -85,10 +85,10 @@ def test_adding_finds_what_helps_a_base() -> None:
     assert ranking.rows[0].stations == ("pelvis", "head")
     assert not ranking.rows[1].tied
     assert len(ranking.rows) == len(UNITS) - 1
-    best = max(found.worth, key=lambda each: each.difference or 0.0)
+    best = max(found.contributions, key=lambda each: each.difference or 0.0)
     assert (best.candidate, best.base) == ("pelvis", ("head",))
     alone = add(AddOptions(), UNITS, Truth())
-    assert alone.worth == ()  # beside nothing there is nothing to compare with
+    assert alone.contributions == ()  # beside nothing there is nothing to compare with
     assert alone.rankings[0].rows[0].stations == ("pelvis",)
 
 
@@ -130,7 +130,7 @@ def test_exhaustive_tries_every_set_once_and_ranks_each_size() -> None:
         ("right_hand", "pelvis"),
         ("right_ankle", "left_ankle", "pelvis"),
     ]
-    worth = {each.candidate: each.difference for each in found.worth}
+    worth = {each.candidate: each.difference for each in found.contributions}
     for name, saves in (("pelvis", 5.0), ("right_hand", 0.5), ("left_ankle", 2.0), ("head", 0.0)):
         assert worth[name] == pytest.approx(saves, abs=0.1)
 
@@ -236,8 +236,8 @@ def test_the_best_that_was_tried_is_where_refining_may_begin() -> None:
 
 def test_where_all_sets_have_one_size_a_contribution_is_without_it_against_with_it() -> None:
     found = search_exhaustive(ExhaustiveOptions(2, 2, ("hand", "pelvis", "head")), UNITS, Truth(noise=0.0))
-    worth = {each.candidate: each.difference for each in found.worth}
+    worth = {each.candidate: each.difference for each in found.contributions}
     assert worth["pelvis"] == pytest.approx((9.25 + 9.5 + 9.75) / 3.0 - (4.5 + 4.75 + 5.0) / 3.0)
     assert worth["head"] == pytest.approx((4.5 + 4.75 + 9.25) / 3.0 - (5.0 + 9.5 + 9.75) / 3.0)
-    assert {each.mode for each in found.worth} == {"exhaustive"}
-    assert all(each.clips == len(CLIPS) for each in found.worth)
+    assert {each.mode for each in found.contributions} == {"exhaustive"}
+    assert all(each.clips == len(CLIPS) for each in found.contributions)
