@@ -13,7 +13,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.interval import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
 from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
-from harness.measure.episode_share import episode_share
+from harness.measure.episode_distributions import episode_share, fit_length, fit_uniform
 from harness.measure.excursions import (
     DEFAULT_RAMP_S,
     ExcursionDetector,
@@ -23,8 +23,6 @@ from harness.measure.excursions import (
 )
 from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
 from harness.measure.static_series import StaticSeries
-from harness.measure.uniform_size import fit_uniform
-from harness.measure.vector_length import fit_length
 
 EPISODE_KEYS = (
     "components.excursion.onsets_per_min",

@@ -13,8 +13,8 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
+from harness.measure.gauss_markov import kalman_gains, transpose_whiten, whiten
 from harness.measure.static_series import StaticSeries
-from harness.measure.whitening import kalman_gains, transpose_whiten, whiten
 
 THRESHOLD = 45.0
 """Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in some hundred hours."""

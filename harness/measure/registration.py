@@ -8,8 +8,8 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
-from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
+from harness.measure.angular_speed import TimeOffset, coarse_offset, record_period_s
 from harness.measure.conventions import (
     MOST_PLACE_M,
     require_clock,
@@ -18,9 +18,8 @@ from harness.measure.conventions import (
     require_same_hand,
     require_scale,
 )
-from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
-from harness.measure.offset import SpeedSeries, TimeOffset, angular_speed, time_offset
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
 from harness.measure.registration_model import (
@@ -221,28 +220,6 @@ def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
                 f"Records of station {name!r} have no time stamps.",
                 "Time offset and clock ratio are not observable without stamps. Switch them on in the device.",
             )
-
-
-def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
-    """Median time between records of a station [s]."""
-    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
-    return float(np.median(np.concatenate(steps_s)))
-
-
-def coarse_offset(
-    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
-) -> TimeOffset:
-    """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
-    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
-    expected = [reference_speed(splines[name], period_s) for name in stations]
-    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
-
-
-def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
-    """Angular speed of a reference, over steps of `period_s` as the device's."""
-    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
-    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
-    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
 
 
 def _make_grids(

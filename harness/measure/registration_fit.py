@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.runs import find_runs
-from harness.measure.correlated_errors import ErrorProcess, fit_process
+from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration_model import OWN, SHARED, RegistrationState, linearise
 

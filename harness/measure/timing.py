@@ -13,7 +13,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.interval import Interval
-from harness.measure.robust_slope import robust_slope
+from harness.core.seeds import generator
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 
 TIMING_KEYS = (
@@ -39,6 +39,8 @@ _LAST_STAMPS = 500
 """Stamps of each station at the end of a capture whose resolution is measured."""
 _AGE_TOLERANCE_S = 0.5
 """Half width of the interval of the clock's age [s]: the set-up of a device takes that long [choice]."""
+_DRAWS = 300
+_LEAST_BLOCK = 4
 
 
 @dataclass
@@ -260,3 +262,30 @@ def _mean(values: Floats) -> Interval:
 
 def _exact(value: float, count: int) -> Interval:
     return Interval.missing("No record has a stamp.") if math.isnan(value) else Interval(value, value, value, count)
+
+
+def robust_slope(at: Floats, values: Floats) -> tuple[float, float, float]:
+    """Slope of values (N,) over rising places (N,), and the ends of its 95 % interval.
+
+    The slope is the median over all pairs (Theil and Sen). Its interval is the wider one of two. One is Sen's, for
+    independent errors. The other comes from residuals drawn in blocks, for errors that are correlated over several
+    values (Kunsch 1989, Ann. Stat. 17), widened for the few blocks.
+    """
+    from scipy import special, stats
+
+    slope, _, low, high = (float(one) for one in stats.theilslopes(values, at, 0.95))
+    count = len(values)
+    length = max(round(2.0 * math.sqrt(count)), _LEAST_BLOCK)
+    blocks = count / length
+    if blocks < 2.0:
+        return slope, low, high
+    first, second = np.triu_indices(count, 1)
+    apart = at[second] - at[first]
+    residual = values - slope * at
+    rng = generator(0, "slope")
+    begins = rng.integers(0, count - length + 1, size=(_DRAWS, math.ceil(blocks)))
+    drawn = residual[(begins[:, :, None] + np.arange(length)).reshape(_DRAWS, -1)[:, :count]]
+    slopes = np.array([np.median((one[second] - one[first]) / apart) for one in drawn])
+    scatter = float(np.std(slopes)) * math.sqrt(blocks / (blocks - 1.0))
+    half = scatter * float(special.stdtrit(max(blocks - 2.0, 1.0), 0.975))
+    return slope, min(low, slope - half), max(high, slope + half)

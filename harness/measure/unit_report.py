@@ -9,16 +9,21 @@ import numpy as np
 from harness.core.arrays import Floats, freeze
 from harness.core.interval import Interval
 from harness.errors import BadInput
-from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
 from harness.measure.departures import Departure
+from harness.measure.episode_distributions import events_for_precision, recording_minutes
 from harness.measure.episode_fit import SeriesEpisodes
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.mean_drift import drift_speed, mean_drift
+from harness.measure.noise_spectra import (
+    AllanDeviation,
+    expected_allan,
+    measure_allan,
+    measure_spectrum,
+    pool_allan,
+    pool_spectra,
+)
 from harness.measure.profile import QualityClass, StretchLength, UnitProfile
-from harness.measure.recording_time import events_for_precision, recording_minutes
+from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
 from harness.measure.rigid_pair import RigidPair
-from harness.measure.spectrum import measure_spectrum, pool_spectra
-from harness.measure.spread import rest_spread
 from harness.measure.static_series import StaticSeries
 from harness.measure.unit_file import UnitFile
 

@@ -17,9 +17,8 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
-from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios, shorten_scenario
 from harness.study.papers.provenance import provenance_tables
-from harness.study.papers.quick_form import shorten_scenario
 
 PAPERS = ("liu2011", "kim2012")
 """Names of modules of this folder, each with a `PAPER`."""

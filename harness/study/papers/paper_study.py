@@ -1,13 +1,14 @@
 """A paper study: named runs in one folder, which are run by `engine.run`, resumed, and read back.
 
 The folder has study.json (the identity of the study), a folder for each run, and measured/ for other measurements.
+Its quick form has a few short clips, to see that everything works. It decides no statement.
 """
 
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -23,6 +24,11 @@ from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
 from harness.results.digests import STUDY_FILE, check_key, read_result_json, write_result_json
 from harness.results.storage import open_folder, read_summary
+
+CLIPS, LONGEST_S = 2, 3.0
+"""Number of test clips of each behaviour, and their length with the first second [s]."""
+DATABASE_SHARE = 0.05
+"""Share of the paper's frames in the databases whose speed is measured."""
 
 
 @dataclass(frozen=True)
@@ -161,3 +167,16 @@ def count_cells(runs: Mapping[str, Scenario]) -> int:
         for scenario in runs.values()
         for _, variant in variants(scenario)
     )
+
+
+def shorten_scenario(scenario: Scenario) -> Scenario:
+    """The scenario with the first `CLIPS` test clips of each behaviour, of `LONGEST_S` at most; its database stays."""
+    motion, taken, kept = scenario.motion, Counter[str](), list[tuple[str, str]]()
+    shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
+    for clip, behaviour in zip(motion.test, shown, strict=True):
+        taken[behaviour] += 1
+        if taken[behaviour] <= CLIPS:
+            kept.append((clip, behaviour))
+    test, behaviours = zip(*kept, strict=True)
+    longest_s = min(motion.longest_s or LONGEST_S, LONGEST_S)
+    return replace(scenario, motion=replace(motion, test=test, behaviours=behaviours, longest_s=longest_s))

@@ -15,8 +15,7 @@ from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed,
 from harness.results import manifest
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.findings import BarChart, FindingsTable, PaperExperiment
-from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.quick_form import DATABASE_SHARE
+from harness.study.papers.paper_study import DATABASE_SHARE, PaperStudy
 from harness.study.papers.speed_dataset import MAX_TEST_S, build_speed_dataset, missing_clips
 
 _REAL_NOTE = (

@@ -9,7 +9,6 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.range_of_motion import measure_ranges
 from harness.study.papers.station_sets import (
     STATION_ABBREVIATIONS,
     ErrorsBySet,
@@ -21,6 +20,7 @@ from harness.study.papers.station_sets import (
     claim_suitable,
     errors_by_set,
     format_station_set,
+    measure_ranges,
     ranked_bars,
     set_table,
     station_count_lines,

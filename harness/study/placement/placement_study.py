@@ -41,10 +41,17 @@ from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
 from harness.study.placement.power import choose_pilot, estimate_power
 from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
-from harness.study.placement.ranking import Costs, best_by_size, complete_sets, summarise_set
+from harness.study.placement.ranking import (
+    ConditionCosts,
+    Costs,
+    best_by_size,
+    complete_sets,
+    rank_agreements,
+    rank_by_condition,
+    summarise_set,
+)
 from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
-from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition
 
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""

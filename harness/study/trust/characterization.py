@@ -17,13 +17,13 @@ from harness.results.digests import file_digest
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.study.trust.expected_values import (
     UNIFORM_KEYS,
+    check_departures,
     flatten_components,
     nest_components,
     preset_components,
     preset_values,
     unit_values,
 )
-from harness.study.trust.named_departures import check_departures
 
 REFERENCE_NEEDED = "A reference is needed: `harness validate`."
 DEFAULT_KEPT = {

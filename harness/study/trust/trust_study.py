@@ -37,22 +37,23 @@ from harness.results.trust_findings import (
 from harness.stream.recording.recording import PLAN, read_recording
 from harness.study.papers.paper_study import open_study
 from harness.study.trust.capture_cells import Arm, CaptureResult, CaptureTask, find_stations, run_capture
-from harness.study.trust.energy_distance import (
-    CORRELATION_TIMES,
-    compare_errors,
-    correlation_samples,
-)
-from harness.study.trust.equivalence import judge_equivalence
 from harness.study.trust.pair_agreement import (
     ArmErrors,
     average_performers,
     clip_means,
     correlate_ranks,
+    judge_equivalence,
     judge_pairs,
     unit_of,
 )
 from harness.study.trust.plan import Plan, load_plan, parameter_variants, plan_digest, scenario_file, unit_file
-from harness.study.trust.reading_errors import FEATURES, HealthCounts
+from harness.study.trust.reading_errors import (
+    CORRELATION_TIMES,
+    FEATURES,
+    HealthCounts,
+    compare_errors,
+    correlation_samples,
+)
 
 
 class OtherPlan(HarnessError):

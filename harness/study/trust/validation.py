@@ -13,30 +13,32 @@ from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import find_playback, registered_take
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.measure.accuracy import StationAccuracy, error_quantiles
+from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
     Registration,
     StationResiduals,
-    coarse_offset,
-    record_period_s,
     register,
     require_stamps,
 )
-from harness.measure.station_identity import identify_stations
 from harness.measure.unit_file import UnitFile
 from harness.measure.unit_report import CaptureSummary
-from harness.measure.validation_report import ValidationReport, estimated_poses, residual_series
+from harness.measure.validation_report import (
+    StationAccuracy,
+    ValidationReport,
+    error_quantiles,
+    estimated_poses,
+    residual_series,
+)
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
-from harness.study.trust.expected_values import preset_components, preset_values
-from harness.study.trust.named_departures import correct_departures
+from harness.study.trust.expected_values import correct_departures, preset_components, preset_values
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,

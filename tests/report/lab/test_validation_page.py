@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from harness.core.interval import Interval
 from harness.errors import ShapeError
-from harness.measure.accuracy import ErrorQuantiles
-from harness.measure.validation_report import ResidualSeries, ValidationReport
+from harness.measure.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.kit.style import to_svg

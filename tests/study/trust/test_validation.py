@@ -9,7 +9,7 @@ import pytest
 
 from harness.errors import BadInput, NotComparable, Outcome, UnknownName
 from harness.experiment.playback import Playback, prepare_playback
-from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.registration import StationResiduals
 from harness.measure.unit_file import UnitFile
 from harness.simulate.simulation import TrackerConfig

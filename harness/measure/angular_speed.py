@@ -1,17 +1,23 @@
-"""Offset between two clocks, from the angular speeds of the same motion.
+"""Offset between two clocks, and which station is on which body, from the angular speeds of the same motion.
 
 Angular speed is the same in every frame, so neither room nor mounts need to be known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, freeze
+from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.time_grid import count_steps
 from harness.errors import BadInput, NotComparable
+from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
+
+LEAST_GAIN = 0.1
+"""Least gain in the mean correlation of the stations concerned with which an exchange is believed [choice]."""
+_FEWEST_STEPS = 20
+_LEAST_OVERLAP_S = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,3 +135,91 @@ def _parabola(values: Floats, best: int) -> float:
     left, middle, right = values[best - 1 : best + 2]
     bend = left - 2.0 * middle + right
     return float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+
+
+def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
+    """Median time between records of a station [s]."""
+    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
+    return float(np.median(np.concatenate(steps_s)))
+
+
+def coarse_offset(
+    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
+) -> TimeOffset:
+    """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
+    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
+    expected = [reference_speed(splines[name], period_s) for name in stations]
+    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
+
+
+def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
+    """Angular speed of a reference, over steps of `period_s` as the device's."""
+    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
+    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
+    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
+
+
+def identify_stations(
+    stations: Mapping[str, MeasuredPoses], truths: Mapping[str, TruthPoses], stated: Mapping[str, str]
+) -> dict[str, str]:
+    """The body of each station: the stated one, unless another assignment correlates clearly better.
+
+    The assignment has the largest sum of correlations between the angular speed of a station and that of a body
+    (Kuhn 1955), over the time offsets of the stated assignment and of the first station on each body: one of those is
+    right. Bodies that no station is stated to be on are not considered.
+    """
+    names, bodies = list(stations), list(dict.fromkeys(stated[name] for name in stations))
+    if len(names) < 2 or len(bodies) < len(names):
+        return dict(stated)
+    splines = {body: TruthSpline(truths[body]) for body in bodies}
+    period_s = record_period_s(stations)
+
+    def correlations(worn: Mapping[str, str]) -> Floats:
+        on = {name: splines[body] for name, body in worn.items()}
+        offset_s = coarse_offset({name: stations[name] for name in worn}, on, period_s, _LEAST_OVERLAP_S).offset_s
+        return np.array([_correlations(stations[name], splines, offset_s) for name in names])
+
+    rows, own = np.arange(len(names)), [bodies.index(stated[name]) for name in names]
+    as_stated = correlations(stated)
+    assigned = [_assigned(as_stated), *(_assigned(correlations({names[0]: body})) for body in bodies)]
+    columns, correlation = max(assigned, key=lambda one: float(one[1].sum()))
+    changed = columns != np.array(own)
+    gain = correlation[changed] - as_stated[rows, own][changed]
+    if not changed.any() or gain.mean() < LEAST_GAIN:
+        return dict(stated)
+    return {name: bodies[column] for name, column in zip(names, columns, strict=True)}
+
+
+def _assigned(correlation: Floats) -> tuple[Ints, Floats]:
+    """The body of each station (N,) and its correlation (N,), of correlations (N, B) with the largest sum."""
+    from scipy import optimize
+
+    rows, columns = optimize.linear_sum_assignment(-correlation)
+    return columns, correlation[rows, columns]
+
+
+def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], offset_s: float) -> list[float]:
+    """Correlation of the station's angular speed with that of each body; 0 with too little in common."""
+    known = station.valid & np.isfinite(station.measured_s)
+    time_s, turn = station.measured_s[known], station.tracker_from_station[known]
+    lag = 4
+    middle_s, step_s = 0.5 * (time_s[lag:] + time_s[:-lag]) - offset_s, time_s[lag:] - time_s[:-lag]
+    measured = _angle(turn[:-lag], turn[lag:]) / np.maximum(step_s, 1e-6)
+    usable = (step_s > 0.0) & (step_s < 3.0 * np.median(step_s))
+    out = []
+    for spline in splines.values():
+        rows = usable & spline.covers(middle_s - step_s) & spline.covers(middle_s + step_s)
+        if rows.sum() < _FEWEST_STEPS:
+            out.append(0.0)
+            continue
+        before, after = (spline.poses(middle_s[rows] + sign * 0.5 * step_s[rows])[1] for sign in (-1.0, 1.0))
+        expected = _angle(before, after) / step_s[rows]
+        with np.errstate(invalid="ignore"):  # of a body that does not turn
+            pair = np.corrcoef(measured[rows], expected)[0, 1]
+        out.append(float(pair) if np.isfinite(pair) else 0.0)
+    return out
+
+
+def _angle(first: Floats, second: Floats) -> Floats:
+    out: Floats = 2.0 * np.arccos(np.clip(np.abs(np.sum(first * second, axis=1)), 0.0, 1.0))
+    return out

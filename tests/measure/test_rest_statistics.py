@@ -7,8 +7,8 @@ import pytest
 
 from harness.core.interval import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.mean_drift import drift_speed, mean_drift
 from harness.measure.noise_fit import NoiseFit
+from harness.measure.rest_statistics import drift_speed, mean_drift
 from harness.simulate.noise import Noise
 from tests.measure.test_gauss_markov import dense_covariance
 from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth

@@ -1,18 +1,45 @@
-"""Drift of the mean: the constant velocity of a resting station's readings, with its interval."""
+"""Spread of the pose of a station at rest, everything included, and the drift of its mean."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from harness.core.arrays import Bools
+from harness.core.arrays import Bools, Floats
 from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
-from harness.measure.correlated_errors import ErrorProcess
-from harness.measure.gauss_markov import NOISE_KEYS
+from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.static_series import StaticSeries
 
+_BLOCK_S = 10.0
+"""Length of the blocks whose sums give the interval [s]: ten correlation times of the drift, two excursions."""
+_FEWEST_BLOCKS = 4
 _ROWS = {"position_m": (0, 1), "rotation_rad": (2, 4)}
 """Rows in `NOISE_KEYS` of the white noise and of the largest drift of a field."""
+
+
+def rest_spread(series: Sequence[StaticSeries], name: str) -> Interval:
+    """Root mean square of the distance (`position_m`) or angle (`rotation_rad`) from the resting pose.
+
+    The interval is that of the mean square over blocks of ten seconds, by Student's t.
+    """
+    from scipy import special
+
+    sums: list[tuple[float, int]] = []
+    for one in series:
+        squared: Floats = np.sum(getattr(one, name) ** 2, axis=1)
+        size = round(_BLOCK_S * one.rate_hz)
+        for begin in range(0, len(one) - size + 1, size):
+            known = squared[begin : begin + size][one.valid[begin : begin + size]]
+            sums.append((float(known.sum()), len(known)))
+    if len(sums) < _FEWEST_BLOCKS:
+        return Interval.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of rest are needed.")
+    above, below = np.array(sums).T
+    ratio = float(above.sum() / below.sum())
+    count = len(above)
+    deviation = float(np.sqrt(count / (count - 1) * np.sum((above - ratio * below) ** 2)) / below.sum())
+    half = float(special.stdtrit(count - 1, 0.975)) * deviation
+    low, middle, high = np.sqrt(np.maximum([ratio - half, ratio, ratio + half], 0.0)).tolist()
+    return Interval(middle, low, high, int(below.sum()))
 
 
 def mean_drift(

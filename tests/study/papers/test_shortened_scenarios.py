@@ -10,8 +10,7 @@ from harness.cli import main
 from harness.errors import BadInput, Outcome
 from harness.results.findings import read_findings
 from harness.study.papers.paper import PAPERS, load_paper, reproduce
-from harness.study.papers.paper_study import PaperStudy, count_cells
-from harness.study.papers.quick_form import CLIPS, LONGEST_S, shorten_scenario
+from harness.study.papers.paper_study import CLIPS, LONGEST_S, PaperStudy, count_cells, shorten_scenario
 from tests.study.papers.tiny import TINY, WALKS
 
 
