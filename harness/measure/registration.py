@@ -151,12 +151,6 @@ class Registration:
         """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
         return self.state.reference_s
 
-    def room_turn_from(self, world_from_tracker: Floats) -> tuple[Interval, Interval, Interval]:
-        """Rotation vector from an expected `world_from_tracker` (4,) to the measured one, tracker's axes [rad]."""
-        measured, expected = rotations.inverse(self.world_from_tracker), rotations.inverse(world_from_tracker)
-        x, y, z = _turns(measured, expected, self.room_covariance[:3, :3], self.blocks)
-        return x, y, z
-
     def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
         """World coordinates of a point (3,) given in the tracker's frame, without the scale error [m]."""
         at_m = rotations.rotate(self.world_from_tracker, point_m)

@@ -85,9 +85,10 @@ def _linear(
     """Residuals (N, 6) and slopes (N, 6, 17) of one station; zero where nothing is known."""
     grid, truth = grids[s], truths[s]
     rows = grid.known
-    one = linearise(state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth)
     residual, slope = np.zeros((len(rows), 6)), np.zeros((len(rows), 6, SHARED + OWN))
-    residual[rows], slope[rows] = one.residual, one.slope
+    residual[rows], slope[rows] = linearise(
+        state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth
+    )
     return residual, slope
 
 

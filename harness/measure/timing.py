@@ -7,7 +7,7 @@ late.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,14 +60,6 @@ class _StationCounts:
     """The last record, to compare the next block with it."""
 
 
-@dataclass
-class _SessionClocks:
-    """Least difference of host and device clock in each second of one session of the line."""
-
-    least_s: dict[int, tuple[float, float]] = field(default_factory=dict)
-    """Number of the second -> difference and device time [s]."""
-
-
 @dataclass(frozen=True)
 class TimingMeasurement:
     """Numbers by `TIMING_KEYS`, of all stations together and of each."""
@@ -85,7 +77,8 @@ class TimingAccumulator:
         """`rate_hz` is the nominal rate of each station [Hz]."""
         self._rate_hz = rate_hz
         self._counts: dict[str, _StationCounts] = {}
-        self._clocks: dict[int, _SessionClocks] = {}
+        self._clocks: dict[int, dict[int, tuple[float, float]]] = {}
+        """Session of the line -> second -> least difference of host and device clock, and device time [s]."""
         self._delays_s: list[float] = []
         """Mean delay of each second of each station [s]."""
         self._tails_s: dict[str, Floats] = {}
@@ -151,14 +144,13 @@ class TimingAccumulator:
             return
         device_s, host_s = readings.measured_s[known], readings.received_s[known]
         difference_s = host_s - device_s
-        clocks = self._clocks.setdefault(block.session, _SessionClocks())
+        clocks = self._clocks.setdefault(block.session, {})
         second = (device_s // _BIN_S).astype(np.int64)
         order = np.lexsort((difference_s, second))
         _, first = np.unique(second[order], return_index=True)
         for row in order[first].tolist():
             least, number = (float(difference_s[row]), float(device_s[row])), int(second[row])
-            if least < clocks.least_s.get(number, (math.inf, 0.0)):
-                clocks.least_s[number] = least
+            clocks[number] = min(least, clocks.get(number, (math.inf, 0.0)))
         _, group = np.unique(second, return_inverse=True)
         late_s = np.bincount(group, difference_s - difference_s[order[first]][group]) / np.bincount(group)
         self._delays_s += late_s.tolist()
@@ -186,8 +178,8 @@ class TimingAccumulator:
 
     def _clock_drift_ppm(self) -> tuple[Interval, float]:
         """Rate error of the device's clock [1e-6] from the longest session, and the length of it [s]."""
-        clocks = max(self._clocks.values(), key=lambda one: len(one.least_s), default=None)
-        points = np.array(list(clocks.least_s.values())) if clocks else np.zeros((0, 2))
+        clocks = max(self._clocks.values(), key=len, default={})
+        points = np.array(list(clocks.values())).reshape(-1, 2)
         if len(points) < _FEWEST_BINS:
             return Interval.missing(f"The clock needs {_FEWEST_BINS} s of records with stamps."), 0.0
         points = points[np.argsort(points[:, 1])]

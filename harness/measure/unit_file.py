@@ -116,13 +116,8 @@ def _require_all(path: Path, unit: UnitFile, content: Mapping[str, Any]) -> None
         raise BadFile(path, f"damaged: no {lost[0]}", f"the whole of {UNIT_FILE}", CUT_ADVICE)
 
 
-def unit_value(unit: UnitFile, key: str) -> float | None:
-    """The value of a dotted key of [components] or [tracker]; None where it is not there or no number."""
-    value = _find_value(unit, key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-
-
 def _find_value(unit: UnitFile, key: str) -> Any:
+    """The value of a dotted key of [components] or [tracker]; None where it is not there."""
     value: Any = {"components": unit.components, "tracker": unit.tracker}
     for part in key.split("."):
         if isinstance(value, Mapping):

@@ -4,19 +4,20 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.measure.excursions import THRESHOLD, ExcursionDetector, ExcursionEvent, ExcursionNoise
+from harness.measure.excursions import THRESHOLD, ExcursionDetector, ExcursionEvent
+from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.static_series import StaticSeries
 from harness.simulate.components.excursion import Excursion
 from tests.measure.resting import RATE_HZ, default_noise, rest_series
 from tests.measure.resting_stations import QUIET, at_rest, planted_series
 from tests.measure.static_readings import simulate_static
 
-NOISE = ExcursionNoise(0.00075, 0.0015, 1.0)
+NOISE = ErrorProcess(0.00075, 0.0015, 1.0)
 
 
 def search(series: StaticSeries) -> list[ExcursionEvent]:
     detector = ExcursionDetector(series.rate_hz, NOISE)
-    return detector.search(detector.innovations(series, np.zeros(len(series), bool)), "chest").events
+    return detector.search(detector.innovations(series, np.zeros(len(series), bool)), "chest")[0]
 
 
 def test_single_excursions_have_their_place_size_and_duration() -> None:

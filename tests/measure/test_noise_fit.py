@@ -91,7 +91,6 @@ def test_each_station_has_its_own_numbers() -> None:
     assert found.by_station["one"][key].value == pytest.approx(0.00075, rel=0.05)
     assert found.by_station["two"][key].value == pytest.approx(0.003, rel=0.05)
     assert found.all_stations[key].value == pytest.approx(np.sqrt((0.00075**2 + 0.003**2) / 2.0), rel=0.2)
-    assert found.samples == 4800
     assert not fit_noise(both, nothing(both), by_station=False).by_station
     short = replace(loud[0], valid=np.arange(2400) < 50)
     numbers = fit_noise([quiet[0], short], nothing(both)).by_station["two"]

@@ -13,7 +13,7 @@ from harness.simulate.noise import Noise
 from tests.measure.test_gauss_markov import dense_covariance
 from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth
 
-KNOWN = NoiseFit({key: Interval(value, value, value) for key, value in truth(PRESET).items()}, {}, 0)
+KNOWN = NoiseFit({key: Interval(value, value, value) for key, value in truth(PRESET).items()}, {})
 
 
 def test_the_slope_is_that_of_dense_least_squares() -> None:
@@ -48,7 +48,7 @@ def test_the_velocity_of_a_station_that_creeps_is_found() -> None:
 
 def test_without_noise_or_readings_nothing_is_measured() -> None:
     series, _ = series_and_masks(PRESET, 3, 10.0, ("one",))
-    quiet = NoiseFit(dict.fromkeys(NOISE_KEYS, Interval.missing("none")), {}, 0)
+    quiet = NoiseFit(dict.fromkeys(NOISE_KEYS, Interval.missing("none")), {})
     assert not any(one.is_measured for one in mean_drift(series, nothing(series), quiet, "position_m"))
     assert not any(one.is_measured for one in mean_drift(series, [np.ones(400, bool)], KNOWN, "rotation_rad"))
 

@@ -18,7 +18,8 @@ from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.planning import cell_names
+from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
@@ -57,8 +58,7 @@ class PaperStudy:
         if not rows:
             return []
         motion, sampling = self.runs[run].motion, Sampling(unit=self.runs[run].unit)
-        shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-        planned = Counter(zip(map(sampling.unit_of, motion.test), shown, strict=True))
+        planned = Counter((sampling.unit_of(clip), behaviour) for clip, behaviour in motion.tested)
         selected = (row for row in rows if all(row[name] == value for name, value in wanted.items()))
         units = ((row, sampling.unit_of(row["clip"])) for row in selected)
         return [{**row, "unit": unit, "unit_clips": planned[unit, row["behaviour"]]} for row, unit in units]
@@ -162,18 +162,13 @@ def run_scenarios(
 
 def count_cells(runs: Mapping[str, Scenario]) -> int:
     """Number of cells of all runs."""
-    return sum(
-        len(variant.motion.test) * len(variant.methods) * len(variant.inputs)
-        for scenario in runs.values()
-        for _, variant in variants(scenario)
-    )
+    return sum(len(cell_names(scenario)) for scenario in runs.values())
 
 
 def shorten_scenario(scenario: Scenario) -> Scenario:
     """The scenario with the first `CLIPS` test clips of each behaviour, of `LONGEST_S` at most; its database stays."""
     motion, taken, kept = scenario.motion, Counter[str](), list[tuple[str, str]]()
-    shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-    for clip, behaviour in zip(motion.test, shown, strict=True):
+    for clip, behaviour in motion.tested:
         taken[behaviour] += 1
         if taken[behaviour] <= CLIPS:
             kept.append((clip, behaviour))

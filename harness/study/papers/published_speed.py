@@ -96,8 +96,8 @@ def _measure(study: PaperStudy, published: PublishedSpeed, frames: Mapping[str, 
     machine = f"{circumstances['processor']}, {circumstances['cpu_count']} cores"
     if absent := missing_clips(study, frames):
         return {"absent": absent, "machine": machine}
-    dataset = build_speed_dataset(study, frames, benchmark_clips.load_clean_scenario(published.scenario), folder)
-    speeds = measure_speed(published.methods, dataset.database, dataset.test_clips, study.seed)
+    scenario = benchmark_clips.load_clean_scenario(published.scenario)
+    speeds = measure_speed(published.methods, *build_speed_dataset(study, frames, scenario, folder), study.seed)
     return {"speeds": [asdict(speed) for speed in speeds], "machine": machine}
 
 

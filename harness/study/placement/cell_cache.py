@@ -47,15 +47,8 @@ def link_rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
     return min(tracker.rate_hz, MAX_RATE_HZ, link_hz)
 
 
-@dataclass(frozen=True)
-class SetRequest:
-    """Sets of stations to measure in one scenario, whose stations are all candidates."""
-
-    scenario: Scenario
-    sets: tuple[StationSet, ...]
-    link: bool = False
-
-
+SetRequest = tuple[Scenario, tuple[StationSet, ...]]
+"""A scenario, whose stations are all candidates, and the sets of stations to measure in it."""
 RunCells = Callable[..., BatchResults]
 
 
@@ -70,6 +63,8 @@ class CellCache:
     executor: TaskExecutor
     command: str
     progress: ProgressCallback
+    link: bool = False
+    """Whether the rate of each set is limited to what the serial line carries."""
     run: RunCells = run_cells
     failures: dict[str, str] = field(default_factory=dict)
     """Cell -> why it has no result."""
@@ -91,9 +86,9 @@ class CellCache:
         """Run all sets that were not run yet, together, so that they share the workers."""
         todo: dict[str, Scenario] = {}
         values: dict[str, dict[str, Any]] = {}
-        for request in requests:
-            for stations in request.sets:
-                scenario, varied = self._variant(request, stations)
+        for asked, sets in requests:
+            for stations in sets:
+                scenario, varied = self._variant(asked, stations)
                 if _variant_key(varied) not in self._variants.get(scenario.name, ()):
                     todo[scenario.name] = scenario
                     values.setdefault(scenario.name, {})[_variant_key(varied)] = next(iter(varied.values()))
@@ -120,17 +115,18 @@ class CellCache:
         The error is None where one of the methods was not measured on one of the clips. Sets are run where necessary.
         """
         self.run_missing([request])
-        units = clips_of_units(request.scenario, self.folder)
-        errors = {stations: self._errors(request, stations, metric, methods) for stations in request.sets}
+        scenario, sets = request
+        units = clips_of_units(scenario, self.folder)
+        errors = {stations: self._errors(scenario, stations, metric, methods) for stations in sets}
         return {
             stations: {unit: _mean([by_clip[clip] for clip in clips]) for unit, clips in units.items()}
             for stations, by_clip in errors.items()
         }
 
     def _errors(
-        self, request: SetRequest, stations: StationSet, metric: str, methods: tuple[str, ...]
+        self, asked: Scenario, stations: StationSet, metric: str, methods: tuple[str, ...]
     ) -> dict[str, float | None]:
-        scenario, varied = self._variant(request, stations)
+        scenario, varied = self._variant(asked, stations)
         by_clip: dict[str, float | None] = {}
         for clip in scenario.motion.test:
             rows = [
@@ -158,10 +154,10 @@ class CellCache:
         self.planned += cells.planned
         self.failures |= cells.failures
 
-    def _variant(self, request: SetRequest, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
+    def _variant(self, asked: Scenario, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
         """The scenario that a set is a variant of, and its varied values: stations, or places of moved stations."""
-        rate = link_rate_hz(request.scenario, len(stations), request.link)
-        scenario = replace(request.scenario, tracker=replace(request.scenario.tracker, rate_hz=rate), vary={})
+        rate = link_rate_hz(asked, len(stations), self.link)
+        scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate), vary={})
         names = [station_name(place) for place in stations]
         moved = {
             station_name(place): {"along": place.along, "around_deg": place.around_deg}

@@ -80,7 +80,7 @@ def run_placement(
     """
     clear_caches()  # files may have changed since the last run
     plan = plan_placement(path, folder)
-    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce)
+    return _run_plan(plan, CellCache(out, folder, executor, command, progress, plan.study.link), jobs, announce)
 
 
 def answer_question(
@@ -106,7 +106,9 @@ def answer_question(
         return plan_study(within, lambda name: shortened, folder), note
 
     plan = plan_study(study, lambda name: scenario, folder)
-    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce, shorten)
+    return _run_plan(
+        plan, CellCache(out, folder, executor, command, progress, plan.study.link), jobs, announce, shorten
+    )
 
 
 def _run_plan(
