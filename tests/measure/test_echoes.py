@@ -7,9 +7,15 @@ from harness.core.arrays import Bools
 from harness.measure.echoes import LEAST_ECHO_M, EchoBursts, echo_limit_m, find_echoes, hold
 from harness.measure.static_series import StaticSeries
 from harness.simulate.components.echo import Echo
-from tests.measure.resting import RATE_HZ, default_noise, rest_series
-from tests.measure.resting_stations import QUIET, at_rest, planted_series
-from tests.measure.static_readings import simulate_static
+from tests.measure.resting_stations import (
+    QUIET,
+    RATE_HZ,
+    at_rest,
+    default_noise,
+    planted_series,
+    rest_series,
+    simulate_static,
+)
 
 LIMIT_M = 0.025
 

@@ -8,9 +8,15 @@ from harness.measure.excursions import THRESHOLD, ExcursionDetector, ExcursionEv
 from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.static_series import StaticSeries
 from harness.simulate.components.excursion import Excursion
-from tests.measure.resting import RATE_HZ, default_noise, rest_series
-from tests.measure.resting_stations import QUIET, at_rest, planted_series
-from tests.measure.static_readings import simulate_static
+from tests.measure.resting_stations import (
+    QUIET,
+    RATE_HZ,
+    at_rest,
+    default_noise,
+    planted_series,
+    rest_series,
+    simulate_static,
+)
 
 NOISE = ErrorProcess(0.00075, 0.0015, 1.0)
 

@@ -81,7 +81,7 @@ def test_the_closed_form_is_that_of_a_plain_double_sum() -> None:
 
 @pytest.mark.long
 def test_intervals_contain_the_closed_form() -> None:
-    rounds = 200
+    rounds = 80
     inside = np.zeros(12)
     for seed in range(rounds):
         found = measure_allan(noise(seed, 12_000, 3, 0.75, 1.5, 1.0), np.ones(12_000, bool), 40.0, longest_s=60.0)

@@ -58,10 +58,10 @@ def test_without_noise_or_readings_nothing_is_measured() -> None:
 def test_intervals_contain_no_drift(name: str) -> None:
     noise: Noise = PRESET
     inside = np.zeros(3)
-    for seed in range(100):
+    for seed in range(50):
         series, _ = series_and_masks(noise, 500 + seed, 60.0, ("one",))
         inside += [one.contains(0.0) for one in mean_drift(series, nothing(series), KNOWN, name)]
-    assert np.all(inside >= 88), inside
+    assert np.all(inside >= 43), inside
 
 
 def test_the_speed_of_a_station_without_drift_is_compatible_with_zero() -> None:

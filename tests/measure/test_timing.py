@@ -15,7 +15,7 @@ from harness.simulate.components.drift_noise import gauss_markov
 from harness.simulate.noise import Noise, noise_preset
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
-from tests.measure.static_readings import simulate_static, station_readings
+from tests.measure.resting_stations import simulate_static, station_readings
 
 STATIONS = ("one", "two", "three", "four", "five", "six")
 Delay = Callable[[np.random.Generator, int], Floats]
@@ -189,20 +189,14 @@ def clocks(rounds: int, seconds: float, delay: Delay, *, ppm: float, age_s: floa
 @pytest.mark.long
 @pytest.mark.parametrize("delay", [exponential, host])
 def test_the_clock_s_interval_contains_the_truth_behind_a_busy_host(delay: Delay) -> None:
-    found = clocks(60, 300.0, delay, ppm=80.0)
+    found = clocks(25, 300.0, delay, ppm=80.0)
     assert np.mean([one.contains(80.0) for one in found]) >= 0.88, [one.value for one in found]
     assert not any(one.contains(20.0) for one in found)
 
 
 @pytest.mark.long
-def test_the_clock_s_interval_of_a_minute_allows_for_a_delay_that_wanders() -> None:
-    found = clocks(60, 60.0, host, ppm=80.0)
-    assert np.mean([one.contains(80.0) for one in found]) >= 0.88, [one.value for one in found]
-
-
-@pytest.mark.long
 def test_the_clock_s_interval_contains_the_truth_with_coarse_stamps() -> None:
-    found = clocks(40, 300.0, exponential, ppm=80.0, age_s=18_000.0)
+    found = clocks(20, 300.0, exponential, ppm=80.0, age_s=18_000.0)
     assert np.mean([one.contains(80.0) for one in found]) >= 0.88
     assert not any(one.contains(20.0) for one in found)
 
@@ -231,10 +225,10 @@ def test_a_few_values_have_the_interval_of_sen() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_intervals_contain_the_slope_with_correlated_errors(correlation: float) -> None:
-    at, rounds = np.arange(60.0), 100
+    at, rounds = np.arange(60.0), 50
     inside = 0
     for seed in range(rounds):
         errors = gauss_markov(generator(seed, "errors").normal(size=(60, 1)), correlation)[:, 0]
         _, low, high = robust_slope(at, 0.5 * at + errors)
         inside += low <= 0.5 <= high
-    assert inside >= 88
+    assert inside >= 44

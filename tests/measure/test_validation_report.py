@@ -47,8 +47,8 @@ def test_little_time_has_a_reason(rng: np.random.Generator) -> None:
 def test_intervals_allow_for_errors_that_last() -> None:
     """Independent records would give intervals a fifth as wide, which contain the truth in a third of the captures."""
     contained = 0
-    for seed in range(60):
+    for seed in range(20):
         error = lasting(np.random.default_rng(seed), 120.0)
         found = error_quantiles(error, np.ones(len(error), bool), PERIOD_S)
         contained += found.rms.contains(np.sqrt(3.0))
-    assert 49 <= contained <= 60
+    assert 16 <= contained <= 20

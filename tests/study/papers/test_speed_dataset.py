@@ -52,9 +52,7 @@ def test_built_in_frames_are_counted_by_behaviour(tmp_path: Path) -> None:
     assert {behaviour: count for behaviour, count in counted.items() if count} == frames
     assert len(clips) == 2
     assert not {trial.take for trial in clips} & {run.take for run in database.segments}
-    assert len(clips[0].simulation.frames) == pytest.approx(
-        speed_dataset.MAX_TEST_S * benchmark_clips.RATE_HZ, abs=2
-    )
+    assert len(clips[0].simulation.frames) == pytest.approx(speed_dataset.MAX_TEST_S * benchmark_clips.RATE_HZ, abs=2)
 
 
 def test_a_database_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
