@@ -52,13 +52,13 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
         scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
-    report = found.report(args.capture)
+    report = found.report
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
     page = validation_page(report, errors, this_command())
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
-        "numbers": {key: number.as_dict() for key, number in found.numbers.items()},
+        "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
         "exchanged": dict(found.exchanged),
         "departures": [
             {

@@ -19,7 +19,7 @@ from harness.results.benchmark_statement import BenchmarkStatement, StatementKin
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import CellRow, errors_by_unit, format_mean, mean_sd, number_of_units
+from harness.study.papers.tables import SummaryRow, errors_by_unit, format_mean, mean_sd, number_of_units
 
 STATION_ABBREVIATIONS = {
     "right_hand": "RH",
@@ -55,9 +55,9 @@ def count_stations(name: str) -> int:
     return name.count("+") + 1
 
 
-def errors_by_set(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
+def errors_by_set(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
     """Set -> unit -> error, of rows that differ only in clip and stations."""
-    by_set: dict[str, list[CellRow]] = {}
+    by_set: dict[str, list[SummaryRow]] = {}
     for row in rows:
         by_set.setdefault(format_station_set(row["stations"]), []).append(row)
     return {name: errors_by_unit(each, metric) for name, each in by_set.items()}

@@ -13,7 +13,7 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.results.summary import GROUP_KEYS
 
-CellRow = Mapping[str, Any]
+SummaryRow = Mapping[str, Any]
 RMS = "joint_angle_rms_deg"
 """The root mean square of the hinge errors, which stands beside their mean."""
 HINGE_GROUPS = {
@@ -27,13 +27,13 @@ HINGE_GROUPS = {
 """Group -> bones; together they have the 48 hinges."""
 
 
-def errors_by_unit(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
+def errors_by_unit(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, float]:
     """Unit of statistics -> mean error of its clips, of rows that differ only in the clip (see `PaperStudy.rows`).
 
     A unit of which a clip was not measured is left out, so that means of one unit can be paired. BadInput for two rows
     of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
     """
-    errors: dict[str, tuple[CellRow, float | None]] = {}
+    errors: dict[str, tuple[SummaryRow, float | None]] = {}
     kinds: dict[str, Any] = {}
     for row in rows:
         for name in (*GROUP_KEYS, "behaviour"):
@@ -47,7 +47,7 @@ def errors_by_unit(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, f
     return _average(errors.values())
 
 
-def _average(values: Iterable[tuple[CellRow, float | None]]) -> dict[str, float]:
+def _average(values: Iterable[tuple[SummaryRow, float | None]]) -> dict[str, float]:
     """Unit -> mean of the values of its clips, of units all of whose clips have one."""
     of_unit: dict[tuple[str, int], list[float]] = {}
     for row, value in values:
@@ -145,7 +145,7 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
 
 
 def errors_by_joint_group(
-    cells: Iterable[tuple[CellRow, Cell]],
+    cells: Iterable[tuple[SummaryRow, Cell]],
     groups: Mapping[str, Sequence[str]] = HINGE_GROUPS,
     metric: str = METRIC,
 ) -> dict[str, dict[str, float]]:
@@ -153,7 +153,7 @@ def errors_by_joint_group(
 
     It is the mean over the hinges of the group; for the metric `RMS`, the root of the mean square.
     """
-    by_group: dict[str, list[tuple[CellRow, float]]] = {name: [] for name in groups}
+    by_group: dict[str, list[tuple[SummaryRow, float]]] = {name: [] for name in groups}
     for row, cell in cells:
         errors = cell.scores.per_joint.get(metric, {})
         for group, bones in groups.items():

@@ -36,7 +36,6 @@ from harness.score.metrics import DEFINITIONS
 from harness.study.papers.paper_study import open_study
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
-from harness.study.placement.cell_cache import CellCache
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
 from harness.study.placement.power import choose_pilot, estimate_power
@@ -52,6 +51,7 @@ from harness.study.placement.ranking import (
 )
 from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
+from harness.study.placement.set_results import SetResults
 
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""
@@ -80,7 +80,7 @@ def run_placement(
     """
     clear_caches()  # files may have changed since the last run
     plan = plan_placement(path, folder)
-    return _run_plan(plan, CellCache(out, folder, executor, command, progress, plan.study.link), jobs, announce)
+    return _run_plan(plan, SetResults(out, folder, executor, command, progress, plan.study.link), jobs, announce)
 
 
 def answer_question(
@@ -107,13 +107,13 @@ def answer_question(
 
     plan = plan_study(study, lambda name: scenario, folder)
     return _run_plan(
-        plan, CellCache(out, folder, executor, command, progress, plan.study.link), jobs, announce, shorten
+        plan, SetResults(out, folder, executor, command, progress, plan.study.link), jobs, announce, shorten
     )
 
 
 def _run_plan(
     plan: PlacementPlan,
-    cache: CellCache,
+    cache: SetResults,
     jobs: int,
     announce: Announce,
     shorten: Callable[[float], tuple[PlacementPlan, str]] | None = None,
@@ -149,7 +149,7 @@ def _run_plan(
 class _PlacementRun:
     """One placement study while it runs."""
 
-    def __init__(self, plan: PlacementPlan, cache: CellCache) -> None:
+    def __init__(self, plan: PlacementPlan, cache: SetResults) -> None:
         self.plan, self.study, self.cache = plan, plan.study, cache
         self.costs: dict[StationSet, dict[str, float | None]] = {}
         """Set -> costs on the test clips, for every set that was measured."""
@@ -199,9 +199,9 @@ class _PlacementRun:
             ),
             best=best,
             circumstances=manifest.current_circumstances(),
-            rankings=tuple(ranking for mode in modes for ranking in mode.rankings),
+            rankings=tuple(ranking for rankings, _ in modes for ranking in rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
-            contributions=tuple(contribution for mode in modes for contribution in mode.contributions),
+            contributions=tuple(contribution for _, contributions in modes for contribution in contributions),
             compared=tuple(map(names_of_places, compared)),
             conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
@@ -311,7 +311,7 @@ class _PlacementRun:
             )
         if slow := self.cache.line_loss:
             yield slow
-        for ranking in (ranking for mode in modes for ranking in mode.rankings):
+        for ranking in (ranking for rankings, _ in modes for ranking in rankings):
             if len(units) < (least := count_needed(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (
                     f"{ranking.title}: {counted} cannot show a significant difference between {len(ranking.rows)} "

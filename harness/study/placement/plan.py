@@ -18,7 +18,6 @@ from harness.mocap.sources import MotionSource
 from harness.results.placement_findings import CandidatePlace
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
-from harness.study.placement.cell_cache import SetRequest, clips_of_units, link_rate_hz
 from harness.study.placement.config import (
     PlacementStudy,
     base_scenario,
@@ -28,6 +27,7 @@ from harness.study.placement.config import (
 from harness.study.placement.ranking import Costs
 from harness.study.placement.refinement import check_unit_count
 from harness.study.placement.search import names_of_places
+from harness.study.placement.set_results import SetRequest, clips_of_units, link_rate_hz
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ function caches them. Costs are errors, with the opposite sign where high values
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -28,12 +27,8 @@ Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
 """Measures sets: set -> unit of statistics -> cost."""
 
 
-@dataclass(frozen=True)
-class ModeResult:
-    """Result of a mode."""
-
-    rankings: tuple[Ranking, ...] = ()
-    contributions: tuple[MarginalContribution, ...] = ()
+ModeResult = tuple[tuple[Ranking, ...], tuple[MarginalContribution, ...]]
+"""Rankings and contributions that a mode found."""
 
 
 def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
@@ -52,7 +47,7 @@ def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measu
         for unit, rest in reduced.items()
         for place in unit
     ]
-    return ModeResult((ranking,), tuple(contributions))
+    return (ranking,), tuple(contributions)
 
 
 def ablation_sets(
@@ -83,7 +78,7 @@ def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) ->
         for place in unit
         if base
     ]
-    return ModeResult((rank_sets("add", title, sets, names_of_places(base)),), tuple(contributions))
+    return (rank_sets("add", title, sets, names_of_places(base)),), tuple(contributions)
 
 
 def addition_sets(
@@ -115,7 +110,7 @@ def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup],
         )
         for size, same_size in sizes.items()
     ]
-    return ModeResult(tuple(rankings), tuple(_shapley_contributions(of, units, costs)))
+    return tuple(rankings), tuple(_shapley_contributions(of, units, costs))
 
 
 def exhaustive_sets(table: ExhaustiveOptions, units: Sequence[CandidateGroup]) -> list[StationSet]:

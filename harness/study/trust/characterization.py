@@ -113,7 +113,8 @@ def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dic
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
     if resolution.value > 2.0 * profile.timing.expected_resolution_s:  # else it is as fine as the format allows
         line["timing.stamp_resolution_s"] = profile.timing.expected_resolution_s
-    return {(key, ""): one for key, one in {**known, **{key: _exact(value) for key, value in line.items()}}.items()}
+    numbers = {**known, **{key: Interval.normal(value, 0.0) for key, value in line.items()}}
+    return {(key, ""): number for key, number in numbers.items()}
 
 
 def _means(profile: UnitProfile) -> dict[str, Interval]:
@@ -139,7 +140,3 @@ def _describe_capture(profile: UnitProfile, path: Path) -> dict[str, Any]:
         "rest_s": round(float(np.sum([one.duration_s for one in profile.rest])), 3),
         "damage": list(profile.damage),
     }
-
-
-def _exact(value: float) -> Interval:
-    return Interval(value, value, value)

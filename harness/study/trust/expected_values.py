@@ -34,7 +34,7 @@ def preset_components() -> dict[str, Any]:
 
 def preset_values() -> dict[str, Interval]:
     """Dotted key -> number of the preset `default`, known exactly; of a uniform distribution also its mean."""
-    return _with_means({key: _exact(value) for key, value in flatten_components(preset_components())})
+    return _with_means({key: Interval.normal(value, 0.0) for key, value in flatten_components(preset_components())})
 
 
 def unit_values(unit: UnitFile) -> dict[str, Interval]:
@@ -90,12 +90,8 @@ def _with_means(values: dict[str, Interval]) -> dict[str, Interval]:
         ends = [values.get(f"{key}.{i}") for i in (0, 1)]
         if key not in values and ends[0] is not None and ends[1] is not None:
             middle = 0.5 * (ends[0].value + ends[1].value)
-            values[key] = _exact(middle)
+            values[key] = Interval.normal(middle, 0.0)
     return values
-
-
-def _exact(value: float) -> Interval:
-    return Interval(value, value, value)
 
 
 def check_departures(

@@ -67,7 +67,7 @@ def _outcome(folder: Path, kind: str, seed: int, capture: Path, earlier: Path | 
         expected = session_unit(validate_capture(earlier, load_truth(earlier, clip, scenario=scenario)), None, EARLIER)
     found = validate_capture(capture, load_truth(capture, clip, scenario=scenario), expected=expected)
     exchanged = tuple(f"{station}: {body}" for station, body in sorted(found.exchanged.items()))
-    return CaptureOutcome(kind, seed, "", stored_checks(found.checks), exchanged=exchanged)
+    return CaptureOutcome(kind, seed, "", stored_checks(found.report.checks), exchanged=exchanged)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -19,10 +19,10 @@ from harness.results.placement_findings import PlacementFindings, StatisticalPow
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
 from harness.study.placement import placement_study
-from harness.study.placement.cell_cache import link_rate_hz
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import run_placement
 from harness.study.placement.plan import plan_placement
+from harness.study.placement.set_results import link_rate_hz
 from tests.results.finish import folder_bytes
 
 SCENARIO = """

@@ -60,7 +60,7 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class CaptureTask:
+class TrustTask:
     """One capture with everything that a worker process needs."""
 
     capture: Path
@@ -80,7 +80,7 @@ class CaptureTask:
 
 
 @dataclass(eq=False)
-class CaptureResult:
+class ArmResults:
     """What one capture gave. Errors of readings are those of `reading_errors`."""
 
     clip: str
@@ -105,24 +105,24 @@ class CaptureResult:
     """Time that training and methods took [s]; not part of any stored result."""
 
 
-def run_capture(task: CaptureTask) -> CaptureResult:
+def run_capture(task: TrustTask) -> ArmResults:
     """Run or read all cells of a capture.
 
     BadFile, BadInput and UnknownName for a capture that is not of the scenario's motion and stations. A method that
     fails costs its own cells.
     """
-    return _CaptureRun(task).run()
+    return _TrustTaskRun(task).run()
 
 
-def find_stations(task: CaptureTask) -> tuple[str, ...]:
+def find_stations(task: TrustTask) -> tuple[str, ...]:
     """Stations of a capture; raises as `run_capture` where its note or its stations do not fit."""
-    return tuple(_CaptureRun(task).playback.scenario.worn_stations)
+    return tuple(_TrustTaskRun(task).playback.scenario.worn_stations)
 
 
-class _CaptureRun:
+class _TrustTaskRun:
     """The evaluation of one capture; each part is made when it is first needed."""
 
-    def __init__(self, task: CaptureTask) -> None:
+    def __init__(self, task: TrustTask) -> None:
         self.task, self.stream = task, RecordingStream(task.capture)
         self.note = checked_note(self.stream)
         self.clip = task.clip or self.note.get("clip")
@@ -145,7 +145,7 @@ class _CaptureRun:
         self.sha256 = hashlib.sha256(self.stream.recording.data).hexdigest()
         self.methods_s, self.failures = 0.0, dict[str, str]()
 
-    def run(self) -> CaptureResult:
+    def run(self) -> ArmResults:
         """Cells of both sides, errors of readings and health."""
         device = self._cells("device", {"capture": self.sha256}, lambda: self.device)
         simulated = []
@@ -155,7 +155,7 @@ class _CaptureRun:
             if seed == self.task.seeds[0]:
                 first = load()
         sides = (self.device, first)
-        return CaptureResult(
+        return ArmResults(
             clip=str(self.clip),
             sha256=self.sha256,
             frames=len(self.device.frames),
@@ -194,7 +194,7 @@ class _CaptureRun:
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
         take = registered_take(self.stream, found.registration, self.playback, self.playback.tracker.rate_hz)
-        offset_s = found.numbers["time_offset_orientation_s"].value
+        offset_s = found.report.numbers["time_offset_orientation_s"].value
         note = (
             f"{self.task.capture.name} was registered with {self.clip}: its clock is {offset_s:.4f} s ahead, and "
             "methods received the room and mounts that were found; in the simulation they received the true ones."

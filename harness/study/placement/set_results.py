@@ -53,7 +53,7 @@ RunCells = Callable[..., BatchResults]
 
 
 @dataclass
-class CellCache:
+class SetResults:
     """Runs sets that were not measured yet, and caches their results."""
 
     out: Path
