@@ -4,9 +4,8 @@ import argparse
 import re
 import sys
 from contextlib import redirect_stdout
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from harness.commands.common import (
     Verbs,
@@ -83,11 +82,6 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     question = _read_question(args)
     name = question.name if question else Path(args.study).stem.removeprefix("placement_")
     out = args.out or Path("results") / f"placement_{name}"
-    study: Any = (
-        partial(placement_study.answer_question, question)
-        if question
-        else partial(placement_study.run_placement, args.study)
-    )
     with (
         progress_note(out),
         ProgressBar("cells") as bar,
@@ -95,7 +89,8 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         process_executor(args.jobs) as each,
     ):
         findings: PlacementFindings
-        findings, outcome = study(
+        findings, outcome = placement_study.run_placement(
+            question or args.study,
             out,
             folder=args.mocap,
             executor=each,

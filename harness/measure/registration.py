@@ -1,7 +1,7 @@
 """Registration of a capture with a reference: clocks, room, scale, heading error, and the mount of each station."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -272,11 +272,7 @@ def _start(
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
     require_same_hand([one.position_m for one in paired], [one.body_m for one in paired])
-    solved = solve_hand_eye(paired, with_scale=False)
-    return RegistrationState(
-        middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, 0.0, 0.0,
-        solved.body_from_station, solved.mount_m,
-    )  # fmt: skip
+    return replace(solve_hand_eye(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
 
 
 def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:

@@ -55,10 +55,12 @@ from harness.study.placement.set_results import SetResults
 
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""
+Shorten = Callable[[float], tuple[PlacementPlan, str]]
+"""Gives another plan, and a note, for the duration of a cell on one worker [s]."""
 
 
 def run_placement(
-    path: Path | str,
+    asked: Path | str | PlacementQuestion,
     out: Path,
     *,
     folder: LibraryFolders | None = None,
@@ -68,9 +70,10 @@ def run_placement(
     progress: ProgressCallback = lambda last, done, planned: None,
     announce: Announce = lambda power, notes: None,
 ) -> tuple[PlacementFindings, Outcome]:
-    """Run the study in a TOML file, and write findings.json into `out`.
+    """Run the study in a TOML file, or the one that answers a question, and write findings.json into `out`.
 
-    The first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
+    A question's study keeps within its budget of time. Without `folder` its motion is built in, else the library's. The
+    first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
     `jobs` workers, before the other cells run.
 
     `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
@@ -79,36 +82,20 @@ def run_placement(
     PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
-    plan = plan_placement(path, folder)
-    return _run_plan(plan, SetResults(out, folder, executor, command, progress, plan.study.link), jobs, announce)
+    shorten: Shorten | None = None
+    if isinstance(asked, PlacementQuestion):
+        study, scenario = question_study(asked, folder)
+        plan = plan_study(study, lambda name: scenario, folder)
 
+        def keep_budget(cell_s: float) -> tuple[PlacementPlan, str]:
+            within, shortened, note = plan_within_budget(study, scenario, asked, cell_s, jobs)
+            return plan_study(within, lambda name: shortened, folder), note
 
-def answer_question(
-    question: PlacementQuestion,
-    out: Path,
-    *,
-    folder: LibraryFolders | None = None,
-    executor: TaskExecutor = run_in_process,
-    jobs: int = 1,
-    command: str = "",
-    progress: ProgressCallback = lambda last, done, planned: None,
-    announce: Announce = lambda power, notes: None,
-) -> tuple[PlacementFindings, Outcome]:
-    """Run the study that answers a question within its budget of time; otherwise as `run_placement`.
-
-    Without `folder` the motion is built in; else it is that of the library.
-    """
-    clear_caches()
-    study, scenario = question_study(question, folder)
-
-    def shorten(cell_s: float) -> tuple[PlacementPlan, str]:
-        within, shortened, note = plan_within_budget(study, scenario, question, cell_s, jobs)
-        return plan_study(within, lambda name: shortened, folder), note
-
-    plan = plan_study(study, lambda name: scenario, folder)
-    return _run_plan(
-        plan, SetResults(out, folder, executor, command, progress, plan.study.link), jobs, announce, shorten
-    )
+        shorten = keep_budget
+    else:
+        plan = plan_placement(asked, folder)
+    results = SetResults(out, folder, executor, command, progress, plan.study.link)
+    return _run_plan(plan, results, jobs, announce, shorten)
 
 
 def _run_plan(
@@ -116,9 +103,9 @@ def _run_plan(
     cache: SetResults,
     jobs: int,
     announce: Announce,
-    shorten: Callable[[float], tuple[PlacementPlan, str]] | None = None,
+    shorten: Shorten | None,
 ) -> tuple[PlacementFindings, Outcome]:
-    """Run a plan; `shorten` gives another one, and a note, for the duration of a cell on one worker [s]."""
+    """Run a plan, or the one that `shorten` gives."""
     identity = {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed}
     with open_study(cache.out, identity):
         (cache.out / "cells").mkdir(exist_ok=True)
