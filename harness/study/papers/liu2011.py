@@ -10,7 +10,6 @@ from harness.compare.claims import claim_lower_error, claim_published_value
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.results.benchmark_statement import Reading, StatementKind
-from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.bone_lengths import evaluate_bone_modes
 from harness.study.papers.database_size import database_size, one_database, other_approaches
@@ -46,16 +45,12 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
     real = study.motion == "cmu"
     first = "blocks" if real else "leave_one_out"  # has two of the four combinations, on the same clips
     runs = {inputs: first if inputs in ("pos+ori", "pos") else "boxing_inputs" for inputs in PUBLISHED_DEG}
-    errors, roots = (
-        {
-            method: {
-                i: errors_by_unit(study.rows(run, behaviour="boxing", method=method, inputs=i), metric)
-                for i, run in runs.items()
-            }
-            for method in (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, DYNAMIC_MAP_WINDOW)
+    errors = {
+        method: {
+            i: errors_by_unit(study.rows(run, behaviour="boxing", method=method, inputs=i)) for i, run in runs.items()
         }
-        for metric in (METRIC, RMS)
-    )
+        for method in (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, DYNAMIC_MAP_WINDOW)
+    }
     orders = [
         claim_lower_error(
             f"{method}: {INPUTS[lower]} err less than {INPUTS[higher]}",
@@ -80,19 +75,11 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
         for method, each in errors.items()
         for inputs, published in PUBLISHED_DEG.items()
     ]
-    groups, root_groups = (
-        {INPUTS[i]: {method: each[i] for method, each in side.items()} for i in PUBLISHED_DEG}
-        for side in (errors, roots)
-    )
-    joints, root_joints = (
-        {
-            INPUTS[i]: errors_by_joint_group(
-                study.cells(run, behaviour="boxing", method=DYNAMIC_MAP, inputs=i), metric=metric
-            )
-            for i, run in runs.items()
-        }
-        for metric in (METRIC, RMS)
-    )
+    groups = {INPUTS[i]: {method: each[i] for method, each in errors.items()} for i in PUBLISHED_DEG}
+    joints = {
+        INPUTS[i]: errors_by_joint_group(study.cells(run, behaviour="boxing", method=DYNAMIC_MAP, inputs=i))
+        for i, run in runs.items()
+    }
     bars = mean_bars(
         "Error by inputs",
         "deg",
@@ -115,8 +102,8 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
         differences=(*((blocks,) if real else ()), *differences(study)),
         claims=(*orders, *figures),
         tables=(
-            mean_table("Joint-angle error [deg]", "inputs", groups, root_groups),
-            mean_table(f"Error of {DYNAMIC_MAP} by joint group [deg]", "inputs", joints, root_joints),
+            mean_table("Joint-angle error [deg]", "inputs", groups),
+            mean_table(f"Error of {DYNAMIC_MAP} by joint group [deg]", "inputs", joints),
         ),
         figures=(bars,),
         runs=(first, "boxing_inputs"),

@@ -213,9 +213,7 @@ def station_count_lines(title: str, behaviours: Mapping[str, ErrorsBySet], capti
     return LineChart(title, "stations", "mean joint-angle error [deg]", tuple(map(float, sizes)), series, shown)
 
 
-def set_table(
-    title: str, angles: ErrorsBySet, roots: ErrorsBySet, positions: ErrorsBySet, reference: str
-) -> FindingsTable:
+def set_table(title: str, angles: ErrorsBySet, positions: ErrorsBySet, reference: str) -> FindingsTable:
     """Table of all sets: mean and RMS of joint angles, joint centres, and the ratio of the angle error to that of the
     `reference` set.
     """
@@ -223,7 +221,7 @@ def set_table(
     rows = [
         (
             name,
-            format_mean(errors, rms=roots.get(name)),
+            format_mean(errors),
             format_mean(positions.get(name, {}), 0),
             _ratio_text(_mean_error(errors) / base),
         )

@@ -179,10 +179,10 @@ def test_pictures_and_tables_rank_the_sets() -> None:
     lines = station_count_lines("lines", {"walking": sets, "boxing": {}}, "")
     assert lines.x == (1.0, 2.0, 3.0, 4.0, 5.0)
     assert set(lines.series["boxing"]) == {None}
-    table = set_table("table", sets, sets, sets, format_station_set(STATION_ABBREVIATIONS))
+    table = set_table("table", sets, sets, format_station_set(STATION_ABBREVIATIONS))
     assert [count_stations(row[0]) for row in table.rows] == sorted(map(count_stations, ALL))
     assert table.rows[-1][-1] == "1.00"
-    assert set_table("table", {"PEL": sets["PEL"]}, {}, {}, format_station_set(STATION_ABBREVIATIONS)).rows[0][2:] == (
+    assert set_table("table", {"PEL": sets["PEL"]}, {}, format_station_set(STATION_ABBREVIATIONS)).rows[0][2:] == (
         "not measured",
         "not measured",
     )
