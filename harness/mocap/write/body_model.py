@@ -42,7 +42,7 @@ class Shape(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class StationPlace:
+class MountedStation:
     """Place of a station in the frame of its bone."""
 
     name: str
@@ -61,7 +61,7 @@ class BodyModel:
     """Surface and stations of one body."""
 
     shapes: Sequence[Shape]
-    stations: Sequence[StationPlace] = ()
+    stations: Sequence[MountedStation] = ()
 
 
 @dataclass(frozen=True, eq=False)
