@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from harness.core.python_process import THREAD_VARIABLES
+from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import HarnessError
 from harness.experiment.environment_audit import audit_environment
 from harness.reconstruct.source_files import (

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
 
 _BLOCK_S = 5.0

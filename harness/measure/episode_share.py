@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 
 
 def episode_share(lengths: Floats, total: int, longest: float) -> Interval:

@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.time_grid import count_steps
+from harness.core.motion import count_steps
 from harness.errors import BadInput, NotComparable
 
 

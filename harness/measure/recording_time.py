@@ -2,7 +2,7 @@
 
 import math
 
-from harness.core.interval import NORMAL_QUANTILE
+from harness.core.number_format import NORMAL_QUANTILE
 from harness.errors import BadInput
 
 

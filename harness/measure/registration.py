@@ -7,8 +7,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
-from harness.core.time_grid import count_steps
+from harness.core.motion import count_steps
+from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
 from harness.measure.conventions import (
     MOST_PLACE_M,

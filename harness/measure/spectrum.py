@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Floats, freeze
-from harness.core.runs import find_runs
+from harness.core.arrays import Floats, find_runs, freeze
 from harness.errors import BadInput
 
 

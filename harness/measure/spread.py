@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.static_series import StaticSeries
 
 _BLOCK_S = 10.0

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 
 FEWEST_VALUES = 10
 _TRIMMED = 4

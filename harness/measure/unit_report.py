@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
 from harness.measure.departures import Departure

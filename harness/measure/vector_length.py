@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 
 FEWEST_VECTORS = 10
 _STRAYS = 0.05

@@ -4,7 +4,7 @@ from functools import partial
 from itertools import pairwise
 
 from harness.compare.claims import claim_lower_error, claim_published_value
-from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.results.benchmark_statement import Reading, StatementKind
 from harness.results.expected_orders import METRIC

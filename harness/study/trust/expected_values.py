@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.core.fields import replace_fields
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import noise_preset

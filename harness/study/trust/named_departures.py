@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from harness.compare.significance import holm
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.departures import Departure, compare_with_expected
 
 

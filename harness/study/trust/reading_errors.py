@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats
-from harness.core.runs import find_runs
+from harness.core.arrays import Floats, find_runs
 from harness.experiment.observed_take import ObservedTake
 from harness.results.trust_findings import StreamHealth
 from harness.simulate.trajectory import Trajectory

@@ -8,7 +8,7 @@ import pytest
 from harness.core.humanoid24 import BONES
 from harness.errors import BadInput
 from harness.mocap import synthetic
-from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import read_skeletons
 from harness.results.findings import BarChart, LineChart
 from harness.study.papers.bone_lengths import MODES, fit_eigenmodes, leave_one_out_errors_m, normalise_by_tibia
 from harness.study.papers.eigenmodes import evaluate_bone_modes

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.compare.significance import holm
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.study.trust.named_departures import check_departures
 
 EXACT_ONE = Interval(1.0, 1.0, 1.0)
