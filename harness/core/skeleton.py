@@ -87,6 +87,27 @@ class Skeleton:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyGeom:
+    """One geom of the body, in the frame of its bone."""
+
+    bone: str
+    """Name of the bone, or "root"."""
+    name: str
+    kind: str
+    """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
+    centre_m: Floats
+    """(3,) [m]."""
+    bone_from_shape: Floats
+    """(4,) unit quaternion."""
+    size_m: Floats
+    """(3,) [m]; see `kind`."""
+    mass_kg: float
+
+    def __post_init__(self) -> None:
+        freeze(self, centre_m=(3,), bone_from_shape=(4,), size_m=(3,))
+
+
+@dataclass(frozen=True, eq=False)
 class Pose:
     """Positions and rotations of B bones in T frames, in the world."""
 

@@ -2,44 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
+from harness.core.skeleton import BodyGeom
 from harness.mocap.write.posed_motion import ExportableCell, PosedMotion
 
 _STICK_RADIUS_M = 0.03
-
-
-class Shape(Protocol):
-    """One shape in the frame of its bone, such as a `harness.body.anatomy.BodyGeom`."""
-
-    @property
-    def bone(self) -> str:
-        """Name of the bone, or "root"."""
-        ...
-
-    @property
-    def kind(self) -> str:
-        """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
-        ...
-
-    @property
-    def centre_m(self) -> Floats:
-        """(3,) [m]."""
-        ...
-
-    @property
-    def bone_from_shape(self) -> Floats:
-        """(4,) unit quaternion (w, x, y, z)."""
-        ...
-
-    @property
-    def size_m(self) -> Floats:
-        """(3,) [m]; see `kind`."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,38 +32,24 @@ class MountedStation:
 class BodyModel:
     """Surface and stations of one body."""
 
-    shapes: Sequence[Shape]
+    shapes: Sequence[BodyGeom]
     stations: Sequence[MountedStation] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Stick:
-    """A capsule from end to end of a bone."""
-
-    bone: str
-    vector_m: Floats
-    """(3,) the bone [m]."""
-    kind: str = "capsule"
-
-    @property
-    def centre_m(self) -> Floats:
-        return 0.5 * self.vector_m
-
-    @property
-    def bone_from_shape(self) -> Floats:
-        turn = np.array([np.linalg.norm(self.vector_m) + self.vector_m[2], -self.vector_m[1], self.vector_m[0], 0.0])
-        length = float(np.linalg.norm(turn))
-        return turn / length if length > 0.0 else np.array([0.0, 1.0, 0.0, 0.0])
-
-    @property
-    def size_m(self) -> Floats:
-        return np.array([_STICK_RADIUS_M, 0.5 * float(np.linalg.norm(self.vector_m)), 0.0])
-
-
 def stick_figure(cell: ExportableCell, motion: PosedMotion) -> BodyModel:
-    """A model with a thin capsule for each bone, and without stations."""
+    """A model with a thin capsule from end to end of each bone, and without stations."""
     skeleton = motion.skeleton
-    return BodyModel([Stick(name, vector) for name, vector in zip(skeleton.names, skeleton.bone_m, strict=True)])
+    return BodyModel([_stick(name, vector) for name, vector in zip(skeleton.names, skeleton.bone_m, strict=True)])
+
+
+def _stick(bone: str, vector_m: Floats) -> BodyGeom:
+    length_m = float(np.linalg.norm(vector_m))
+    turn = np.array([length_m + vector_m[2], -vector_m[1], vector_m[0], 0.0])
+    size = float(np.linalg.norm(turn))
+    bone_from_shape = turn / size if size > 0.0 else np.array([0.0, 1.0, 0.0, 0.0])
+    return BodyGeom(
+        bone, bone, "capsule", 0.5 * vector_m, bone_from_shape, np.array([_STICK_RADIUS_M, 0.5 * length_m, 0.0]), 0.0
+    )
 
 
 _SECTORS, _RINGS = 16, 6
@@ -111,7 +68,7 @@ class TriangleMesh:
     """(N, 3) indices of vertices."""
 
 
-def tessellate_shape(shape: Shape) -> TriangleMesh:
+def tessellate_shape(shape: BodyGeom) -> TriangleMesh:
     """The surface of a shape in the frame of its bone."""
     capsule = shape.kind == "capsule"
     latitude = np.linspace(0.5 * np.pi, 0.0, _RINGS)
