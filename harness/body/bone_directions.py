@@ -4,8 +4,7 @@ import numpy as np
 
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Floats
-from harness.core.hinges import are_gimbal, equivalent_euler_angles, hinge_angles
-from harness.core.skeleton import Skeleton
+from harness.core.skeleton import Skeleton, are_gimbal, equivalent_euler_angles, hinge_angles
 
 
 def match_bone_directions(source: Skeleton, qpos: Floats, target: Skeleton) -> Floats:

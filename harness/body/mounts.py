@@ -17,8 +17,8 @@ import numpy as np
 from harness.body import anatomy
 from harness.core import rotations
 from harness.core.arrays import Floats, immutable
-from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton
+from harness.core.working_folder import plain_import
 from harness.errors import BadInput
 
 with plain_import():

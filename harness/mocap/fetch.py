@@ -26,9 +26,9 @@ from harness.core.csv_text import csv_line
 from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.folder_scan import FETCHED
-from harness.mocap.index import INDEX_NAME, read_index
-from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
+from harness.mocap.index import FETCHED, INDEX_NAME, read_index
+from harness.mocap.read.amc import read_amc
+from harness.mocap.read.asf import AsfFile, read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"
 SHIPPED_RATE_HZ = 120.0

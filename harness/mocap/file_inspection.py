@@ -18,8 +18,8 @@ from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
 from harness.mocap.clip_file import CMU_NAME, find_skeleton_file, motion_format, read_library_file
 from harness.mocap.index import INDEX_NAME, rate_from_index, unknown_rate_error
-from harness.mocap.inspection import Inspection
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
+from harness.mocap.motion_checks import Inspection
 from harness.mocap.read.file_checks import check_size
 from harness.mocap.read.joint_clip import LEG_BONES
 
@@ -112,7 +112,8 @@ def inspect_clip(clip: Clip) -> Inspection:
 
 
 def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: LibraryFolders | None) -> Inspection:
-    from harness.mocap.read.acclaim import read_amc, read_asf_file
+    from harness.mocap.read.amc import read_amc
+    from harness.mocap.read.asf import read_asf_file
 
     check_size(path, "an AMC motion")
     rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_from_index(path, library)

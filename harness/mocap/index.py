@@ -1,18 +1,63 @@
-"""The index of a motion library: `manifest.csv` at the top of its folder, which says what motion files do not record.
+"""What a folder of a motion library holds: its files, and its index, which says what motion files do not record.
 
-Columns: path (relative to the folder), subject, trial, behaviour, frames, fps and note. Only path is required. Paths
-are compared in Unicode's composed form (NFC), with slashes.
+Symbolic links are followed inside the folder only. The index is `manifest.csv` at its top. Columns: path (relative to
+the folder), subject, trial, behaviour, frames, fps and note. Only path is required. Paths are compared in Unicode's
+composed form (NFC), with slashes.
 """
 
 import csv
 import io
 import unicodedata
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from harness.core.csv_text import unescape_formula
+from harness.core.files import TEMPORARY
 from harness.core.input_file import read_input_file
 from harness.errors import BadFile, BadInput
 from harness.mocap.read.file_checks import check_size
+
+FETCHED = ".fetch-"
+"""Prefix of the names of folders of `harness mocap fetch`, which hold files before they are checked."""
+
+
+@dataclass(frozen=True)
+class FolderScan:
+    """What a folder holds, at any depth."""
+
+    files: tuple[Path, ...]
+    """Files with one of the suffixes, sorted; links to files inside the folder are among them."""
+    ignored_paths: tuple[Path, ...]
+    """Links that lead outside the folder or to nothing, and folders that cannot be read, sorted."""
+
+
+def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
+    """Search a folder for files with lower-case `suffixes` such as ".amc".
+
+    A link to a folder inside is not walked again: its files are found where they lie, so loops of links are harmless.
+    """
+    top = folder.resolve()
+    files, ignored, waiting = [], [], [top]
+    while waiting:
+        parent = waiting.pop()
+        try:
+            paths = list(parent.iterdir())
+        except PermissionError:
+            ignored.append(parent)
+            continue
+        for path in paths:
+            if path.name.startswith((TEMPORARY, FETCHED)):
+                continue  # a process writes there, or was killed while it did
+            link = path.is_symlink()
+            if link and not (path.exists() and path.resolve().is_relative_to(top)):
+                ignored.append(path)
+            elif path.is_dir():
+                waiting += [] if link else [path]
+            elif path.suffix.lower() in suffixes and path.is_file():
+                files.append(path)
+    return FolderScan(tuple(sorted(files)), tuple(sorted(ignored)))
+
 
 INDEX_NAME = "manifest.csv"
 _LIMIT_BYTES = 16 * 2**20

@@ -18,8 +18,7 @@ from pathlib import Path
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput, UnknownName, shorten
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
-from harness.mocap.folder_scan import scan_folder
-from harness.mocap.index import INDEX_NAME, index_key, read_index
+from harness.mocap.index import INDEX_NAME, index_key, read_index, scan_folder
 
 LibraryFolders = Path | str | Sequence[Path | str]
 """One folder, or several."""

@@ -11,9 +11,8 @@ from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
-from harness.core.hearing import hearing_key
-from harness.core.motion import BodyMotion
-from harness.core.time_grid import count_steps
+from harness.core.motion import BodyMotion, count_steps
+from harness.core.stream_health import hearing_key
 from harness.errors import BadInput
 from harness.simulate.filter_report import apply_device_settings
 from harness.simulate.link import TrackerConfig, transmit

@@ -16,7 +16,7 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
 from harness.mocap.clip_file import find_skeleton_file
 from harness.mocap.library import MotionLibrary
-from harness.mocap.read.acclaim import read_amc_clip
+from harness.mocap.read.amc import read_amc_clip
 from tests.body.conftest import clip_on, random_qpos
 
 STANDARD = humanoid24.standard_skeleton()

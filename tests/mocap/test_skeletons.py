@@ -8,7 +8,7 @@ import pytest
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
 from harness.mocap import synthetic
-from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import read_skeletons
 from tests.mocap.sample_files import asf_text
 
 

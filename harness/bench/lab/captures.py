@@ -20,7 +20,7 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig, stretch_marks
+from harness.mocap.synthetic.takes import generate_rig, stretch_marks
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.session_bias import SessionBias
 from harness.simulate.link import TrackerConfig

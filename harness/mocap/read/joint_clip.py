@@ -2,7 +2,7 @@
 
 A joint rotates everything below it; in the rest pose every joint's frame is parallel to the world. The fit goes from
 the root outwards. Each bone gets the hinge angles that bring its world orientation closest to that of the joint that
-it is mapped to (`core.hinges`).
+it is mapped to (`core.skeleton`).
 """
 
 from collections.abc import Mapping
@@ -12,10 +12,9 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
-from harness.core.hinges import hinge_angles, hinge_rotation
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip
-from harness.core.skeleton import Skeleton, unwrap_angles
+from harness.core.skeleton import Skeleton, hinge_angles, hinge_rotation, unwrap_angles
 from harness.errors import BadInput
 
 LEG_BONES = ("lfemur", "ltibia", "rfemur", "rtibia")

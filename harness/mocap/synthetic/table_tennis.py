@@ -11,20 +11,18 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
-from harness.mocap.synthetic.curves import smooth_minimum, smooth_noise
-from harness.mocap.synthetic.foot_trajectory import plan_foot
+from harness.mocap.synthetic.curves import Gesture, Keyframes, smooth_minimum, smooth_noise, sum_gestures
 from harness.mocap.synthetic.footwork import (
     FootPlacement,
     StanceShift,
     highest_root_m,
     leg_length_m,
     plan_body_path,
+    plan_foot,
     plan_steps,
 )
-from harness.mocap.synthetic.gestures import Gesture, Keyframes, sum_gestures
 from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
-from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
 
 _FOREHAND: Mapping[str, Keyframes] = {
     "ahead": [(0.0, 0.0), (0.34, -0.30), (0.52, 0.14), (0.64, 0.16), (1.05, 0.0)],

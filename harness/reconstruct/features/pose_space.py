@@ -11,8 +11,8 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
-from harness.core.hinges import hinge_angles, hinge_rotation
 from harness.core.humanoid24 import QPOS_OF_DOF
+from harness.core.skeleton import hinge_angles, hinge_rotation
 from harness.reconstruct.features.smoothing import smooth, smooth_rotation
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.plain_import import plain_import
+from harness.core.working_folder import plain_import
 from harness.report.coverage.content import CoverageContent, PlanView, format_dilution
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.rows import label_rows

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.body.anatomy import BodyGeom, body_geoms
+from harness.body.anatomy import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
-from harness.core.skeleton import Pose, pose_from_rotations
+from harness.core.skeleton import BodyGeom, Pose, pose_from_rotations
 from harness.report.kit.style import FAINT, GRID, PAPER
 
 if TYPE_CHECKING:

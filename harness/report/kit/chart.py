@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
+from harness.core.working_folder import plain_import
 from harness.report.kit.hover_chart import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import write_text
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED
+from harness.core.number_format import NOT_MEASURED, Interval
 from harness.core.text_table import Table
 from harness.report.kit.document import chart_figure, chart_panel, document
 from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, tag

@@ -4,7 +4,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.text_table import Table
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, TerminalOnly
 

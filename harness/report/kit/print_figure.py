@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from harness.core.plain_import import plain_import
+from harness.core.working_folder import plain_import
 from harness.errors import BadInput, UnknownName
 from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 
 
 @dataclass(frozen=True)

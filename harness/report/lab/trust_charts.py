@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_fixed
+from harness.core.number_format import Interval, format_fixed
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.metric_labels import metric_label, quantity
 from harness.report.kit.rows import label_rows

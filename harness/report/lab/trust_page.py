@@ -5,8 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_p_value, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_p_value, format_share
 from harness.errors import Outcome
 from harness.report.kit.metric_labels import quantity
 from harness.report.kit.page import (

@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
 from harness.measure.profile import QualityClass, StretchLength
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.unit_report import (

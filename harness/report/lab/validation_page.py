@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_fixed, format_number, format_share
+from harness.core.number_format import Interval, format_fixed, format_number, format_share
 from harness.measure.validation_report import ValidationReport
 from harness.report.kit.metric_labels import metric_label
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section

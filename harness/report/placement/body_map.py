@@ -15,8 +15,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
-from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
+from harness.core.working_folder import plain_import
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer

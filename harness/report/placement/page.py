@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from harness.core.files import to_json_types
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.page import (
     Block,

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.units import count_clips, count_units
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_share
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,

@@ -7,8 +7,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.compare.units import Sampling, average_units
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, format_fixed
+from harness.core.number_format import NOT_MEASURED, Interval, format_fixed
 from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.table import html_table

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.units import Sampling, count_clips
-from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_share
+from harness.core.stream_health import describe_line_loss
 from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
 from harness.report.run.ranking import describe_rankings

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.core.estimate import name_with_lag
-from harness.core.hearing import poor_hearing
-from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_fixed, format_mean_sd, format_share
+from harness.core.stream_health import describe_line_loss, poor_hearing
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line, name_motion
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery

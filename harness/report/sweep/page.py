@@ -10,8 +10,7 @@ from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.ranking import find_best
 from harness.compare.units import count_clips
 from harness.core.arrays import Bools
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_number
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_number
 from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text

@@ -11,7 +11,7 @@ import numpy as np
 from harness.compare.units import BY_NAME, Sampling
 from harness.core.arrays import Ints
 from harness.core.estimate import name_with_lag
-from harness.core.training_data import training_note
+from harness.core.split import training_note
 from harness.report.sweep.data import READ_METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex

@@ -11,8 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.names import Name
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import Name, Range, check_fields
 from harness.errors import ShapeError
 from harness.simulate.physics.acquisition import (
     FIRST_TILT_VARIANCE,

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.hearing import ENOUGH_EMITTERS
+from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter_readings import FilterReadings, empty_readings
 from harness.simulate.physics.filter_state import Outputs

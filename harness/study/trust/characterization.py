@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.departures import Departure
 from harness.measure.profile import UnitProfile, measure_profile

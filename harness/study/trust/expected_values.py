@@ -6,7 +6,7 @@ from typing import Any
 
 from harness.compare.significance import holm
 from harness.core.fields import replace_fields
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.unit_file import UnitFile

@@ -14,7 +14,8 @@ from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read import file_checks
-from harness.mocap.read.acclaim import read_amc, read_amc_clip, read_asf, read_asf_file
+from harness.mocap.read.amc import read_amc, read_amc_clip
+from harness.mocap.read.asf import read_asf, read_asf_file
 from tests.mocap.sample_files import UNIT_M, amc_text, asf_text, clip
 
 ASF, AMC = asf_text(standard_skeleton()), amc_text(clip(4))

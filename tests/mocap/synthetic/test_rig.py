@@ -6,7 +6,7 @@ import pytest
 from harness.core import rotations
 from harness.errors import UnknownName
 from harness.mocap.sources import open_motion_source
-from harness.mocap.synthetic.rig import RIG_TAKES, RigTake, generate_rig, stretch_marks
+from harness.mocap.synthetic.takes import RIG_TAKES, RigTake, generate_rig, stretch_marks
 
 SHORT = "rig_p1_01"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import Outcome
 from harness.report.kit.markup import Markup
 from harness.report.kit.page import (

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.timing import TIMING_KEYS
 from harness.measure.unit_report import STATION_FIGURES

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import MARKS
 from harness.report.paper.page import KINDS, count_verdicts, run_link, sentence, write_paper_page

@@ -9,7 +9,7 @@ import pytest
 
 import harness
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import WIDTH
 from harness.report.paper.page import claims_table, paper_text, statements_table, statements_text

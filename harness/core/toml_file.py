@@ -1,17 +1,30 @@
-"""TOML files whose first line is a SHA-256 digest of all other lines, which shows a lost line, a cut and an edit.
+"""Text of TOML files, and files whose first line is a SHA-256 digest of all other lines.
 
-Since schema 2 the digest is required, so that a file which lost its first line is noticed too. Who edits a file says so
-there: sha256 = "edited". Files of schema 1 have no digest; their readers look for what such a file always has.
+The digest shows a lost line, a cut and an edit. Since schema 2 it is required, so that a file which lost its first line
+is noticed too. Who edits a file says so there: sha256 = "edited". Files of schema 1 have no digest; their readers look
+for what such a file always has.
 """
 
 import hashlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import tomli_w
 
 from harness.core.files import MAX_TOML_BYTES, parse_toml
 from harness.core.input_file import read_input_file
 from harness.errors import BadFile
+
+_ARRAY = re.compile(r"\[\n +([^\[\]]*),\n *\]")
+"""An array without arrays in it, as tomli-w writes it: one line for each value. Strings have no line breaks."""
+
+
+def format_toml(content: Mapping[str, Any]) -> str:
+    """The text of tables, with arrays on one line; TypeError for values that TOML does not have."""
+    return _ARRAY.sub(lambda found: "[" + re.sub(r",\n +", ", ", found[1]) + "]", tomli_w.dumps(content))
+
 
 SCHEMA = 2
 EARLIER_SCHEMA = 1

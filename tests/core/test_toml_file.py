@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.core.toml_digest import insert_toml_digest, read_digested_toml
+from harness.core.toml_file import insert_toml_digest, read_digested_toml
 from harness.errors import BadFile
 from tests.core.digested_toml import as_earlier_version, declare_edited
 

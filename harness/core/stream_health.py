@@ -1,4 +1,4 @@
-"""Records that the line between tracker and host drops: in the health of a stream and in a sentence."""
+"""The health of a stream in a sentence: records that the line dropped, and stations that hear few emitters."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -58,3 +58,25 @@ def _counts(health: Mapping[str, Any]) -> tuple[float, float]:
     """The numbers of dropped records and of all records."""
     dropped, sent = (float(health.get(name) or 0.0) for name in ("records_dropped", "records_sent"))
     return dropped, dropped + sent
+
+
+ENOUGH_EMITTERS = 3
+"""Number of emitters that a position needs."""
+LEAST_SHARE = 0.5
+"""Share of the time below which a station is reported [choice]."""
+_ENDING = f" hears {ENOUGH_EMITTERS} emitters"
+
+
+def hearing_key(station: str) -> str:
+    """Key in the stream's health of the share of time in which a station hears enough emitters."""
+    return station + _ENDING
+
+
+def poor_hearing(health: Mapping[str, float]) -> str:
+    """A sentence on the stations that hear enough emitters for less than half of the time; "" if there are none."""
+    shares = {key.removesuffix(_ENDING): share for key, share in health.items() if key.endswith(_ENDING)}
+    poor = [f"{station} for {100.0 * share:.0f} %" for station, share in shares.items() if share < LEAST_SHARE]
+    if not poor:
+        return ""
+    first = poor[0].replace(" for ", " hears three emitters for ", 1)
+    return ", ".join([f"{first} of the time", *poor[1:]])

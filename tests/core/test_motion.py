@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.core.motion import Clip
-from harness.core.time_grid import MOST_STEPS, count_steps, require_rate, require_seconds
+from harness.core.motion import MOST_STEPS, Clip, count_steps, require_rate, require_seconds
 from harness.errors import BadInput
 from tests.mocap.sample_files import clip
 

@@ -1,6 +1,6 @@
 """Stations that hear too few emitters, in a sentence."""
 
-from harness.core.hearing import hearing_key, poor_hearing
+from harness.core.stream_health import hearing_key, poor_hearing
 
 
 def test_stations_below_half_of_the_time_are_named() -> None:
