@@ -14,9 +14,9 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
-from harness.simulate.filter_report import filter_samples
 from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
+from harness.simulate.physical_readings import filter_samples
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings

@@ -15,12 +15,11 @@ from harness.core.hearing import hearing_key
 from harness.core.motion import BodyMotion
 from harness.core.time_grid import count_steps
 from harness.errors import BadInput
-from harness.simulate.filter_report import apply_device_settings
+from harness.simulate.components.soft_tissue import skin_below, tissue_force_m_s2
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
-from harness.simulate.physical_readings import simulate_physical_readings
+from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
-from harness.simulate.skin import skin_below, tissue_force_m_s2
 from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import position_range_m

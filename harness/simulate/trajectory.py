@@ -28,6 +28,7 @@ from harness.simulate.resting_ends import (
 OVERLAP_S = 0.05
 """Time for which a take goes on into its next round [s]: longer than what a device does at once."""
 _RETURN_HZ, _LAST_REST_S = 120.0, 0.5
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,6 +253,3 @@ def _cross(a: Floats, b: Floats) -> Floats:
     """Cross products (N, 3); `np.cross` is slow on short rows."""
     out: Floats = a[:, _NEXT] * b[:, _AFTER] - a[:, _AFTER] * b[:, _NEXT]
     return out
-
-
-_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])

@@ -3,8 +3,7 @@
 import numpy as np
 
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import DriftNoise, WhiteNoise
 from harness.simulate.noise import Noise
 from harness.simulate.readings import SimulatedReadings
 

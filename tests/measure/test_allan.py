@@ -8,7 +8,7 @@ import pytest
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.allan import AllanDeviation, equivalent_freedom, expected_allan, measure_allan, pool_allan
-from harness.simulate.components.drift_noise import gauss_markov
+from harness.simulate.components.stationary import gauss_markov
 
 
 def noise(seed: int, count: int, axes: int, white: float, drift: float, correlation_s: float) -> np.ndarray:

@@ -5,7 +5,7 @@ import pytest
 
 from harness.measure.excursions import ExcursionDetector, ExcursionEvent, ExcursionNoise, Innovations
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.excursion import Excursion
+from harness.simulate.components.transient import Excursion
 from tests.measure.resting import RATE_HZ, default_noise, rest_series
 from tests.measure.static_readings import simulate_static
 

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.measure.robust_slope import robust_slope
-from harness.simulate.components.drift_noise import gauss_markov
+from harness.simulate.components.stationary import gauss_markov
 
 
 def test_a_line_has_its_slope_and_no_width() -> None:

@@ -10,7 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.interval import Interval
 from harness.core.seeds import generator
 from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share
-from harness.simulate.components.clock import Clock
+from harness.simulate.components.stationary import Clock
 from harness.simulate.noise import Noise, noise_preset
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings

@@ -14,7 +14,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotate, rotation_vector
 from harness.simulate.physics.error_state import MOTION_ERRORS
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
+from harness.simulate.physics.filter_state import RangingModel, range_variance
 from harness.simulate.physics.strapdown import STATE, attitude, set_attitude
 from harness.simulate.readings import GRAVITY_M_S2
 

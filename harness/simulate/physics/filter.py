@@ -16,7 +16,6 @@ from harness.simulate.physics.acquisition import (
     fix,
     level_attitude,
 )
-from harness.simulate.physics.enhancement import MODES, add_to_offset
 from harness.simulate.physics.error_state import (
     ERRORS,
     MOTION_ERRORS,
@@ -29,13 +28,11 @@ from harness.simulate.physics.error_state import (
     reset_attitude,
     update,
 )
-from harness.simulate.physics.filter_record import write_record
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
+from harness.simulate.physics.filter_record import MODES, add_to_offset, write_record
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, RangingModel, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CONFIRMING, LOST
 from harness.simulate.physics.strapdown import attitude, integrate, set_attitude
-from harness.simulate.physics.tracking_state import finish_slot
+from harness.simulate.physics.tracking_state import CONFIRMING, LOST, finish_slot
 from harness.simulate.readings import GRAVITY_M_S2
 
 _CLIPPED_SHARE = 0.3

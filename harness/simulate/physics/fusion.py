@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.names import Name
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import CheckedFields, Range
 from harness.errors import ShapeError
 from harness.simulate.physics.acquisition import (
     FIRST_TILT_VARIANCE,
@@ -21,12 +21,11 @@ from harness.simulate.physics.acquisition import (
     LONGEST_WINDOW_SLOTS,
     Search,
 )
-from harness.simulate.physics.enhancement import MODES
 from harness.simulate.physics.error_state import ERRORS
 from harness.simulate.physics.filter import advance
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
+from harness.simulate.physics.filter_record import MODES
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, RangingModel
 from harness.simulate.physics.inertial import Inertial, InertialErrors
-from harness.simulate.physics.ranging_model import RangingModel
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
 from harness.simulate.physics.strapdown import STATE
@@ -34,7 +33,7 @@ from harness.simulate.physics.tracking_state import CONFIRMING_SLOTS, freeze, se
 
 
 @dataclass(frozen=True)
-class Fusion:
+class Fusion(CheckedFields):
     """What the device's filter assumes, when it gives a station up, and the settings of each station."""
 
     gate: Annotated[float, Range(0.5, 100.0)] = 4.0
@@ -63,9 +62,6 @@ class Fusion:
     """Station -> prediction (`Mp`) [ms]; 0 for the others (docs/is900.md 4.2)."""
     enhancement: dict[Name, Annotated[int, Range(0, 2)]] = field(default_factory=dict)
     """Station -> perceptual enhancement (`MF`); 0 for the others (docs/is900.md 4.2)."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 class FusionFilter:

@@ -14,16 +14,23 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.simulate.physics.bursts import Bursts
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.echoes import mirror_images, reflection_point
-from harness.simulate.physics.flight import time_of_flight_s
-from harness.simulate.physics.level import level_db, noise_factor, threshold_db
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
+from harness.simulate.physics.sound import (
+    MICROPHONES,
+    Bursts,
+    Sound,
+    level_db,
+    mirror_images,
+    noise_factor,
+    reflection_point,
+    speed_of_sound_m_s,
+    threshold_db,
+    time_of_flight_s,
+)
 
 _EARLY_SHARE = 0.5
 """Share of the microphones that a burst triggers early; the others hear nothing [choice]."""

@@ -7,21 +7,18 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import CheckedFields, Range, check_fields
 from harness.errors import BadInput
 
 
 @dataclass(frozen=True)
-class Box:
+class Box(CheckedFields):
     """A piece of furniture: a box whose sides are parallel to the walls."""
 
     centre_m: Annotated[tuple[float, float, float], Range(-100.0, 100.0)]
     """Centre: x and y from the middle of the room, z from the floor [m]."""
     size_m: Annotated[tuple[float, float, float], Range(0.01, 100.0)]
     """Length along x, y and z [m]."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,21 @@
 
 import numpy as np
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
 from harness.simulate.physics.acquisition import (
     LOST_TILT_VARIANCE,
     Search,
     begin_search,
 )
-from harness.simulate.physics.enhancement import decay
 from harness.simulate.physics.error_state import (
     MOTION_ERRORS,
     attitude_sigma_rad,
     position_sigma_m,
 )
+from harness.simulate.physics.filter_record import decay
 from harness.simulate.physics.filter_state import FilterModel, FilterState
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CYCLE_SLOTS, DOUBTED, LOST, TRACKING, quality, sum_last
 
 CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
 """Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
@@ -33,6 +32,13 @@ _DOUBTED_SIGMA_M = 0.15
 """Standard deviation of the position at which a doubted station needs a new fix [choice]."""
 _COAST_SIGMA_M = 0.5
 """Standard deviation of the position at which a lost station stops coasting [choice]."""
+LOST, CONFIRMING, TRACKING, DOUBTED = 0, 1, 2, 3
+"""Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one; with one whose position
+has become too uncertain. Records show quality 0 for all but the third."""
+CYCLE_SLOTS = 6
+"""Slots whose ranges `MP` counts: at most twelve ranges of two microphones (docs/is900.md 7)."""
+LEAST_QUALITY = 1.0 / 255.0
+"""Quality of a station that tracks: the least that a record tells from lost (docs/is900.md 7)."""
 
 
 @compiled
@@ -133,3 +139,25 @@ def freeze(state: FilterState, s: int) -> None:
     for i in range(3):
         covariance[i, i] = _COAST_SIGMA_M**2
         covariance[6 + i, 6 + i] = LOST_TILT_VARIANCE
+
+
+@compiled
+def sum_last(counts: Ints, slot: int, slots: int) -> int:
+    """Sum of the counts of the last slots, up to `slot`, in a ring (N,) with one entry per slot."""
+    total = 0
+    for k in range(slots):
+        total += counts[(slot - k) % len(counts)]
+    return total
+
+
+@compiled
+def quality(state: int, sigma_m: float, received: int, rejected: int, best_sigma_m: float) -> float:
+    """Quality in 0..1 [choice]: `best_sigma_m` over the position's standard deviation [m], at most 1.
+
+    The share of accepted ranges scales it by 0.5 to 1. A station without a confirmed fix has 0.
+    """
+    if state != TRACKING:
+        return 0.0
+    share = (received - rejected) / received if received > 0 else 0.0
+    precision = min(1.0, best_sigma_m / sigma_m) if sigma_m > 0.0 else 1.0
+    return max(LEAST_QUALITY, precision * (0.5 + 0.5 * share))

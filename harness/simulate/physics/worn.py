@@ -1,4 +1,4 @@
-"""What is worn moves the tracker itself: soft tissue, mount errors and slips, with consistent velocities.
+"""True motion of the stations that a performer wears, and what is worn: soft tissue, mount errors and slips.
 
 The components are those of the statistical noise, with the same draws. Here they act at every tick of the inertial
 sensors, and velocity and turn rate are the derivatives of position and orientation. So a slip needs a duration.
@@ -11,14 +11,22 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.mount import MountSlip
-from harness.simulate.components.soft_tissue import SoftTissueArtefact, free_response, natural_frequency_rad_s
+from harness.simulate.components.soft_tissue import (
+    Skin,
+    SoftTissueArtefact,
+    free_response,
+    natural_frequency_rad_s,
+    tissue_force_m_s2,
+)
 from harness.simulate.noise import Noise
 from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.skin import Skin
+from harness.simulate.physics.station_kinematics import station_chain, station_states
+from harness.simulate.trajectory import Trajectory
 
 
 class Worn:
@@ -186,3 +194,31 @@ def _roll(motion: TrackerMotion, row: int | slice, angle_rad: Floats, rate_rad_s
     axis, turn = np.array([1.0, 0.0, 0.0]), motion.tracker_from_station[:, row]
     motion.turn_rad_s[:, row] += rotations.rotate(turn, rate_rad_s[..., None] * axis)
     motion.tracker_from_station[:, row] = rotations.multiply(turn, rotations.exp(angle_rad[..., None] * axis))
+
+
+class BodyMotionSource:
+    """A `TrackerMotionSource`: the stations of a calibration on a trajectory, with what `worn` does to them."""
+
+    def __init__(self, trajectory: Trajectory, calibration: Calibration, worn: Worn) -> None:
+        self.stations = calibration.stations
+        self._trajectory, self._calibration, self._worn = trajectory, calibration, worn
+        self._chain = station_chain(trajectory.body.skeleton, calibration)
+        self._pieces: Floats = np.ascontiguousarray(trajectory.spline.c)
+        self._knots_s: Floats = np.ascontiguousarray(trajectory.spline.x)
+
+    def advance(self, time_s: Floats) -> TrackerMotion:
+        """Motion at the ticks (T+1,) of the next block [s]; BadInput outside the trajectory."""
+        self._trajectory.require_inside(time_s)
+        true = station_states(self._chain, self._pieces, self._knots_s, time_s)
+        motion = TrackerMotion(time_s, true.position_m, true.tracker_from_station, true.velocity_m_s, true.turn_rad_s)
+        force_m_s2 = None
+        if self._worn.on_tissue:
+            force_m_s2 = tissue_force_m_s2(
+                true.tracker_from_station, true.acceleration_m_s2, self._calibration, self._chain.tracker_from_world
+            )
+        self._worn.apply(motion, force_m_s2)
+        return motion
+
+    def qpos(self, time_s: Floats) -> Floats:
+        """(F, 55) configurations at F times [s]."""
+        return self._trajectory.qpos(time_s)

@@ -11,16 +11,13 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.soft_tissue import SoftTissueArtefact
-from harness.simulate.components.strap_slip import StrapSlip
+from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
+from harness.simulate.components.soft_tissue import SoftTissueArtefact, skin_below
 from harness.simulate.noise import Noise
-from harness.simulate.physics.body_motion import BodyMotionSource
 from harness.simulate.physics.inertial import Inertial, InertialUnit, true_increments
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource
-from harness.simulate.physics.worn import Worn
+from harness.simulate.physics.worn import BodyMotionSource, Worn
 from harness.simulate.simulation import TrackerConfig, exact_calibration
-from harness.simulate.skin import skin_below
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import SIX, worn
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.simulate.physics.bursts import Bursts
+from harness.simulate.physics.sound import Bursts
 
 
 def test_number_and_duration_are_those_of_the_settings() -> None:

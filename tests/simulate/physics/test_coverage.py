@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
-from harness.simulate.physics.coverage import PLAN_POINTS, dilution_of_precision, grid_m, place_coverage, plan_axes_m
+from harness.simulate.physics.coverage import PLAN_POINTS, dilution_of_precision, emitter_coverage, grid_m, plan_axes_m
 from harness.stream.codec.replies import Emitter
 
 
@@ -40,32 +40,32 @@ def test_dilution_of_known_arrangements() -> None:
 
 def test_places_are_heard_in_range_and_cone() -> None:
     places_m = np.array([[0.0, 0.0, 1.5], [0.0, 0.0, 4.0], [0.0, 0.0, 4.1], [0.0, 0.0, -0.5], [0.0, 0.0, 0.3]])
-    found = place_coverage(cave(), places_m)
+    found = emitter_coverage(cave(), places_m)
     assert found.heard.tolist() == [9, 1, 0, 0, 3]
     assert (found.share, found.fixed_share) == pytest.approx((0.4, 0.2))
     assert found.median_heard == 1.0
     assert np.isfinite(found.dilution[0])
     assert np.isnan(found.dilution[1:]).all(), "three emitters of one bar and the place lie in a plane"
     assert found.median_dilution == pytest.approx(found.dilution[0])
-    assert np.isnan(place_coverage(cave(), places_m[1:]).median_dilution)
+    assert np.isnan(emitter_coverage(cave(), places_m[1:]).median_dilution)
 
 
 def test_a_place_at_an_emitter_is_no_error() -> None:
-    assert place_coverage(cave(), np.zeros((1, 3))).heard.tolist() == [0]
+    assert emitter_coverage(cave(), np.zeros((1, 3))).heard.tolist() == [0]
 
 
 def test_a_narrower_cone_and_a_shorter_range_are_heard_less() -> None:
     grid = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, 7)] * 2, np.linspace(0.5, 2.5, 5)), axis=-1).reshape(-1, 3)
-    whole = place_coverage(cave(), grid).heard
+    whole = emitter_coverage(cave(), grid).heard
     for less in (cave(cone_deg=40.0), cave(range_m=2.5)):
-        heard = place_coverage(less, grid).heard
+        heard = emitter_coverage(less, grid).heard
         assert np.all(heard <= whole)
         assert heard.sum() < whole.sum()
 
 
 def test_an_emitter_that_faces_away_is_not_heard() -> None:
     up = [Emitter(n, (0.1 * n, 0.02 * n * n, 0.0), (0.0, 0.0, -1.0), n) for n in (1, 2, 3)]
-    assert place_coverage(Constellation.of_emitters(up, 1.2, 4.0), np.array([[0.0, 0.0, 1.0]])).heard.tolist() == [0]
+    assert emitter_coverage(Constellation.of_emitters(up, 1.2, 4.0), np.array([[0.0, 0.0, 1.0]])).heard.tolist() == [0]
 
 
 def test_a_plan_view_shows_the_emitters_and_two_metres_around() -> None:

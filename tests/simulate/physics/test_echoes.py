@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from harness.core.seeds import generator
-from harness.simulate.physics.echoes import mirror_images, reflection_point
 from harness.simulate.physics.room import Room
+from harness.simulate.physics.sound import mirror_images, reflection_point
 from tests.simulate.physics.rooms import placed
 
 planes = placed(Room(size_m=(6.0, 5.0))).planes()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.simulate.physics.enhancement import add_to_offset, decay
+from harness.simulate.physics.filter_record import add_to_offset, decay
 
 
 def test_an_offset_undoes_a_correction(rng: np.random.Generator) -> None:

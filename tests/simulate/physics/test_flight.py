@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.simulate.physics.flight import time_of_flight_s
+from harness.simulate.physics.sound import time_of_flight_s
 
 TICK_S, SPEED = 1.0 / 400.0, 343.0
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.simulate.physics.level import NOISE_AT_M, level_db, noise_factor, threshold_db
+from harness.simulate.physics.sound import NOISE_AT_M, level_db, noise_factor, threshold_db
 
 ABSORPTION = 1.3
 distances = st.floats(0.05, 10.0)

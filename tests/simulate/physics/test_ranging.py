@@ -10,13 +10,12 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.level import level_db, noise_factor
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.ranging import Ranges, Ranging
 from harness.simulate.physics.room import Box, Room
 from harness.simulate.physics.schedule import Schedule
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
+from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
 from tests.simulate.physics.rooms import (
     DOWN,
     TICK_HZ,

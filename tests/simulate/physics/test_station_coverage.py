@@ -12,9 +12,9 @@ from harness.experiment.scenario import Station, read_station_sets
 from harness.mocap import synthetic
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
+from harness.simulate.physics.coverage import MOST_SAMPLES, StationCoverage, heard_emitters, station_coverage
 from harness.simulate.physics.room import Box, Room
 from harness.simulate.physics.sound import Sound
-from harness.simulate.physics.station_coverage import MOST_SAMPLES, StationCoverage, heard_emitters, station_coverage
 from harness.simulate.simulation import exact_calibration
 
 CAVE = load_constellation(ConstellationSettings(name="cave"))

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from harness.simulate.physics.status import CONFIRMING, DOUBTED, LEAST_QUALITY, LOST, TRACKING, quality, sum_last
+from harness.simulate.physics.tracking_state import (
+    CONFIRMING,
+    DOUBTED,
+    LEAST_QUALITY,
+    LOST,
+    TRACKING,
+    quality,
+    sum_last,
+)
 
 
 @pytest.mark.parametrize("state", [LOST, CONFIRMING, DOUBTED])

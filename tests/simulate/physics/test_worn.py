@@ -10,14 +10,12 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
-from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.soft_tissue import SoftTissueArtefact, simulate_oscillators, soft_limit
-from harness.simulate.components.strap_slip import StrapSlip
+from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
+from harness.simulate.components.soft_tissue import Skin, SoftTissueArtefact, simulate_oscillators, soft_limit
 from harness.simulate.noise import Noise
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.worn import Worn, minimum_jerk_share
 from harness.simulate.simulation import TrackerConfig, exact_calibration, sampling_times_s, simulate_readings
-from harness.simulate.skin import Skin
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import SIX, worn
 from tests.simulate.physics.test_body_motion import EVERYTHING, TISSUE, central_differences, source_of, ticks_s
