@@ -18,7 +18,7 @@ from harness.core.options import parse_name, split_outside_brackets
 from harness.core.working_folder import name_module
 from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
-from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, weighted_blend
+from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, local_regression
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
@@ -48,8 +48,8 @@ _BUILT_IN: dict[str, Callable[[], Method]] = {
     "dynamic_map:window": lambda: dynamic_map.WINDOW,
     "dynamic_map:literal": lambda: dynamic_map.LITERAL,
     "expert_map": expert_map.ExpertMap,
-    "weighted_blend": weighted_blend.WeightedBlend,
-    "weighted_blend:literal": lambda: weighted_blend.LITERAL,
+    "weighted_blend": local_regression.WeightedBlend,
+    "weighted_blend:literal": lambda: local_regression.LITERAL,
     "kernel_cca": kernel_cca.KernelCca,
     "kernel_cca:literal": lambda: kernel_cca.LITERAL,
 }

@@ -2,7 +2,7 @@
 
 The anchor's own orientation gives the heading. Where it was not measured, the root of the last estimate is fitted to
 the readings and the missing values are taken from it. Their confidence is 0, so they only propose candidates in the
-search (`index.partial_search`).
+search (`index.exact`).
 """
 
 import math
@@ -14,10 +14,10 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.features.example_features import ExampleFeatures, Query
-from harness.reconstruct.solver.anchor_frame import AnchorFrame
-from harness.reconstruct.solver.device_time import DeviceTime
+from harness.reconstruct.solver.ground_frame import AnchorFrame
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
+from harness.reconstruct.solver.status_monitor import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 LONGEST_GAP_S = 0.2

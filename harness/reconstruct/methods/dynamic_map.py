@@ -35,10 +35,8 @@ from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
-from harness.reconstruct.features.ground_step import ground_after_step
-from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
 from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.features.predictor_query import FeatureSearch, NeighbourSearch, PoseHistorySearch
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.index import Index, make_index
 from harness.reconstruct.methods.ik import Ik
@@ -48,6 +46,7 @@ from harness.reconstruct.solver.ground_frame import (
     HINGES,
     POSTURE_SIZE,
     TILT,
+    ground_after_step,
     ground_from_qpos,
     posture_from_qpos,
     qpos_from_posture,
@@ -64,6 +63,7 @@ from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.subspace import SubspaceSolver, gaussian_space
 from harness.reconstruct.solver.subspace_minimiser import Subspace
+from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _MIN_WEIGHT_VARIANCE = 1e-6

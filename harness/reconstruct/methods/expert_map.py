@@ -29,13 +29,11 @@ from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.contract import Session
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad, toe_height_m
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
-from harness.reconstruct.features.toe_height import toe_height_m
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.fixed_lag import FixedLagSession
 from harness.reconstruct.solver.floor_contact import FloorContact
@@ -50,12 +48,12 @@ from harness.reconstruct.solver.ground_frame import (
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
-from harness.reconstruct.solver.loss_scale import LossScale
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
-from harness.reconstruct.solver.self_calibration import SelfCalibration, posterior
+from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace
+from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 POSES = 3

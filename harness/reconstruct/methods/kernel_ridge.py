@@ -28,16 +28,14 @@ from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
-from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.anchor_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of
-from harness.reconstruct.solver.device_time import DeviceTime
-from harness.reconstruct.solver.ground_frame import ground_from_qpos
+from harness.reconstruct.solver.ground_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of, ground_from_qpos
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
+from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _JUMP_M = 0.3

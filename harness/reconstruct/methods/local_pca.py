@@ -32,13 +32,11 @@ from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
-from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.posture_statistics import mean_posture
-from harness.reconstruct.features.station_features import StationFeatures
+from harness.reconstruct.features.virtual_trackers import StationFeatures
 from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
 from harness.reconstruct.methods.ik import Ik
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, ground_after_step
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import (
     POSTURE_PRIOR_SIGMA_RAD,
@@ -49,6 +47,7 @@ from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, mu
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
+from harness.reconstruct.training import CalibrationCache
 
 _MIN_WIDENING_RAD = math.radians(1.0)
 """Smallest standard deviation for which the answer is solved again outside the subspace [rad]."""

@@ -13,6 +13,10 @@ Ours: features relative to an anchor station instead of the room, weights by the
 and whole-body inverse kinematics with a prior about the regressed pose (`solve` "limbs" is closed-form limb IK).
 
 The options are the fields of `LocalRegression`; each method adds its own.
+
+Weighted blend (`weighted_blend`, docs/papers.md C3) weighs neighbours by a power of their distance in feature space. It
+is the baseline of Kim et al. 2012, which prints no weights; the power is ours. scenarios/tune_weighted_blend.toml chose
+`neighbours` 16 and `power` 4.
 """
 
 import math
@@ -26,27 +30,26 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S, QueryFeatures
-from harness.reconstruct.solver.device_time import DeviceTime
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture, step_ground
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.limb_solver import LimbSolver
 from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
+from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
@@ -222,3 +225,43 @@ class LocalRegressionSession:
         if self._options.final_ik:
             return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
         return place_root(self._residuals, qpos)
+
+
+@dataclass(frozen=True)
+class WeightedBlend(LocalRegression):
+    """Options of the weighted blend, a `Method`."""
+
+    name: str = "weighted_blend"
+    summary: str = "nearest examples weighted by inverse distance, smoothed, then fitted to the trackers"
+    neighbours: Annotated[int, Range(1, 1_000_000)] = 16
+    """k of eq. 2: neighbours of a frame; those of the frame before are added."""
+    power: Annotated[float, Range(0.0, 100.0)] = 4.0
+    """Exponent of the weights, distance^-power."""
+
+    def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
+        return _inverse_distance_weights(inputs, query, self.power)
+
+
+LITERAL = WeightedBlend(
+    "weighted_blend:literal",
+    "the baseline of Kim et al. 2012: 8 neighbours by inverse distance, with the steps of kernel_cca:literal",
+    neighbours=8,
+    index="kd_tree",
+    jump_m=math.inf,
+    outputs="quaternions",
+    power=1.0,
+)
+"""The paper names the baseline and prints no weights; inverse distance is the plainest choice: docs/methods.md."""
+
+
+@compiled
+def _inverse_distance_weights(inputs: Floats, query: Floats, power: float) -> Floats:
+    """(m,) weights distance^-power of inputs (m, n) for a query (n,), of sum 1."""
+    out: Floats = np.empty(len(inputs))
+    for i in range(len(inputs)):
+        squared = 0.0
+        for k in range(len(query)):
+            squared += (inputs[i, k] - query[k]) ** 2
+        out[i] = max(squared, 1e-12) ** (-0.5 * power)
+    out /= out.sum()
+    return out

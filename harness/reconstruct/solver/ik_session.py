@@ -15,13 +15,12 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin, Status
-from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
-from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
 from harness.stream.frame import TrackerFrame
 

@@ -15,6 +15,18 @@ from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicT
 from harness.reconstruct.solver.matrix_algebra import dot
 from harness.reconstruct.solver.normal_equations import StationTargets, add_curvature, evaluate, normal_rows
 
+_INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
+_MAX_CONVERGED_DAMPING = 30.0
+"""Convergence is tested below this damping only: as a prior it is 10 deg about the present pose [1/rad^2]."""
+_GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
+"""Ratios of actual to predicted decrease: above the first Gauss-Newton suffices, above the second the damping falls."""
+_MAX_STEP_RAD = 1.0
+"""Larger rotations are scaled down to this."""
+_MAX_FINAL_STEP = 1e-2
+"""A converged step is still taken when no component is larger [m, rad]."""
+_MIN_DECREASE = 1e-12
+"""A predicted decrease of the cost, a log likelihood, that is only rounding."""
+
 
 class QuadraticModel(NamedTuple):
     """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and arrays to minimise it."""
@@ -92,19 +104,6 @@ def new_quadratic_model(tree: KinematicTree) -> QuadraticModel:
         change=change,
         hessian_change=hessian_change,
     )
-
-
-_INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
-_MAX_CONVERGED_DAMPING = 30.0
-"""Convergence is tested below this damping only: as a prior it is 10 deg about the present pose [1/rad^2]."""
-_GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
-"""Ratios of actual to predicted decrease: above the first Gauss-Newton suffices, above the second the damping falls."""
-_MAX_STEP_RAD = 1.0
-"""Larger rotations are scaled down to this."""
-_MAX_FINAL_STEP = 1e-2
-"""A converged step is still taken when no component is larger [m, rad]."""
-_MIN_DECREASE = 1e-12
-"""A predicted decrease of the cost, a log likelihood, that is only rounding."""
 
 
 @compiled

@@ -13,7 +13,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
-from harness.reconstruct.solver.anchor_frame import anchor_of, on_trunk
+from harness.reconstruct.solver.ground_frame import anchor_of, on_trunk
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.limb_ik import END, LOWER, TWIST, UPPER, Limb, LimbBase, LimbTarget, solve_limb
 from harness.reconstruct.solver.residuals import Residuals

@@ -17,8 +17,8 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled, specialise
-from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.residuals import Residuals
+from harness.reconstruct.solver.status_monitor import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25

@@ -5,9 +5,9 @@ import pytest
 
 from harness.body.kinematics import Kinematics
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.ground_step import ground_after_step
-from harness.reconstruct.features.station_features import StationFeatures
+from harness.reconstruct.features.virtual_trackers import StationFeatures
 from harness.reconstruct.solver.ground_frame import (
+    ground_after_step,
     ground_from_qpos,
     posture_from_qpos,
     qpos_from_posture,

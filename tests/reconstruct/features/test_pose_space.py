@@ -8,8 +8,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.skeleton import world_rotations
-from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions
-from harness.reconstruct.features.smoothing import smoothing_weights
+from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, smoothing_weights
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 

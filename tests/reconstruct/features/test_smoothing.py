@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.reconstruct.features.smoothing import slerp, smooth_rotation, smoothing_weights
+from harness.reconstruct.features.pose_space import slerp, smooth_rotation, smoothing_weights
 
 ALPHA, BETA = 0.3, 0.4
 

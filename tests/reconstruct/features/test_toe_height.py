@@ -7,7 +7,7 @@ import pytest
 
 from harness.body.kinematics import pose_from_qpos
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.toe_height import toe_height_m
+from harness.reconstruct.features.posture_statistics import toe_height_m
 from tests.reconstruct.conftest import Scene
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
-from harness.reconstruct.index.clustering import cluster_vectors, find_centroids, nearest_centroids
+from harness.reconstruct.index.decomposition import cluster_vectors, find_centroids, nearest_centroids
 
 
 def blobs(count: int = 600, size: int = 5) -> tuple[Singles, Ints]:

@@ -11,13 +11,11 @@ from harness.core.humanoid24 import BONES, unpack
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca
-from harness.reconstruct.methods.local_regression import LocalRegression
-from harness.reconstruct.methods.weighted_blend import WeightedBlend
+from harness.reconstruct.methods.local_regression import LocalRegression, WeightedBlend
 from harness.reconstruct.solver import ground_frame
-from harness.reconstruct.solver.anchor_frame import anchor_of
+from harness.reconstruct.solver.ground_frame import anchor_of, step_ground
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.solver.anchor_frame import HeadingEstimator
+from harness.reconstruct.solver.ground_frame import HeadingEstimator
 
 EVERY: Bools = np.ones(4, bool)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.reconstruct.solver.dense_factor import factorise, new_rows, solve_factorised
+from harness.reconstruct.solver.matrix_algebra import factorise, new_rows, solve_factorised
 
 
 def padded(matrix: Floats) -> Floats:

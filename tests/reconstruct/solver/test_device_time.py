@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.reconstruct.solver.device_time import DeviceTime
+from harness.reconstruct.solver.status_monitor import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 PERIOD_S, SLOT_S = 0.025, 0.0033

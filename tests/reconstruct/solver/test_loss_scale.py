@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.reconstruct.solver import loss_scale
+from harness.reconstruct.solver import self_calibration
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import Stopping
-from harness.reconstruct.solver.loss_scale import LossScale, median_distance
 from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.self_calibration import LossScale, median_distance
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from tests.reconstruct.conftest import Scene
@@ -21,7 +21,7 @@ from tests.reconstruct.conftest import Scene
 def planted_constants(monkeypatch: pytest.MonkeyPatch) -> None:
     """Constants for these tests, whatever validation clips choose."""
     for name, value in {"_MULTIPLE": 6.0, "_MIN_SCALE_M": 0.005, "_MEAN_S": 0.5}.items():
-        monkeypatch.setattr(loss_scale, name, value)
+        monkeypatch.setattr(self_calibration, name, value)
 
 
 def residuals_at(scene: Scene, offset_m: Floats) -> Residuals:
