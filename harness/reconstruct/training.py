@@ -1,15 +1,28 @@
-"""Cache of what a method computes for a calibration, such as the features of its examples, which takes seconds."""
+"""What trained methods keep: how a session starts, and what was computed for a calibration."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from harness.core.calibration import Calibration
+from harness.reconstruct.contract import Session
 
 T = TypeVar("T")
+S = TypeVar("S", bound=Session, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted(Generic[S]):
+    """A `Reconstructor` that knows no more than what its sessions start with."""
+
+    begin: Callable[[Calibration], S]
 
 
 class CalibrationCache(Generic[T]):
-    """Holds a value for the last calibration, so that sessions of one performer share it."""
+    """Cache of what takes seconds, such as the features of the examples.
+
+    It holds a value for the last calibration, so that sessions of one performer share it.
+    """
 
     def __init__(self) -> None:
         self._entry: tuple[tuple[tuple[str, ...], bytes], T] | None = None

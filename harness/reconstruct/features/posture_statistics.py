@@ -45,6 +45,15 @@ def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, cent
     return np.sqrt(total / count)
 
 
+def scaled_spread_rad(
+    body: Body, examples: Sequence[BodyMotion] | MotionDatabase, centre: Floats, rms_rad: float, least_rad: float
+) -> Floats:
+    """(48,) standard deviations in proportion to `spread_rad`, at least `least_rad`, scaled to this RMS [rad]."""
+    spread = np.maximum(spread_rad(body, examples, centre), least_rad)
+    out: Floats = rms_rad * (spread / np.sqrt(np.mean(spread**2)))
+    return out
+
+
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
     """Principal hinge angles (T, 48) [rad], take by take, since a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):

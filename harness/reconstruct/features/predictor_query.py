@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct.database import Windows
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression, ReducedRankSearch
@@ -33,7 +32,6 @@ class PredictorQuery:
         """(2 S,) readings that the session has had. A station that appears later only takes part in the solver."""
         self._measured_before: Bools = np.zeros(2 * regression.count, bool)
         self._fixed = False
-        self._identity = np.tile(rotations.IDENTITY, (regression.count, 1))
 
     def prepare(self, history: bool) -> bool:
         """Choose the regression for the readings that were measured so far; returns whether they have changed.
@@ -75,14 +73,8 @@ class PredictorQuery:
         has_position, has_orientation = residuals.measured[:count], residuals.measured[count + anchor]
         at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
         if not (has_position[anchor] and has_orientation if heading is None else has_position[heading.stations].all()):
-            residuals.kinematics.set(last)
-            last_m, last_orientation = residuals.kinematics.station_poses(
-                residuals.bones, residuals.mount_m, self._identity
-            )
-            at_m, turned = (
-                np.where(has_position[:, None], at_m, last_m),
-                (turned if has_orientation else last_orientation[anchor]),
-            )
+            at_m, orientations = residuals.completed(last)
+            turned = orientations[anchor]
         yaw = twist_rad(turned) if heading is None else heading.heading_rad(at_m)
         return AnchorFrame(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))
 

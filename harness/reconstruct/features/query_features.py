@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
@@ -39,7 +38,6 @@ class QueryFeatures:
         """`clock` is that of the session; without one the features have their own."""
         count = len(calibration.stations)
         self._residuals, self._examples = residuals, examples
-        self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
         self._time = clock or DeviceTime()
@@ -62,7 +60,8 @@ class QueryFeatures:
         position_m, turned = residuals.target_m, residuals.world_from_target
         facing = turned[examples.anchor]
         if not complete:
-            position_m, turned, facing = self._completed_readings(last_qpos)
+            position_m, turned = residuals.completed(place_root(residuals, last_qpos))
+            facing = turned[examples.anchor]
         now_s = self._time.frame_time_s(frame)
         gap_s = now_s - self._shown_s
         filled = 0.0 < gap_s <= LONGEST_GAP_S
@@ -80,15 +79,6 @@ class QueryFeatures:
             *(residuals.confidence, moving),
         )
         return Query(view, query, confidence, filled)
-
-    def _completed_readings(self, last_qpos: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions (S, 3), orientations (S, 4) and the anchor's (4,); missing ones are those of the last estimate."""
-        residuals, count = self._residuals, self._examples.count
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(place_root(residuals, last_qpos))
-        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._identity)
-        turned = np.where(facing, residuals.world_from_target, turned)
-        return np.where(here, residuals.target_m, at_m), turned, turned[self._examples.anchor]
 
 
 @compiled

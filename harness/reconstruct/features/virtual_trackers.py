@@ -7,7 +7,6 @@ Columns: for each of S stations the position (3) [m], then two axes of its bone 
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Singles
 from harness.core.calibration import Calibration
@@ -49,10 +48,8 @@ class StationFeatures:
     """Features of the frame after each of W windows of a database, for the mounts of a calibration."""
 
     def __init__(self, body: Body, followed: Windows, calibration: Calibration, lever_m: float) -> None:
-        self._lever_m, self._mount_m = lever_m, calibration.mount_m
-        self._bones = [body.skeleton.index(bone) for bone in calibration.bones]
-        self._identity = np.tile(rotations.IDENTITY, (len(self._bones), 1))
-        self.values: Singles = np.empty((len(followed), 9 * len(self._bones)), np.float32)
+        self._lever_m, stations = lever_m, len(calibration.stations)
+        self.values: Singles = np.empty((len(followed), 9 * stations), np.float32)
         """(W, 9 S) features [m]."""
         database, trackers = followed.database, VirtualTrackers(body, calibration)
         for start in range(0, len(followed), _CHUNK):
@@ -73,8 +70,3 @@ class StationFeatures:
         """(9 S,) weights: 1 for columns whose reading (2 S,) of positions, then orientations, was measured, else 0."""
         places, axes = np.split(measured.astype(np.float32), 2)
         return np.concatenate([np.repeat(places, 3).reshape(-1, 3), np.repeat(axes, 6).reshape(-1, 6)], 1).reshape(-1)
-
-    def station_poses(self, body: Kinematics, qpos: Floats) -> tuple[Floats, Floats]:
-        """Station positions (S, 3) [m] and bone orientations (S, 4) of a configuration (55,)."""
-        body.set(qpos)
-        return body.station_poses(self._bones, self._mount_m, self._identity)

@@ -185,7 +185,10 @@ class KernelRidgeSession:
             self._gate.read(frame, self._residuals)
             self._measured_before |= self._residuals.measured
             learnt = self._maps.learnt(self._measured_before)
-            inputs = self._maps.inputs(*self._completed_readings(), learnt.columns, learnt.heading)
+            position_m, turned = self._residuals.target_m, self._residuals.world_from_target
+            if not self._residuals.measured.all():
+                position_m, turned = self._residuals.completed(place_root(self._residuals, self._estimate))
+            inputs = self._maps.inputs(position_m[None], turned[None], learnt.columns, learnt.heading)
             qpos = self._maps.mean_qpos.copy()
             qpos[7:] += learnt.angles(inputs)[0]
             qpos[:7] = self._estimate[:7]
@@ -193,27 +196,9 @@ class KernelRidgeSession:
             self._gate.update(self._residuals, self._estimate)
         return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
-    def _completed_readings(self) -> tuple[Floats, Floats]:
-        """Positions (1, S, 3) and bone orientations (1, S, 4); missing ones are those of the last estimate."""
-        residuals, count = self._residuals, len(self._residuals.bones)
-        if residuals.measured.all():
-            return residuals.target_m[None], residuals.world_from_target[None]
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(place_root(residuals, self._estimate))
-        at_m, turned = residuals.kinematics.station_poses(
-            residuals.bones, residuals.mount_m, _identity_orientations(count)
-        )
-        position_m = np.where(here, residuals.target_m, at_m)
-        return position_m[None], np.where(facing, residuals.world_from_target, turned)[None]
-
 
 def gaussian_kernel(x: Floats, examples: Floats, width: float) -> Floats:
     """(M, N) kernel between inputs (M, C) and those of examples (N, C)."""
     far = np.sum(x**2, axis=1)[:, None] + np.sum(examples**2, axis=1) - 2.0 * x @ examples.T
     out: Floats = np.exp(-far / width)
     return out
-
-
-def _identity_orientations(count: int) -> Floats:
-    """(S, 4) identity quaternions."""
-    return np.tile(rotations.IDENTITY, (count, 1))

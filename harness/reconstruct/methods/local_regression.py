@@ -20,8 +20,8 @@ is the baseline of Kim et al. 2012, which prints no weights; the power is ours. 
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar, Literal
 
@@ -32,14 +32,13 @@ from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
-from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S, QueryFeatures
+from harness.reconstruct.methods.window_method import DatabaseLearner
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture, step_ground
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
@@ -48,7 +47,7 @@ from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
@@ -67,7 +66,7 @@ _NO_ROWS: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
-class LocalRegression(ABC):
+class LocalRegression(DatabaseLearner["FittedLocalRegression"]):
     """Options that both methods share. A method adds its own options and `weigh`."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
@@ -80,8 +79,6 @@ class LocalRegression(ABC):
 
     name: str
     summary: str
-    needs_examples: bool = True
-    training_data = "examples"
     neighbours: Annotated[int, Range(1, 1_000_000)] = 8
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     weights: FeatureWeights = field(default_factory=FeatureWeights)
@@ -105,18 +102,12 @@ class LocalRegression(ABC):
     spread: bool = True
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":
-        """Build the database; BadInput without examples."""
-        if not any(len(take) for take in examples):
-            raise BadInput("A local regression learns from examples, and there are none.", "Name some in the scenario.")
-        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
-
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalRegression":
         """Learn from a database, which may lie on disk."""
         sigma_rad = np.full(48, _HINGE_SIGMA_RAD)
         if self.spread:
-            hinge_spread_rad = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
-            sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
+            centre = mean_posture(body, database)
+            sigma_rad = scaled_spread_rad(body, database, centre, _HINGE_SIGMA_RAD, _MIN_SPREAD_RAD)
         return FittedLocalRegression(self, body, database, sigma_rad)
 
     @abstractmethod
@@ -181,10 +172,7 @@ class LocalRegressionSession:
         if not any_valid:
             self._last_rows, self._last_poses = _NO_ROWS, []
             return Estimate(self._estimate, status, Origin.BRIDGED)
-        if self._alignment is None:
-            self._gate.read(frame, self._residuals)
-        else:
-            self._alignment.read(frame, self._residuals, self._gate)
+        read_frame(frame, self._residuals, self._gate, self._alignment)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._estimate, status, Origin.BRIDGED)
         query = self._features.compute(frame, self._estimate)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from harness.body.kinematics import Kinematics
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.virtual_trackers import StationFeatures
+from harness.reconstruct.features.virtual_trackers import StationFeatures, VirtualTrackers
 from harness.reconstruct.solver.ground_frame import (
     ground_after_step,
     ground_from_qpos,
@@ -35,7 +34,6 @@ def test_readings_of_an_example_have_its_features(boxing: Scene) -> None:
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
     for row in (0, 40):
         before = int(windows.frames[row])
-        placed = controls.station_poses(Kinematics(boxing.body), qpos[before + 1])
-        np.testing.assert_allclose(
-            controls.query(*placed, ground_from_qpos(qpos[before])), controls.values[row], atol=1e-5
-        )
+        at_m, turned = VirtualTrackers(boxing.body, boxing.calibration).station_poses(qpos[before + 1][None])
+        found = controls.query(at_m[0], turned[0], ground_from_qpos(qpos[before]))
+        np.testing.assert_allclose(found, controls.values[row], atol=1e-5)

@@ -89,7 +89,7 @@ def test_the_prediction_is_that_of_equations_5_to_8(width: float, spread: float,
 
 def printed_prediction(fitted: FittedDynamicMap, past: Floats) -> tuple[Floats, Floats]:
     """Mean and variance (48,) of the hinges by eq. 2 to 8, for the last estimates (m, 55), newest first."""
-    windows, options = fitted.windows, fitted.options
+    windows, options = fitted.examples.windows, fitted.options
     query = windows.query(past).astype(float)
     x, y = windows.gather(slice(None)).astype(float), windows.successors(np.arange(len(windows)))[:, 4:52].astype(float)
     squared = np.sum((x - query) ** 2, axis=1)
