@@ -63,17 +63,10 @@ class Disturbance(CheckedFields):
             case "one_lost" | "all_lost":
                 lost = one if self.kind == "one_lost" else stations
                 return replace(noise, lost=(*noise.lost, *(LostStation(s, fade_s=0.0, **within) for s in lost)))
-            case "one_off":
-                return replace(
-                    noise,
-                    position_offset=(
-                        *noise.position_offset,
-                        PositionOffset(one, offset_m=forward_offset_m(self.off_m), **within),
-                    ),
-                )
-            case "start_off":
-                everything = PositionOffset((), offset_m=forward_offset_m(self.start_off_m), **within)
-                return replace(noise, position_offset=(*noise.position_offset, everything))
+            case "one_off" | "start_off":
+                which, off_m = (one, self.off_m) if self.kind == "one_off" else ((), self.start_off_m)
+                off = PositionOffset(which, offset_m=forward_offset_m(off_m), **within)
+                return replace(noise, position_offset=(*noise.position_offset, off))
             case "all_turned":
                 turned = OrientationOffset((), angle_rad=float(np.deg2rad(self.turn_deg)), **within)
                 return replace(noise, orientation_offset=(*noise.orientation_offset, turned))

@@ -1,7 +1,7 @@
 """Error model of an IS-900: error components, and the noise presets of docs/is900.md 13.5."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 from harness.errors import BadInput, UnknownName
@@ -104,14 +104,6 @@ def noise_preset(name: str) -> Noise:
         case "noise":
             return Noise(white=WhiteNoise(), drift=DriftNoise(), session=SessionBias(), clock=Clock())
         case "default":
-            return Noise(
-                white=WhiteNoise(),
-                drift=DriftNoise(),
-                session=SessionBias(),
-                excursion=Excursion(),
-                echo=Echo(),
-                dropout=Dropout(),
-                speed=SpeedError(),
-                clock=Clock(),
-            )
+            every_reading = noise_preset("noise")
+            return replace(every_reading, excursion=Excursion(), echo=Echo(), dropout=Dropout(), speed=SpeedError())
     raise UnknownName("noise preset", name, NOISE_PRESETS)

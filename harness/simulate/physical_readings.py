@@ -17,7 +17,7 @@ from harness.simulate.noise import Noise
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
-from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room
+from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room, place_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.worn import BodyMotionSource, Worn
@@ -92,12 +92,9 @@ def place_constellation(
         centre_m = np.round(middle_of_path_m(path[:, :3]), 2)
     else:
         centre_m = np.array(settings.centre_m)
-    placed = PlacedRoom(physics.room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
-    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
-    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     constellation = load_constellation(settings)
     check_emitters(physics.room, float(calibration.tracker_origin_m[2]), constellation.number, constellation.position_m)
-    return constellation.shifted(rotations.rotate(tracker_from_world, offset_m)), placed
+    return place_room(physics.room, constellation, centre_m, calibration)
 
 
 def _check_path(

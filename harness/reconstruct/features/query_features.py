@@ -25,21 +25,20 @@ LONGEST_GAP_ADVICE = f"Leave it out: velocities are computed over at most {LONGE
 """For `RENAMED_KEYS` of methods, where it was an option."""
 
 
+Reading = tuple[Floats, Floats, Bools]
+"""Positions (S, 3) [m], their times (S,) [s], and where they were measured: (S,) or more, of which S count."""
+
+
 class QueryFeatures:
     """Computes the features of each frame of a session."""
 
     def __init__(
-        self,
-        residuals: Residuals,
-        calibration: Calibration,
-        examples: ExampleFeatures,
-        clock: DeviceTime | None = None,
+        self, residuals: Residuals, calibration: Calibration, examples: ExampleFeatures, clock: DeviceTime | None = None
     ) -> None:
         """`clock` is that of the session; without one the features have their own."""
         count = len(calibration.stations)
         self._residuals, self._examples = residuals, examples
-        self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
-        self._before_valid: Bools = np.zeros(count, bool)
+        self._before: Reading = np.zeros((count, 3)), np.full(count, np.nan), np.zeros(count, bool)
         self._time = clock or DeviceTime()
         self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
         """(S, 3) positions of the last query, measured or filled in, and its time by the device's clock [s]."""
@@ -51,11 +50,9 @@ class QueryFeatures:
         has no velocity, and neither has any station at the start or after a gap.
         """
         residuals, examples = self._residuals, self._examples
-        velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
+        velocity_m_s, moving = np.empty_like(self._before[0]), np.empty_like(self._before[2])
         complete, all_moving = _estimate_velocities(
-            *(residuals.target_m, frame.measured_s, residuals.measured),
-            *(self._before_m, self._before_s, self._before_valid),
-            *(velocity_m_s, moving),
+            *((residuals.target_m, frame.measured_s, residuals.measured), self._before, velocity_m_s, moving)
         )
         position_m, turned = residuals.target_m, residuals.world_from_target
         facing = turned[examples.anchor]
@@ -75,28 +72,21 @@ class QueryFeatures:
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
         query, confidence = _compute_features(
-            *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
+            *((position_m, turned, velocity_m_s), view, examples.hemisphere, examples.scale),
             *(residuals.confidence, moving),
         )
         return Query(view, query, confidence, filled)
 
 
 @compiled
-def _estimate_velocities(
-    target_m: Floats,
-    measured_s: Floats,
-    measured: Bools,
-    before_m: Floats,
-    before_s: Floats,
-    before_valid: Bools,
-    velocity_m_s: Floats,
-    has_velocity: Bools,
-) -> tuple[bool, bool]:
+def _estimate_velocities(now: Reading, before: Reading, velocity_m_s: Floats, has_velocity: Bools) -> tuple[bool, bool]:
     """Compute velocities (S, 3) since the last frame [m/s], 0 where unknown, and where they are known (S,), in place.
 
     Returns whether everything was measured, and whether all velocities are known. The frame is then stored as the last
-    one (`before_*`).
+    one (`before`).
     """
+    target_m, measured_s, measured = now
+    before_m, before_s, before_valid = before
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
         has_velocity[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= LONGEST_GAP_S
@@ -109,12 +99,8 @@ def _estimate_velocities(
 
 @compiled
 def _compute_features(
-    position_m: Floats,
-    turned: Floats,
-    velocity_m_s: Floats,
-    x_m: float,
-    y_m: float,
-    yaw_rad: float,
+    readings: tuple[Floats, Floats, Floats],
+    view: AnchorFrame,
     hemisphere: Floats,
     scale: Floats,
     reading_confidence: Floats,
@@ -124,6 +110,8 @@ def _compute_features(
 
     `reading_confidence` (2 S,) is that of positions, then orientations; velocities also need `moving` (S,).
     """
+    position_m, turned, velocity_m_s = readings
+    x_m, y_m, yaw_rad = view
     count = len(position_m)
     out, confidence = np.empty(10 * count), np.empty(10 * count)
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)

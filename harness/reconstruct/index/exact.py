@@ -46,11 +46,6 @@ class FlatIndex(StatelessIndex):
     def __len__(self) -> int:
         return len(self._values)
 
-    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
-        """See `Lookup`."""
-        rows, squared, _ = self.nearest_with_offsets(query, count)
-        return rows, squared
-
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """See `Index`."""
         centred = np.asarray(query, np.float32) - self._mean
@@ -88,11 +83,6 @@ class KDTree(StatelessIndex):
 
     def __len__(self) -> int:
         return len(self._vectors)
-
-    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
-        """See `Lookup`."""
-        rows, squared, _ = self.nearest_with_offsets(query, count)
-        return rows, squared
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """See `Index`."""

@@ -26,13 +26,13 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
+from harness.reconstruct.contract import Fitted
 from harness.reconstruct.features.example_features import FeatureWeights
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.reconstruct.training import Fitted
 from harness.stream.frame import TrackerFrame
 
 Complexes = NDArray[np.complex128]

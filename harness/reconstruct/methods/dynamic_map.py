@@ -21,7 +21,7 @@ scenarios/tune_dynamic_map.toml and other validation clips chose them. `regressi
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -33,6 +33,7 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE, Origin
 from harness.core.ranges import Range
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.predictor_query import FeatureSearch, NeighbourSearch, PoseHistorySearch
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
@@ -49,16 +50,13 @@ from harness.reconstruct.solver.ground_frame import (
     qpos_from_posture,
 )
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import (
-    SolverOptions,
-)
+from harness.reconstruct.solver.ik_session import SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution, Prior, multiply_priors
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.subspace import SubspaceSolver, gaussian_space
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _MIN_WEIGHT_VARIANCE = 1e-6
@@ -153,24 +151,18 @@ WINDOW = DynamicMap(
     turn_sigma_rad=math.radians(10.0),
     jump_m=JUMP_M,
 )
-LITERAL = DynamicMap(
+LITERAL = replace(
+    WINDOW,
     name="dynamic_map:literal",
     summary="Liu et al. 2011 as printed, eq. 2 to 14, with constants chosen on validation clips",
-    search="history",
-    poses=2,
     neighbours=200,
     width=0.0,
     variance_kept=0.6,
     ridge=0.0,
-    covariance="diagonal",
     spread=1.0,
-    widening=0.0,
-    ik_prior_weight=0.0,
     least_sigma_rad=math.radians(0.01),
     tilt_sigma_rad=math.radians(0.01),
     height_sigma_m=1e-4,
-    step_sigma_m=0.3,
-    turn_sigma_rad=math.radians(10.0),
     start="closest",
     loss=Loss(
         position_sigma_m=0.0007,
@@ -230,8 +222,7 @@ class DynamicMapSession(HistorySession):
         options, examples = fitted.options, fitted.examples
         windows = examples.windows
         super().__init__(
-            *(examples.body, calibration, options, examples.mean_prior),
-            *(options.poses, windows.database.rate_hz),
+            *(examples.body, calibration, options, examples.mean_prior), *(options.poses, windows.database.rate_hz)
         )
         self._options, self._windows, self._ik_prior = options, windows, examples.ik_prior
         self._neighbours: NeighbourSearch

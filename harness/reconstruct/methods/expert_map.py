@@ -25,7 +25,7 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
 from harness.core.ranges import Range
-from harness.reconstruct.contract import Session
+from harness.reconstruct.contract import CalibrationCache, Session
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
@@ -50,7 +50,6 @@ from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 POSES = 3
@@ -69,6 +68,10 @@ FEATURES = 32
 
 _LAG_WEIGHTS = {1: (0.15, 0.7, 0.15), 2: (0.02, 0.14, 0.68, 0.14, 0.02)}
 """Weights of the poses for each fixed lag. The jitter is then about that of true motion."""
+
+
+Gaussian = tuple[Floats, Floats]
+"""Mean (P,) and covariance (P, P) of a posture."""
 
 
 @dataclass(frozen=True)
@@ -236,15 +239,15 @@ class ExpertMapSession(HistorySession):
         mean, covariance = condition(local, z, noise, _RIDGE)
         mean[HINGES] = self.limits.clip(mean[HINGES])
         widened = 1.0 + (options.widening * local.nearest / len(z)) ** 2
-        other_mean, other, weight = mean, covariance, 0.0
+        other, weight = (mean, covariance), 0.0
         if history and options.history_weight > 0.0:
             u = predictors[: len(experts.history_axes)] @ experts.history_axes - experts.history_origin
             around = local_gaussian(experts.history_table, u, options.history_neighbours, _HISTORY_WIDTH)
-            other_mean, other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
+            other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
             weight = options.history_weight / math.sqrt(widened)
         precision, linear = self._ik_terms(mean, 1.0 - 1.0 / widened)
-        factors = widened * scales.prior, weight / scales.prior
-        prior = _product(mean, covariance, factors[0], other_mean, other, factors[1], precision, linear)
+        expert, factor, power = (mean, covariance), widened * scales.prior, weight / scales.prior
+        prior = _product(expert, factor, other, power, precision, linear)
         return self._contact.constrain(prior, history)
 
     def _ik_terms(self, mean: Floats, weight: float) -> tuple[Floats, Floats]:
@@ -270,26 +273,21 @@ def _extrapolate_ground(newest: Floats, before: Floats) -> Floats:
 
 @compiled
 def _product(
-    mean: Floats,
-    covariance: Floats,
-    factor: float,
-    other_mean: Floats,
-    other: Floats,
-    weight: float,
-    precision: Floats,
-    linear: Floats,
+    expert: Gaussian, factor: float, other: Gaussian, weight: float, precision: Floats, linear: Floats
 ) -> Subspace:
     """The prior: two experts, the second with a power, and independent terms of each number, linear about `mean`.
 
-    `covariance` and `other` (P, P) are overwritten.
+    The covariances (P, P) are overwritten.
     """
+    mean, covariance = expert
+    other_mean, other_covariance = other
     size = len(mean)
     _add_floor(covariance, 0.0)
     covariance *= factor
     curvature = invert_positive_definite(covariance)
     if weight > 0.0:
-        _add_floor(other, _HISTORY_SIGMA_RAD**2)
-        inverse = invert_positive_definite(other)
+        _add_floor(other_covariance, _HISTORY_SIGMA_RAD**2)
+        inverse = invert_positive_definite(other_covariance)
         linear = linear + weight * np.dot(inverse, other_mean - mean)
         curvature += weight * inverse
     for i in range(size):

@@ -30,11 +30,11 @@ from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.core.training_data import EXAMPLES, NONE
+from harness.reconstruct.contract import Fitted
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.residuals import Loss
-from harness.reconstruct.training import Fitted
 
 _MIN_SPREAD_RAD = math.radians(2.0)
 """Smallest spread of a hinge over the examples that scales the prior."""

@@ -15,7 +15,7 @@ chosen on built-in takes that no scenario evaluates.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -28,6 +28,7 @@ from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.ground_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of, ground_from_qpos
@@ -35,7 +36,6 @@ from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _JUMP_M = 0.3
@@ -91,8 +91,7 @@ class FittedKernelRidge:
         return KernelRidgeSession(self, calibration)
 
 
-@dataclass(frozen=True, eq=False)
-class ReadingMap:
+class ReadingMap(NamedTuple):
     """Kernel ridge regression of hinges on some of the readings."""
 
     columns: Bools

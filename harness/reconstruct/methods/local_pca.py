@@ -29,19 +29,17 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.ranges import Range
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.virtual_trackers import StationFeatures
 from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
 from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, ground_after_step
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import (
-    SolverOptions,
-)
+from harness.reconstruct.solver.ik_session import SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
-from harness.reconstruct.training import CalibrationCache
 
 _MIN_WIDENING_RAD = math.radians(1.0)
 """Smallest standard deviation for which the answer is solved again outside the subspace [rad]."""
@@ -142,8 +140,7 @@ class LocalPcaSession(HistorySession):
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, examples = fitted.options, fitted.examples
         super().__init__(
-            *(examples.body, calibration, options, examples.mean_prior),
-            *(_HISTORY, examples.windows.database.rate_hz),
+            *(examples.body, calibration, options, examples.mean_prior), *(_HISTORY, examples.windows.database.rate_hz)
         )
         self._options, self._windows, self._ik_prior = options, examples.windows, examples.ik_prior
         self._subspace_solver = SubspaceSolver(self.residuals, self.limits, options.stopping)

@@ -33,6 +33,7 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
 from harness.core.ranges import Range
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
@@ -48,7 +49,6 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
-from harness.reconstruct.training import CalibrationCache
 from harness.stream.frame import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)

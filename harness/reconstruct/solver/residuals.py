@@ -23,6 +23,7 @@ from harness.errors import ShapeError
 from harness.reconstruct.solver.kinematic_tree import build_tree, new_state
 from harness.reconstruct.solver.normal_equations import (
     MeasurementModel,
+    Readings,
     StationTargets,
     evaluate,
     update_targets,
@@ -95,8 +96,7 @@ class Residuals:
         zeros, never = np.zeros(count), np.zeros(count, bool)
         empty = TrackerFrame(0.0, zeros, np.zeros((count, 3)), np.zeros((count, 4)), never, never, zeros, never)
         self._update_targets = specialise(
-            *(update_targets, self._measurement, self.targets, *_frame_arguments(empty)),
-            *(self.measured, self.confidence),
+            *(update_targets, self._measurement, self.targets, _readings_of(empty)), *(self.measured, self.confidence)
         )
         self._evaluate = specialise(evaluate, self.tree, self.targets, self.state, self._qpos)
 
@@ -113,8 +113,7 @@ class Residuals:
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
-        arguments = *_frame_arguments(frame), self.measured, self.confidence
-        self._update_targets(self._measurement, self.targets, *arguments)
+        self._update_targets(self._measurement, self.targets, _readings_of(frame), self.measured, self.confidence)
 
     def completed(self, qpos: Floats) -> tuple[Floats, Floats]:
         """Positions (S, 3) [m] and bone orientations (S, 4) of the frame; missing ones are those of a pose (55,)."""
@@ -153,7 +152,7 @@ class Residuals:
         return self._evaluate(self.tree, self.targets, self.state, self._qpos)
 
 
-def _frame_arguments(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
+def _readings_of(frame: TrackerFrame) -> Readings:
     """The fields of a frame that `update_targets` takes, in its order."""
     valid = frame.position_valid, frame.orientation_valid
     return frame.position_m, frame.tracker_from_station, *valid, frame.quality, frame.suspect

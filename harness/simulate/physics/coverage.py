@@ -1,6 +1,7 @@
 """Coverage: how many emitters are heard at a place, or by the stations of a performer, and how well they fix it."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation, middle_of_path_m
-from harness.simulate.physics.room import PlacedRoom, Room
+from harness.simulate.physics.room import Room, place_room
 from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.sound import Sound, level_db, threshold_db
 from harness.simulate.trajectory import Trajectory
@@ -46,8 +47,7 @@ def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class EmitterCoverage:
+class EmitterCoverage(NamedTuple):
     """Coverage at N places without a body; a station there faces each emitter."""
 
     heard: Ints
@@ -157,9 +157,7 @@ def station_coverage(
     stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
     centre_m = np.round(middle_of_path_m(motion.qpos), 2)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    placed = PlacedRoom(room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
-    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
-    centred = constellation.shifted(rotations.rotate(tracker_from_world, offset_m))
+    centred, placed = place_room(room, constellation, centre_m, calibration)
     position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
     turned = rotations.multiply(tracker_from_world, stations.world_from_station)
     sight = Sight(body, placed) if room.shadow else None

@@ -6,8 +6,8 @@ an IS-900 does not send it. Without it the numbers have to be those from 1 on, s
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,11 +35,10 @@ _LONGEST_LINE = 200
 _COUNT = re.compile(rb"# ([0-9]{1,4}) emitters?")
 
 
-@dataclass(frozen=True)
-class EmitterFault:
+class EmitterFault(NamedTuple):
     """Why emitters cannot be used."""
 
-    index: int | None
+    row: int | None
     """Index of the emitter at fault; None for the number of emitters."""
     found: str
     expected: str
@@ -107,7 +106,7 @@ def read_mcf(path: Path) -> tuple[Emitter, ...]:
         emitters.append(emitter)
         line_of.append(number)
     if fault := find_emitter_fault(emitters):
-        number_or_none = None if fault.index is None else line_of[fault.index]
+        number_or_none = None if fault.row is None else line_of[fault.row]
         raise BadFile(path, fault.found, fault.expected, "Correct the file.", number_or_none)
     if lost := _find_lost(data, emitters, announced):
         raise BadFile(

@@ -25,7 +25,6 @@ from tests.simulate.physics.rooms import (
     grid,
     moving,
     placed,
-    some_stations,
     still,
     worn,
 )
@@ -300,28 +299,6 @@ def measure_worn(
 def assert_same(a: Ranges, b: Ranges) -> None:
     for one_array, other in zip(vars(a).values(), vars(b).values(), strict=True):
         assert one_array.tobytes() == other.tobytes()
-
-
-def test_block_sizes_do_not_change_a_byte(boxer: tuple[Body, BodyMotion]) -> None:
-    names = ("left_wrist", "right_wrist", "torso", "left_foot")
-    stations, qpos = worn(*boxer, 240, *names)
-    whole = measure_worn(stations, qpos, names, boxer[0], (240,))
-    assert whole.direct.any()
-    assert whole.echo.any()
-    assert np.isnan(whole.range_m).any()
-    for blocks in ((1,) * 240, (7, 100, 133), (80, 80, 80)):
-        assert_same(measure_worn(stations, qpos, names, boxer[0], blocks), whole)
-
-
-def test_one_station_more_changes_no_other(boxer: tuple[Body, BodyMotion]) -> None:
-    names = ("left_wrist", "right_wrist", "torso", "left_foot")
-    stations, qpos = worn(*boxer, 240, *names)
-    whole = measure_worn(stations, qpos, names, boxer[0], (240,))
-    for rows in ((0,), (2,), (3, 1)):
-        some = measure_worn(some_stations(stations, *rows), qpos, tuple(names[row] for row in rows), boxer[0], (240,))
-        at = list(rows)
-        own = Ranges(whole.emitter, whole.range_m[:, at], whole.direct[:, at], whole.echo[:, at])
-        assert_same(some, own)
 
 
 def test_each_slot_sees_the_body_of_its_own_instant(boxer: tuple[Body, BodyMotion]) -> None:

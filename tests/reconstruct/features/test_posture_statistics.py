@@ -1,4 +1,4 @@
-"""The height of a toe on the floor against the body's kinematics."""
+"""The height of a standing toe, from examples."""
 
 from dataclasses import replace
 

@@ -1,15 +1,79 @@
-"""The filter's quality over seeded scenarios with wrong assumptions: no confident error of a metre for a second."""
+"""Status of a station: what is counted, when it is doubted, and how sure it is of itself."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body.retargeting import retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.mocap import synthetic
+from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.physics.inertial import Inertial
+from harness.simulate.physics.settings import Physics
+from harness.simulate.physics.tracking_state import (
+    CONFIRMING,
+    DOUBTED,
+    LEAST_QUALITY,
+    LOST,
+    TRACKING,
+    quality,
+    sum_last,
+)
+from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
+from harness.simulate.trajectory import Trajectory
 from tests.simulate.physics.free_station import EMITTER_M, TICK_HZ, FreeStation, free_station, new_filter, noisy, run
+
+
+@pytest.mark.parametrize("state", [LOST, CONFIRMING, DOUBTED])
+def test_a_station_without_a_confirmed_fix_has_quality_0(state: int) -> None:
+    assert quality(state, 0.001, 12, 0, 0.003) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "received", "rejected", "expected"),
+    [
+        (0.001, 12, 0, 1.0),
+        (0.003, 12, 0, 1.0),
+        (0.006, 12, 0, 0.5),
+        (0.003, 12, 6, 0.75),
+        (0.003, 12, 12, 0.5),
+        (0.003, 0, 0, 0.5),
+        (0.0, 12, 0, 1.0),
+        (100.0, 0, 0, LEAST_QUALITY),
+    ],
+)
+def test_quality_falls_with_sigma_and_rejections(sigma_m: float, received: int, rejected: int, expected: float) -> None:
+    assert quality(TRACKING, sigma_m, received, rejected, 0.003) == pytest.approx(expected)
+
+
+def test_counts_are_summed_over_the_last_slots() -> None:
+    ring = np.arange(10)
+    assert sum_last(ring, 12, 3) == 2 + 1 + 0
+    assert sum_last(ring, -9, 3) == 1 + 0 + 9  # slots before the take are negative
+
+
+def test_an_ankle_that_hears_few_ranges_is_lost_for_moments_only() -> None:
+    clip = synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0)
+    body, take = retarget_to_own_body(clip)
+    physics, tracker = Physics(), TrackerConfig()
+    physics = replace(physics, constellation=replace(physics.constellation, name="hall"))
+    trajectory, mounts = Trajectory(body, take), [DEFAULT_MOUNTS["right_ankle"]]
+    time_s = sampling_times_s(trajectory.duration_s, tracker, 1)
+    found, true = (
+        simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=1, take=take.name)
+        for noise in (Noise(physics=physics), noise_preset("clean"))
+    )
+    lost = found.quality[:, 0] == 0.0
+    assert found.filter is not None
+    assert found.filter.hearing_share[0] > 0.95
+    assert 0.0 < np.mean(lost) < 0.1
+    error_m = np.linalg.norm(found.position_m - true.position_m, axis=-1)[:, 0]
+    assert error_m[~lost].max() < 0.05
+
 
 SECONDS, RECORD_TICKS, SCENARIOS = 12.0, 10, 1000
 KINDS = ("temperature", "survey", "two exchanged", "four exchanged", "all exchanged", "shadow", "echoes")

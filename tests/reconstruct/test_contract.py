@@ -3,7 +3,7 @@
 import threading
 from dataclasses import replace
 
-from harness.reconstruct.training import CalibrationCache
+from harness.reconstruct.contract import CalibrationCache
 from tests.reconstruct.conftest import Scene
 
 
