@@ -121,6 +121,13 @@ def check_fields(record: object, **more: Range) -> None:
             raise _error(record, name, getattr(record, name), allowed)
 
 
+class CheckedFields:
+    """Base of a dataclass whose fields obey their annotations from the start (`check_fields`)."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
 def _error(record: object, name: str, value: Any, broken: Constraint) -> BadInput:
     return BadInput(f"{type(record).__name__}.{name} = {shorten(repr(value), 60)}.", f"Give {broken}.")
 

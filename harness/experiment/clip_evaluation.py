@@ -42,7 +42,7 @@ from harness.results import manifest, storage
 from harness.score.loops import WARM_UP_S
 from harness.score.metrics import VERSIONS
 from harness.simulate import noise as noises
-from harness.simulate.mounting import perturb_mounts
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.simulate.trajectory import Trajectory

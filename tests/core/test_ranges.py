@@ -124,7 +124,7 @@ ENDLESS = {"jump_m", "to_s"}
 """Fields that may be as large as you like; `inf` switches the outlier gate off, or lasts to the end."""
 NOT_CHOSEN = {"schema"}
 CHECKED_TOGETHER = {"Emitter"}
-"""Records of the protocol, which `simulate.physics.emitter_checks` checks where a scenario names them."""
+"""Records of the protocol, which `simulate.physics.emitters` checks where a scenario names them."""
 
 
 def types_in(hint: Any) -> Iterator[type]:

@@ -43,7 +43,7 @@ from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run
 from harness.results.placement_findings import read_placement
 from harness.results.storage import read_summary
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.frame_table import format_csv_row, frame_rows

@@ -6,7 +6,7 @@ import pytest
 from harness.core.arrays import Bools
 from harness.measure.echoes import LEAST_ECHO_M, EchoBursts, echo_limit_m, find_echoes, hold
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.echo import Echo
+from harness.simulate.components.transient import Echo
 from tests.measure.resting_stations import (
     QUIET,
     RATE_HZ,

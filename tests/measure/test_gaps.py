@@ -5,7 +5,7 @@ import pytest
 
 from harness.measure.episode_distributions import fit_length
 from harness.measure.gaps import find_gaps_at_rest, leaked_tilt_rad
-from harness.simulate.components.dropout import Dropout
+from harness.simulate.components.transient import Dropout
 from harness.simulate.noise import Noise
 from tests.measure.resting_stations import RATE_HZ, default_noise, rest_series, simulate_rest, simulate_static
 

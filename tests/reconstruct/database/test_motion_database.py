@@ -15,12 +15,12 @@ from harness.core.skeleton import equivalent_euler_angles
 from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase, TakeSegment
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.solver.ground_frame import (
     ground_from_qpos,
     posture_from_qpos,
     qpos_from_postures,
     relative_ground,
+    step_ground,
 )
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from tests.reconstruct.conftest import moved as elsewhere
