@@ -17,8 +17,8 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.live.browser_process import BrowserConfig
 from harness.live.pose import LivePose
-from harness.live.pose_ring import PoseRing
-from harness.stream.recording.recording_switch import RecordingSwitch
+from harness.live.shared_memory import PoseRing
+from harness.stream.recording.recorder import RecordingSwitch
 
 _START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 2.0
 

@@ -15,11 +15,9 @@ from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin, Status
-from harness.live.capture import CapturedFrame, CaptureThread
-from harness.live.dropping_queue import DroppingQueue
-from harness.live.latency import StageLatencies
+from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
+from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
-from harness.live.low_latency import collect_garbage, low_latency_mode
 from harness.live.pose import LivePose, Output
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream

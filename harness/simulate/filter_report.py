@@ -5,7 +5,7 @@ import numpy as np
 from harness.core import rotations
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.readings import SimulatedReadings
-from harness.stream.codec.filter_samples import FilterSamples
+from harness.stream.codec.samples import FilterSamples
 
 
 def filter_samples(readings: SimulatedReadings, fusion: Fusion) -> FilterSamples | None:

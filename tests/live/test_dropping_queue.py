@@ -2,7 +2,7 @@
 
 import threading
 
-from harness.live.dropping_queue import DroppingQueue
+from harness.live.capture import DroppingQueue
 
 
 def test_the_oldest_gives_way_and_is_counted() -> None:

@@ -8,7 +8,7 @@ from PIL import Image
 from harness.calibrate.poses import POSES
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
-from harness.live.pose_sheet import SHEET_NAME, draw_poses
+from harness.live.viewer import SHEET_NAME, draw_poses
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
 

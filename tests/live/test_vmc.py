@@ -15,8 +15,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.live.pose import LivePose
-from harness.live.unity import HIPS, UNITY_BONES, UnityPose
-from harness.live.vmc import VmcOutput, parse_address
+from harness.live.vmc import HIPS, UNITY_BONES, UnityPose, VmcOutput, parse_address
 from harness.mocap.sources import SyntheticSource
 from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose

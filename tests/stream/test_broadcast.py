@@ -23,7 +23,7 @@ from harness.stream.driver import DriverConfig, DriverTiming, Is900Broadcast, Li
 from harness.stream.driver.transport import open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.emulator.server import RunningEmulator
-from harness.stream.emulator.udp_port import parse_udp_address
+from harness.stream.emulator.udp_broadcast import parse_udp_address
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream

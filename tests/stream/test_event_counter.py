@@ -1,7 +1,6 @@
 """Events on the line are shown without repetition."""
 
-from harness.stream.event_counter import EventCounter
-from harness.stream.line_events import LineEvent, LineEventKind
+from harness.stream.line_events import EventCounter, LineEvent, LineEventKind
 
 
 def test_garbage_is_shown_once_and_counted_and_changes_are_always_shown() -> None:

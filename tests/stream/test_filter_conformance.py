@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ByteCapture, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.driver import Is900
 from harness.stream.emulator import serve_emulator

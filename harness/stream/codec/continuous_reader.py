@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.frame import TrackerFrame
 
 SILENCE_PERIODS = 2.0

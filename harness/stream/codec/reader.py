@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.names import Label
 from harness.errors import BadInput
 from harness.stream.codec.assembler import FrameAssembler
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.clock import ClockUnwrapper
-from harness.stream.codec.datagram_decoder import DatagramDecoder
+from harness.stream.codec.datagram import DatagramDecoder
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, position_range_m
 from harness.stream.codec.plausibility import PlausibilityCheck
@@ -20,6 +19,22 @@ from harness.stream.codec.readings import Readings, decode_readings, has_quality
 from harness.stream.codec.records import RecordFormat, Table
 from harness.stream.codec.replies import ParsedReply, TrackingStatus, parse_reply
 from harness.stream.frame import TrackerFrame
+
+
+@dataclass(frozen=True, eq=False)
+class ByteCapture:
+    """K consecutive chunks of received bytes."""
+
+    data: bytes
+    ends: Ints
+    """(K,) number of bytes received up to the end of each chunk."""
+    received_s: Floats
+    """(K,) host clock when each chunk was received [s]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, np.int64, ends=("K",))
+        freeze(self, received_s=("K",))
+
 
 LEAST_RATE_HZ, MOST_RATE_HZ = 1e-3, 1e4
 """Limits of the records per second of a station [choice]."""

@@ -1,14 +1,27 @@
 """Exchange with the device: queries and replies over a line that may carry data records as well."""
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 from harness.stream.codec.commands import RESUME, STOP
 from harness.stream.codec.replies import DeviceError, ParsedReply, parse_reply
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.host import Host
-from harness.stream.driver.transport import Transport
+from harness.stream.driver.transport import Transport, open_transport
 from harness.stream.line_events import LineObserver
+
+
+@dataclass(frozen=True)
+class Host:
+    """Ports and clocks of the computer that the driver runs on."""
+
+    open: Callable[[str, int], Transport] = open_transport
+    """Opens a port at a baud rate. Raises BadInput."""
+    monotonic_s: Callable[[], float] = time.monotonic
+    wall_s: Callable[[], float] = time.time
+    sleep: Callable[[float], None] = time.sleep
+
 
 MAX_UNFINISHED_BYTES = 4096
 """An unfinished line longer than this is no reply [bytes]."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.errors import BadInput
 from harness.stream.codec import commands
-from harness.stream.codec.command_table import parse_command
+from harness.stream.codec.commands import parse_command
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.readings import decode_readings
@@ -74,7 +74,7 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
     if status is None or states is None or not states.stations:
         raise BadInput("The device does not tell its format and its active stations (S, l*).", "")
     lists = {
-        station: line.ask(commands.query_output_list(station), OutputList, answer_s) for station in states.stations
+        station: line.ask(commands.station_command("O", station), OutputList, answer_s) for station in states.stations
     }
     items = {answer.items for answer in lists.values() if answer is not None}
     if None in lists.values() or len(items) != 1:

@@ -9,7 +9,7 @@ from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import Message, SentMessage
+from harness.stream.emulator.serial_line import Message, SentMessage
 from harness.stream.emulator.server import RunningEmulator, serve_emulator
 
 __all__ = [

@@ -10,9 +10,8 @@ from dataclasses import replace
 from harness.stream.codec.replies import ParsedReply
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.message import Message
-from harness.stream.emulator.player import SamplePlayer
-from harness.stream.emulator.round_encoder import RoundEncoder
+from harness.stream.emulator.player import RoundEncoder, SamplePlayer
+from harness.stream.emulator.serial_line import Message
 from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
 
 _LOG_LENGTH = 100

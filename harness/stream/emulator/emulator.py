@@ -5,8 +5,7 @@ from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 from harness.stream.emulator.faults import FaultEpisode, FaultInjector
-from harness.stream.emulator.message import SentMessage
-from harness.stream.emulator.serial_line import SerialLine
+from harness.stream.emulator.serial_line import SentMessage, SerialLine
 
 
 class Emulator:

@@ -16,14 +16,12 @@ import numpy as np
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.codec.samples import DeviceSamples
-from harness.stream.emulator.addresses import parse_address
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
-from harness.stream.emulator.message import SentMessage
-from harness.stream.emulator.port import Port
+from harness.stream.emulator.port import Port, parse_address
+from harness.stream.emulator.serial_line import SentMessage
 from harness.stream.emulator.tcp_port import LogCallback, TcpPort
-from harness.stream.emulator.udp_broadcast import UdpBroadcast
-from harness.stream.emulator.udp_port import LOOPBACK, UdpPort
+from harness.stream.emulator.udp_broadcast import LOOPBACK, UdpBroadcast, UdpPort
 
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0

@@ -18,8 +18,8 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.driver import DriverConfig, Tracker, open_tracker
-from harness.stream.event_counter import EventCounter
 from harness.stream.frame import TrackerFrame
+from harness.stream.line_events import EventCounter
 from harness.stream.recording.recording import RecordingWriter, read_marks
 
 WATCHED_S = 2.0

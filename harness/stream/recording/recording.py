@@ -37,7 +37,9 @@ from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
-from harness.stream.codec.blocks import (
+from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.line_events import LineEvent
+from harness.stream.recording.blocks import (
     ANSWERED,
     CONFIGURED,
     EVENT,
@@ -55,9 +57,6 @@ from harness.stream.codec.blocks import (
     read_version,
     scan_blocks,
 )
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
-from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
 PLAN = "plan"

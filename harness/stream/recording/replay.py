@@ -15,11 +15,10 @@ from typing import Literal
 import numpy as np
 
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import CONFIGURED, RECEIVED
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ByteCapture, WireFormat
 from harness.stream.frame import TrackerFrame
+from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 
 CHUNKS_PER_BATCH = 1000

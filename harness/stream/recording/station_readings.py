@@ -16,13 +16,13 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadFile
-from harness.stream.codec.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.codec.clock import ClockUnwrapper
 from harness.stream.codec.decoder import Garbage, RecordRun
 from harness.stream.codec.plausibility import PlausibilityCheck
 from harness.stream.codec.reader import WireFormat, make_decoder
 from harness.stream.codec.readings import Readings, concatenate_readings, decode_readings
 from harness.stream.codec.records import Table
+from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
 
 BLOCK_S = 600.0

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.errors import BadInput
-from harness.stream.codec.command_table import DEVICE_COMMANDS, find_danger, parse_command
-from harness.stream.codec.commands import CommandReader
+from harness.stream.codec.commands import DEVICE_COMMANDS, CommandReader, find_danger, parse_command
 from harness.stream.driver import DriverConfig
 from harness.stream.emulator.config import EmulatorConfig
 from tests.stream.driver.bench import NAMES, Bench, EmulatedDevice, frames_for, make_samples

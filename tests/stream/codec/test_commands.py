@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.stream.codec import commands
-from harness.stream.codec.commands import LONGEST_LINE, Command, CommandReader
+from harness.stream.codec.commands import LONGEST_LINE, Command, CommandReader, station_command
 
 
 def read(data: bytes) -> list[bytes]:
@@ -60,20 +60,10 @@ def test_an_endless_line_is_truncated_and_the_next_is_read() -> None:
 @pytest.mark.parametrize(
     ("command", "expected_bytes"),
     [
-        (commands.set_output_list("1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
-        (commands.query_output_list("A"), b"OA\r\n"),
-        (commands.switch_station("2", active=False), b"l2,0\r\n"),
-        (commands.boresight("3"), b"B3\r\n"),
-        (commands.undo_boresight("3"), b"b3\r\n"),
-        (
-            commands.alignment("1", (0, 0, 0), (100, 0, 0), (0, 100, 0)),
-            b"A1,0.00,0.00,0.00,100.00,0.00,0.00,0.00,100.00,0.00\r\n",
-        ),
-        (commands.undo_alignment("1"), b"R1\r\n"),
-        (commands.prediction("1", 20), b"Mp1,20\r\n"),
-        (commands.enhancement("1", 2), b"MF1,2\r\n"),
-        (commands.sensitivity("1", 3), b"MQ1,3\r\n"),
-        (commands.serial_line(115200), b"o1152,N,8,0\r\n"),
+        (station_command("O", "1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
+        (station_command("O", "A"), b"OA\r\n"),
+        (station_command("l", "2", [False]), b"l2,0\r\n"),
+        (station_command("N", "1", (0, -2.5, 30.0), 3), b"N1,0.000,-2.500,30.000\r\n"),
     ],
 )
 def test_commands_are_those_of_the_manuals(command: bytes, expected_bytes: bytes) -> None:

@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.datagram import Datagram
-from harness.stream.codec.datagram_decoder import DATAGRAM_FORMAT, DATAGRAM_LIST, DatagramDecoder, split_packets
+from harness.stream.codec.datagram import DATAGRAM_FORMAT, DATAGRAM_LIST, Datagram, DatagramDecoder, split_packets
 from harness.stream.codec.decoder import Garbage, RecordRun
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, from_yaw_pitch_roll_deg
 from harness.stream.frame import TrackerFrame
 

@@ -11,8 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from harness.core import rotations
 from harness.errors import BadInput, HarnessError
-from harness.stream.codec.filter_samples import FilterSamples
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.codec.samples import DeviceSamples, FilterSamples
 from tests.stream.emulator.played import make_samples, with_filter
 
 STATIONS = 4

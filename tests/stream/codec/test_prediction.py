@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.codec.prediction import predict_poses
+from harness.stream.codec.samples import predict_poses
 
 STATIONS = 3
 VECTORS = arrays(float, (STATIONS, 3), elements=st.floats(-20.0, 20.0))

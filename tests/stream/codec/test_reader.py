@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.codec.reader import LEAST_RATE_HZ, MOST_RATE_HZ, CaptureStream, FrameReader, WireFormat
+from harness.stream.codec.reader import LEAST_RATE_HZ, MOST_RATE_HZ, ByteCapture, CaptureStream, FrameReader, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame

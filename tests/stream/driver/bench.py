@@ -11,7 +11,7 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, Is900, LineEvent
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.host import Host
+from harness.stream.driver.connection import Host
 from harness.stream.driver.transport import LineLost, Transport
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator

@@ -3,8 +3,8 @@
 import pytest
 
 from harness.errors import BadInput
+from harness.stream.codec.capacity import check_capacity, required_bit_rate
 from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, record_size
-from harness.stream.driver.capacity import check_capacity, required_bit_rate
 
 BAUD = 115200
 

@@ -12,7 +12,7 @@ from harness.errors import BadInput, UnknownName
 from harness.stream.codec.items import BAUD_RATES, SHORT_LIST, STANDARD_LIST, record_size
 from harness.stream.codec.replies import StatusRecord
 from harness.stream.driver import DriverConfig, DriverTiming, Is900
-from harness.stream.driver.rate_measurement import estimate_rate_hz
+from harness.stream.driver.configurator import estimate_rate_hz
 from harness.stream.emulator.config import EmulatorConfig
 from tests.stream.driver.bench import (
     NAMES,

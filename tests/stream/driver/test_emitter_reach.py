@@ -2,8 +2,8 @@
 
 import pytest
 
+from harness.stream.codec.capacity import emitter_reach_m
 from harness.stream.codec.replies import Emitter
-from harness.stream.driver.emitter_reach import emitter_reach_m
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 
 DOWN = (0.0, 0.0, 1.0)

@@ -8,7 +8,7 @@ import pytest
 from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.station_watch import StationWatch
+from harness.stream.driver.stations import StationWatch
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 from harness.stream.recording.recording import RecordingWriter, read_recording

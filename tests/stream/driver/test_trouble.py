@@ -10,7 +10,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.experiment.scenario import load_scenario
-from harness.stream.codec.commands import set_output_list
+from harness.stream.codec.commands import station_command
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.items import SHORT_LIST
 from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
@@ -211,10 +211,10 @@ def send_from_elsewhere(data: bytes) -> Callable[[Bench], None]:
 @pytest.mark.parametrize(
     ("data", "kind"),
     [
-        (b"".join(set_output_list(station, (2, 4, 1)) for station in "1234"), "wrong list"),
-        (set_output_list("3", (40, 2, 11, 21, 22, 1)), "wrong list"),
+        (b"".join(station_command("O", station, (2, 4, 1)) for station in "1234"), "wrong list"),
+        (station_command("O", "3", (40, 2, 11, 21, 22, 1)), "wrong list"),
         (b"F", "reset"),
-        (b"F" + b"".join(set_output_list(station, (2, 4, 1)) for station in "1234"), "reset"),
+        (b"F" + b"".join(station_command("O", station, (2, 4, 1)) for station in "1234"), "reset"),
         (b"c", "reset"),
     ],
 )

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
+from harness.stream.codec.reader import ByteCapture
+from harness.stream.emulator.faults import Fault, add_byte_faults, unapplied_kinds
 
 RECORDS = [f"record {i:04d}\r\n".encode() for i in range(2000)]
 CAPTURE = ByteCapture(

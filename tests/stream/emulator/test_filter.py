@@ -9,11 +9,10 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.stream.codec.datagram import parse_datagram
-from harness.stream.codec.filter_samples import FilterSamples
 from harness.stream.codec.items import record_size, record_type
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, yaw_pitch_roll_deg
 from harness.stream.codec.replies import TrackingStatus
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.codec.samples import DeviceSamples, FilterSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.emulator.udp_broadcast import UdpBroadcast

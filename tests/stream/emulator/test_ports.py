@@ -19,8 +19,8 @@ from harness.errors import BadInput
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.pty_port import PtyPort
+from harness.stream.emulator.serial_line import SentMessage
 from harness.stream.emulator.server import EmulatorServer, RunningEmulator, open_port, serve_emulator
 from harness.stream.emulator.tcp_port import MAX_CLIENTS, TcpPort
 from tests.stream.emulator.played import make_samples

@@ -4,7 +4,7 @@ import pytest
 
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS
+from harness.stream.emulator.setting_commands import SET_ONLY_COMMANDS, SETTER_COMMANDS
 from tests.stream.emulator.played import DeviceSession
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"

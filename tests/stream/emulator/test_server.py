@@ -25,7 +25,7 @@ def walk() -> Playback:
 def configure(client: Transport, stations: str = "123456") -> None:
     client.write(commands.STOP)
     for station in stations:
-        client.write(commands.set_output_list(station, (40, 2, 11, 21, 1)))
+        client.write(commands.station_command("O", station, (40, 2, 11, 21, 1)))
     for command in (commands.BINARY, commands.CENTIMETRES, commands.MILLISECONDS, commands.ZERO_CLOCK, commands.STREAM):
         client.write(command)
 

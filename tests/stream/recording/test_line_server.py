@@ -14,7 +14,7 @@ from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.emulator import serve_emulator
-from harness.stream.recording.client_pty import ABSENT_S, MAX_WAITING_BYTES, ClientPty
+from harness.stream.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadFile, HarnessError
-from harness.stream.codec.blocks import read_blocks
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
+from harness.stream.recording.blocks import read_blocks
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureBlock, CaptureReader, StationReadings
@@ -195,7 +195,7 @@ def test_a_clock_of_the_host_that_began_anew_parts_the_capture(tmp_path: Path) -
 
 
 def test_memory_does_not_grow_with_the_length(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.stream.codec.blocks._PIECE_BYTES", 1 << 17)
+    monkeypatch.setattr("harness.stream.recording.blocks._PIECE_BYTES", 1 << 17)
     monkeypatch.setattr("harness.stream.recording.station_readings._BATCH_BYTES", 1 << 16)
     sizes, peaks = [], []
     for name, frames in (("short.rec", 2000), ("long.rec", 12000)):
@@ -233,6 +233,6 @@ def test_blocks_are_the_same_from_pieces_of_any_size(
     for place in (100, 300, 301, 777):
         data[place] ^= 0x55
     whole = list(read_blocks(bytes(data)))
-    monkeypatch.setattr("harness.stream.codec.blocks._PIECE_BYTES", piece)
+    monkeypatch.setattr("harness.stream.recording.blocks._PIECE_BYTES", piece)
     assert list(read_blocks(bytes(data))) == whole
     assert any(type(entry).__name__ == "DamagedSpan" for entry in whole)
