@@ -12,7 +12,7 @@ from harness.core.files import write_bytes
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, shorten
 from harness.simulate.physics.emitter_checks import find_emitter_fault
-from harness.stream.codec.replies import Emitter
+from harness.stream.codec.replies import Emitter, parse_reply
 
 MCF_SUFFIX = ".mcf"
 MAX_MCF_BYTES = MEGABYTE
@@ -80,4 +80,5 @@ def write_mcf(path: Path, emitters: Sequence[Emitter]) -> None:
 def _parse_line(line: bytes) -> Emitter | None:
     if len(line) > _LONGEST_LINE or not line.isascii():
         return None
-    return Emitter.parse(line.decode("ascii").rstrip(" "))
+    reply = parse_reply(line.rstrip(b" "))
+    return reply if isinstance(reply, Emitter) else None

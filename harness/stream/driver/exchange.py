@@ -1,26 +1,17 @@
 """Commands and their answers, one after another, with a device that is left as it is: nothing else is set."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from harness.errors import BadInput
-from harness.stream.codec import commands
+from harness.stream.codec import commands, replies
 from harness.stream.codec.commands import parse_command
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.readings import decode_readings
 from harness.stream.codec.records import RecordFormat
-from harness.stream.codec.replies import (
-    OutputList,
-    StationStates,
-    StatusRecord,
-    SystemRecord,
-    TrackingStatus,
-    UnknownReply,
-    parse_reply,
-)
 from harness.stream.driver.connection import DeviceConnection
 
 Answer = dict[str, Any]
@@ -68,19 +59,20 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
     `rate_hz` is the rate of a device that does not report it [Hz]. Raises BadInput where the answers do not suffice.
     """
     answer_s = line.timing.answer_s
-    status = line.ask(commands.STATUS, StatusRecord, answer_s)
-    system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
-    states = line.ask(commands.STATION_STATES, StationStates, answer_s)
+    status = line.ask(commands.STATUS, replies.StatusRecord, answer_s)
+    system = line.ask(commands.SYSTEM, replies.SystemRecord, answer_s)
+    states = line.ask(commands.STATION_STATES, replies.StationStates, answer_s)
     if status is None or states is None or not states.stations:
         raise BadInput("The device does not tell its format and its active stations (S, l*).", "")
     lists = {
-        station: line.ask(commands.station_command("O", station), OutputList, answer_s) for station in states.stations
+        station: line.ask(commands.station_command("O", station), replies.OutputList, answer_s)
+        for station in states.stations
     }
     items = {answer.items for answer in lists.values() if answer is not None}
     if None in lists.values() or len(items) != 1:
         raise BadInput("The stations have different output lists, or do not tell them (O).", "")
     if rate_hz is None:
-        tracking = line.ask(commands.TRACKING, TrackingStatus, answer_s)
+        tracking = line.ask(commands.TRACKING, replies.TrackingStatus, answer_s)
         rate_hz = tracking.rate_hz if tracking is not None else 0.0
     if not rate_hz > 0.0:
         raise BadInput("The device does not report its rate (MP).", "Give --rate.")
@@ -113,14 +105,14 @@ def _decode_event(event: DecoderEvent, data: bytes, wire: WireFormat) -> list[An
 
 
 def _decode_reply(line: bytes) -> Answer:
-    reply = parse_reply(line)
+    reply = replies.parse_reply(line)
     match reply:
-        case UnknownReply():
+        case replies.UnknownReply():
             values: Answer = {"text": reply.text.decode("latin-1")}
-        case StationStates():
+        case replies.StationStates():
             values = {"station": reply.station, "active": "".join(reply.stations)}
         case _:
-            values = asdict(reply)
+            values = dict(vars(reply))
     return {"kind": type(reply).__name__, **values}
 
 

@@ -18,19 +18,7 @@ from harness.stream.codec.reader import ByteCapture
 
 ByteFaultKind = Literal["lost", "garbled", "duplicated", "added", "repeated"]
 FaultEpisodeKind = Literal["burst", "stall", "disconnect", "reset", "lost_station"]
-FaultKind = Literal[
-    "lost",
-    "garbled",
-    "duplicated",
-    "added",
-    "repeated",
-    "burst",
-    "stall",
-    "disconnect",
-    "reset",
-    "lost_station",
-    "firmware",
-]
+FaultKind = Literal[ByteFaultKind, FaultEpisodeKind, "firmware"]
 BYTE_FAULT_KINDS: tuple[str, ...] = get_args(ByteFaultKind)
 FAULT_EPISODE_KINDS: tuple[str, ...] = get_args(FaultEpisodeKind)
 _INSTANT_KINDS = (*BYTE_FAULT_KINDS, "reset")

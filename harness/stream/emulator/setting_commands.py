@@ -7,22 +7,9 @@ from typing import Any
 import numpy as np
 
 from harness.errors import HarnessError
+from harness.stream.codec import replies
 from harness.stream.codec.items import record_type
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
-from harness.stream.codec.replies import (
-    Emitter,
-    GenlockReply,
-    GeometryReply,
-    IntegerReply,
-    OutputList,
-    ParsedReply,
-    PredictionReply,
-    SensitivityReply,
-    StationRecord,
-    StationStates,
-    SystemRecord,
-    UnknownReply,
-)
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import MISSING, OUT_OF_RANGE, CommandArgument, CommandError
 from harness.stream.emulator.config import SUPPORTED_BAUD_RATES
@@ -94,7 +81,7 @@ def _set_genlock(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     number = CommandArgument(argument.fields[0]).integer(1, 9999999, start=0)
     x, y, z, nx, ny, nz, identity = argument.numbers(7)
-    emitter = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
+    emitter = replies.Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
     others = (emitter for emitter in settings.draft_emitters if emitter.number != number)
     return replace(settings, draft_emitters=tuple(sorted((*others, emitter), key=lambda emitter: emitter.number)))
 
@@ -221,43 +208,43 @@ SINGLE_FIELD_SETTERS = {"MU", "Mg", "MSchAlg", "MConfigLockMode", "MEthIp", "MEt
 """Those of `SETTER_COMMANDS` that set with their first field."""
 
 
-Query = Callable[[DeviceSettings, CommandArgument], Iterable[ParsedReply]]
+Query = Callable[[DeviceSettings, CommandArgument], Iterable[replies.ParsedReply]]
 _NO_INERTIA_CUBE = -1
 """The answer for a station without one (docs/is900.md 14)."""
 _STATE_FLAGS = 32
 """Number of flags in the reply to `l*`."""
 
 
-def _station_query(reply: Callable[[str, StationSettings], ParsedReply]) -> Query:
-    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+def _station_query(reply: Callable[[str, StationSettings], replies.ParsedReply]) -> Query:
+    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
         name = argument.station()
         return [reply(name, settings.station(name))]
 
     return query
 
 
-def _device_query(reply: Callable[[DeviceSettings], ParsedReply]) -> Query:
-    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+def _device_query(reply: Callable[[DeviceSettings], replies.ParsedReply]) -> Query:
+    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
         argument.require_empty()
         return [reply(settings)]
 
     return query
 
 
-def _text_reply(text: str) -> ParsedReply:
-    return UnknownReply(text.encode("ascii"))
+def _text_reply(text: str) -> replies.ParsedReply:
+    return replies.UnknownReply(text.encode("ascii"))
 
 
-def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
     """Reply to `l`; without a station it tells the first four (docs/is900.md 6.3)."""
     if argument.text.strip() == "*":
         active = [station.active for station in settings.stations]
-        return [StationStates(None, (*active, *[False] * (_STATE_FLAGS - len(active))))]
+        return [replies.StationStates(None, (*active, *[False] * (_STATE_FLAGS - len(active))))]
     name = argument.station() if argument.text.strip() else "1"
-    return [StationStates(name, tuple(settings.station(queried).active for queried in (name, *"234")))]
+    return [replies.StationStates(name, tuple(settings.station(queried).active for queried in (name, *"234")))]
 
 
-def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
     if not argument.text.strip():
         return settings.emitters
     number = argument.integer(1, 9999999, start=0)
@@ -268,31 +255,31 @@ def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterab
 
 
 QUERIES: dict[str, Query] = {
-    "O": _station_query(lambda name, station: OutputList(name, station.items)),
+    "O": _station_query(lambda name, station: replies.OutputList(name, station.items)),
     "l": _station_states,
-    "A": _station_query(lambda name, station: GeometryReply(name, "A", geometry.alignment_cm(station))),
-    "G": _station_query(lambda name, station: GeometryReply(name, "G", station.reference_deg)),
-    "H": _station_query(lambda name, station: GeometryReply(name, "H", station.hemisphere)),
+    "A": _station_query(lambda name, station: replies.GeometryReply(name, "A", geometry.alignment_cm(station))),
+    "G": _station_query(lambda name, station: replies.GeometryReply(name, "G", station.reference_deg)),
+    "H": _station_query(lambda name, station: replies.GeometryReply(name, "H", station.hemisphere)),
     "N": _station_query(
-        lambda name, station: GeometryReply(name, "N", tuple(100.0 * value for value in station.tip_m))
+        lambda name, station: replies.GeometryReply(name, "N", tuple(100.0 * value for value in station.tip_m))
     ),
-    "V": _station_query(lambda name, station: GeometryReply(name, "V", station.envelope_m)),
+    "V": _station_query(lambda name, station: replies.GeometryReply(name, "V", station.envelope_m)),
     "MS": _device_query(
-        lambda settings: SystemRecord(
+        lambda settings: replies.SystemRecord(
             boresight_as_fastrak=settings.boresight_as_fastrak,
             microseconds=settings.microseconds,
             lights=settings.lights,
         )
     ),
-    "Ms": _station_query(lambda name, station: StationRecord(name, station.enhancement, station.compass)),
-    "Mp": _station_query(lambda name, station: PredictionReply(name, station.prediction_ms)),
-    "MQ": _station_query(lambda name, station: SensitivityReply(name, station.sensitivity)),
-    "MG": _device_query(lambda settings: GenlockReply(settings.genlock, settings.genlock_hz)),
-    "MU": _device_query(lambda settings: IntegerReply("1", "U", settings.timeout_ms)),
-    "Mg": _device_query(lambda settings: IntegerReply("1", "g", settings.gain)),
+    "Ms": _station_query(lambda name, station: replies.StationRecord(name, station.enhancement, station.compass)),
+    "Mp": _station_query(lambda name, station: replies.PredictionReply(name, station.prediction_ms)),
+    "MQ": _station_query(lambda name, station: replies.SensitivityReply(name, station.sensitivity)),
+    "MG": _device_query(lambda settings: replies.GenlockReply(settings.genlock, settings.genlock_hz)),
+    "MU": _device_query(lambda settings: replies.IntegerReply("1", "U", settings.timeout_ms)),
+    "Mg": _device_query(lambda settings: replies.IntegerReply("1", "g", settings.gain)),
     "MCF": _emitter_list,
     "MCI": _station_query(
-        lambda name, station: IntegerReply(
+        lambda name, station: replies.IntegerReply(
             name, "I", 1 + STATION_NAMES.index(name) if station.active else _NO_INERTIA_CUBE
         )
     ),
