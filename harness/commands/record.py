@@ -205,8 +205,7 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
         exchanges = record_commands(
             args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
         )
-    content = [exchange.as_dict() for exchange in exchanges]
-    return _print_recording(args, writer, more={"exchanges": content}, lines=format_exchanges(content))
+    return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
 
 
 def _print_recording(

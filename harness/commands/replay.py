@@ -73,8 +73,7 @@ def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
 
 def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness.stream.recording.command_recording import format_exchanges
-    from harness.stream.recording.frame_table import FRAME_COLUMNS, format_csv_row, frame_rows
-    from harness.stream.station_counts import StreamSummary
+    from harness.stream.station_counts import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:

@@ -1,11 +1,12 @@
 """Counts of what the stations of a stream reported: records, readings, suspect ones and quality."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.csv_text import csv_line
 from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
 from harness.stream.frame import TrackerFrame
@@ -96,3 +97,48 @@ class StreamSummary:
             rows.append([station, *shares, str(counts.suspect[i]), format_fixed(float(counts.mean_quality[i]), 2)])
         table = Table(["station", "with a record", "position", "orientation", "suspect", "mean quality"], rows)
         return "\n".join([head, "", *table.lines()])
+
+
+FRAME_COLUMNS = (
+    "received_s",
+    "wall_s",
+    "station",
+    "measured_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "position_valid",
+    "orientation_valid",
+    "quality",
+    "suspect",
+)
+
+
+def frame_rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterator[dict[str, Any]]:
+    """Yield one row per station, keyed by `FRAME_COLUMNS`; None for numbers that are missing or not valid."""
+    for i, station in enumerate(stations):
+        numbers = (frame.measured_s[i], *frame.position_m[i], *frame.tracker_from_station[i])
+        values = (
+            frame.received_s,
+            wall_s,
+            station,
+            *(None if number != number else float(number) for number in numbers),
+            bool(frame.position_valid[i]),
+            bool(frame.orientation_valid[i]),
+            float(frame.quality[i]),
+            bool(frame.suspect[i]),
+        )
+        yield dict(zip(FRAME_COLUMNS, values, strict=True))
+
+
+def format_csv_row(row: dict[str, Any]) -> str:
+    """Format a row as a CSV line.
+
+    Floats have full precision, so that they read back unchanged. Booleans are 1 and 0.
+    """
+    values = (row[name] for name in FRAME_COLUMNS)
+    return csv_line(int(value) if isinstance(value, bool) else value for value in values)[:-1]

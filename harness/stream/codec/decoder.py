@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.stream.codec import ascii_records as text
 from harness.stream.codec.items import (
     HEADER_BYTES,
     RECORD_HEAD,
@@ -24,7 +23,7 @@ from harness.stream.codec.items import (
     resolve_items,
     terminator,
 )
-from harness.stream.codec.records import RecordFormat, Table
+from harness.stream.codec.records import RecordFormat, Table, item_pattern, parse_records
 
 
 class RecordLayout:
@@ -49,7 +48,7 @@ class RecordLayout:
         if self._binary:
             return np.frombuffer(buffer, record_type(self.items, self._stylus_bytes), count, offset)
         raw = np.frombuffer(buffer, np.uint8, count * self.size, offset).reshape(count, self.size)
-        return text.parse_records(self.items, raw, self._stylus_bytes)
+        return parse_records(self.items, raw, self._stylus_bytes)
 
     def _expression(self, item: OutputItem) -> bytes:
         if item.fixed:
@@ -57,7 +56,7 @@ class RecordLayout:
         if item.sevens:
             return rb"[\x80-\xff][\x00-\x7f]{%d}" % (item.count - 1)
         if item.width and not self._binary:
-            return text.item_pattern(item)
+            return item_pattern(item)
         return b".{%d}" % np.dtype((item.kind, item.count)).itemsize
 
 

@@ -10,7 +10,7 @@ from harness.stream.codec.datagram import DATAGRAM_FORMAT, DATAGRAM_LIST, Datagr
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.reader import WireFormat
 from harness.stream.driver.configurator import MIN_RECORDS, estimate_rate_hz
-from harness.stream.driver.detection import NoAnswer
+from harness.stream.driver.connection import NoAnswer
 from harness.stream.driver.stations import StationWatch
 from harness.stream.driver.tracker import Tracker
 from harness.stream.driver.transport import LineLost

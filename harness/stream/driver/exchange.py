@@ -1,6 +1,5 @@
 """Commands and their answers, one after another, with a device that is left as it is: nothing else is set."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,33 +14,15 @@ from harness.stream.codec.records import RecordFormat
 from harness.stream.driver.connection import DeviceConnection
 
 Answer = dict[str, Any]
-"""A decoded answer: its kind and its values."""
+"""A decoded answer: its kind and its values; or a command with all of its answers."""
 _CONTROLS = ("buttons", "joystick")
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """A command and what came back."""
+def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Answer:
+    """Send a command as a person writes it, and return it with what comes back until silence; bytes are hexadecimal.
 
-    command: str
-    """The command as a person writes it, such as `O1` or `^Q`."""
-    sent: bytes
-    received: bytes
-    answers: tuple[Answer, ...]
-    """Each reply, data record and stretch of other bytes, in sequence. Records have SI units."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the content as JSON has it; bytes are hexadecimal."""
-        return {
-            "command": self.command,
-            "sent": self.sent.hex(" "),
-            "received": self.received.hex(" "),
-            "answers": list(self.answers),
-        }
-
-
-def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exchange:
-    """Send a command and collect what comes back, until silence. `wire` is the format of data records, if known.
+    `answers` are each reply, data record and stretch of other bytes, in sequence, with SI units. `wire` is the format
+    of data records, if known.
 
     A device that streams never falls silent; it is heard for twice `answer_s`. `C` has no answer but the stream itself,
     of which nothing is collected.
@@ -50,7 +31,12 @@ def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exch
     sent = command.line if command.immediate else command.line + b"\r\n"
     line.send(sent)
     received = b"" if sent == commands.STREAM else line.listen_until_silence()
-    return Exchange(text, sent, received, decode_answers(received, wire))
+    return {
+        "command": text,
+        "sent": sent.hex(" "),
+        "received": received.hex(" "),
+        "answers": list(decode_answers(received, wire)),
+    }
 
 
 def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireFormat:

@@ -15,8 +15,15 @@ from harness.stream.codec.replies import Emitter, OutputList, StatusRecord
 from harness.stream.driver.broadcast import Is900Broadcast
 from harness.stream.driver.config import DriverConfig
 from harness.stream.driver.configurator import DeviceConfigurator
-from harness.stream.driver.connection import DeviceConnection, DriverClosed
-from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
+from harness.stream.driver.connection import (
+    DetectedDevice,
+    DeviceConnection,
+    DriverClosed,
+    NoAnswer,
+    candidate_baud_rates,
+    detect_device,
+    query_status,
+)
 from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
 from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
 from harness.stream.driver.tracker import Tracker

@@ -12,12 +12,11 @@ from harness.stream.codec.commands import Command, CommandReader
 from harness.stream.codec.items import missing_items
 from harness.stream.codec.replies import DeviceError, StatusRecord, TrackingStatus, UnknownReply
 from harness.stream.codec.samples import DeviceSamples
-from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN_COMMAND, CommandArgument, CommandError
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device_state import DeviceState
 from harness.stream.emulator.setting_commands import QUERIES, SET_ONLY_COMMANDS, SETTER_COMMANDS, SINGLE_FIELD_SETTERS
-from harness.stream.emulator.settings import STATION_NAMES
+from harness.stream.emulator.settings import STATION_NAMES, boresight
 
 
 def _report_status(device: DeviceState, now_s: float) -> None:
@@ -47,7 +46,7 @@ def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, ful
     name = argument.station()
     if name in device.rounds.plugged:
         present = device.rounds.orientation(now_s, name, device.settings)
-        station = geometry.boresight(device.settings.station(name), present, full)
+        station = boresight(device.settings.station(name), present, full)
         device.settings = device.settings.with_station(name, station)
 
 

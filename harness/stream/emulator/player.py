@@ -8,9 +8,8 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.samples import MAX_RANGES, DeviceSamples
-from harness.stream.emulator import geometry
 from harness.stream.emulator.config import CONTROL_PATTERNS, EmulatorConfig
-from harness.stream.emulator.settings import DeviceSettings, StationSettings
+from harness.stream.emulator.settings import DeviceSettings, StationSettings, apply_station_settings
 
 _SAME_TIME_S = 1e-9
 """Times closer than this count as equal [s]."""
@@ -145,9 +144,7 @@ class RoundEncoder:
         buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
         for row, (name, station) in enumerate(zip(self.plugged, self._stations(settings), strict=True)):
             if not station.plain:
-                position_m[row], orientation[row] = geometry.apply_station_settings(
-                    position_m[row], orientation[row], station
-                )
+                position_m[row], orientation[row] = apply_station_settings(position_m[row], orientation[row], station)
             if self._is_lost(name, settings):
                 quality[row] = 0.0
         return RecordValues(stamps_s, position_m, orientation, quality, buttons, joystick)

@@ -10,7 +10,6 @@ from harness.errors import HarnessError
 from harness.stream.codec import replies
 from harness.stream.codec.items import record_type
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
-from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import MISSING, OUT_OF_RANGE, CommandArgument, CommandError
 from harness.stream.emulator.config import SUPPORTED_BAUD_RATES
 from harness.stream.emulator.settings import (
@@ -19,6 +18,9 @@ from harness.stream.emulator.settings import (
     ZERO_VECTOR,
     DeviceSettings,
     StationSettings,
+    align,
+    alignment_cm,
+    clear_boresight,
 )
 
 Setter = Callable[[DeviceSettings, CommandArgument], DeviceSettings]
@@ -44,7 +46,7 @@ def _set_output_list(settings: DeviceSettings, argument: CommandArgument) -> Dev
 def _set_alignment(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     name = argument.station()
     origin, on_x, on_y = _CM * np.array(argument.numbers(9)).reshape(3, 3)
-    aligned = geometry.align(settings.station(name), origin, on_x, on_y)
+    aligned = align(settings.station(name), origin, on_x, on_y)
     if aligned is None:
         raise CommandError(OUT_OF_RANGE, 2)
     return settings.with_station(name, aligned)
@@ -52,7 +54,7 @@ def _set_alignment(settings: DeviceSettings, argument: CommandArgument) -> Devic
 
 def _clear_boresight(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     name = argument.station()
-    return settings.with_station(name, geometry.clear_boresight(settings.station(name)))
+    return settings.with_station(name, clear_boresight(settings.station(name)))
 
 
 def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -257,7 +259,7 @@ def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterab
 QUERIES: dict[str, Query] = {
     "O": _station_query(lambda name, station: replies.OutputList(name, station.items)),
     "l": _station_states,
-    "A": _station_query(lambda name, station: replies.GeometryReply(name, "A", geometry.alignment_cm(station))),
+    "A": _station_query(lambda name, station: replies.GeometryReply(name, "A", alignment_cm(station))),
     "G": _station_query(lambda name, station: replies.GeometryReply(name, "G", station.reference_deg)),
     "H": _station_query(lambda name, station: replies.GeometryReply(name, "H", station.hemisphere)),
     "N": _station_query(

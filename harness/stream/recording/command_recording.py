@@ -10,9 +10,15 @@ from harness.errors import BadInput
 from harness.stream.codec.commands import find_danger, parse_command
 from harness.stream.codec.reader import WireFormat
 from harness.stream.driver import DriverConfig, DriverTiming
-from harness.stream.driver.connection import WAKE_UP, DeviceConnection, Host
-from harness.stream.driver.detection import NoAnswer, candidate_baud_rates, detect_device
-from harness.stream.driver.exchange import Exchange, exchange, read_wire_format
+from harness.stream.driver.connection import (
+    WAKE_UP,
+    DeviceConnection,
+    Host,
+    NoAnswer,
+    candidate_baud_rates,
+    detect_device,
+)
+from harness.stream.driver.exchange import Answer, exchange, read_wire_format
 from harness.stream.driver.transport import LineLost
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
@@ -28,7 +34,7 @@ _LONGEST_LINE = 240
 
 
 def format_exchanges(exchanges: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Format commands with their answers (`Exchange.as_dict`) as lines."""
+    """Format commands with their answers (`driver.exchange`) as lines."""
     return [line for exchange in exchanges for line in _format_exchange(exchange)]
 
 
@@ -79,7 +85,7 @@ def record_commands(
     progress: Callable[[str], None] = lambda line: None,
     timing: DriverTiming | None = None,
     host: Host | None = None,
-) -> list[Exchange]:
+) -> list[Answer]:
     """Send commands one after another, record everything that passes, and return the commands with their answers.
 
     The device is stopped before the first command and after the last. A device that streams at the end is
@@ -91,7 +97,7 @@ def record_commands(
     def connect(baud: int | None) -> DeviceConnection:
         return DeviceConnection(used_host.open(port, baud or 115200), used_host, writer, used_timing)
 
-    exchanges: list[Exchange] = []
+    exchanges: list[Answer] = []
     streaming = False
     detected = detect_device(port, candidate_baud_rates(port, config), connect, used_timing.answer_s)
     line = detected.line
@@ -105,7 +111,7 @@ def record_commands(
                 streaming = text == STREAM or (streaming and text != STOP)
                 answer = exchange(line, text, wire)
                 exchanges.append(answer)
-                writer.on_answer(answer.as_dict())
+                writer.on_answer(answer)
             _listen(line, math.inf if seconds is None and streaming else seconds or 0.0, writer, progress)
     except LineLost as lost:
         raise NoAnswer(f"Port {port}: {lost.why}.", "What arrived before is recorded.") from lost

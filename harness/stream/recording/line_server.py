@@ -17,8 +17,7 @@ from harness.errors import BadFile, BadInput
 from harness.stream.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
 from harness.stream.codec.reader import WireFormat
 from harness.stream.driver.config import DriverConfig, DriverTiming
-from harness.stream.driver.connection import DeviceConnection, Host
-from harness.stream.driver.detection import NoAnswer, candidate_baud_rates, detect_device
+from harness.stream.driver.connection import DeviceConnection, Host, NoAnswer, candidate_baud_rates, detect_device
 from harness.stream.driver.exchange import read_wire_format
 from harness.stream.driver.transport import LineLost, SelectTransport
 from harness.stream.emulator.pty_port import ClientPty, check_link_is_free

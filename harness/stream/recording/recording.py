@@ -311,7 +311,7 @@ class RecordingWriter:
         self.counts[MARK] += 1
 
     def on_answer(self, content: Mapping[str, Any]) -> None:
-        """Write a command with its answer (`Exchange.as_dict`), as much of it as fits; `recv` blocks have all of it."""
+        """Write a command with its answer (`driver.exchange`), as much of it as fits; `recv` blocks have all of it."""
         fitting = {**content, "received": content["received"][: 3 * _MAX_ANSWER_BYTES]}
         while len(json.dumps(fitting)) > MAX_PAYLOAD_BYTES:
             fitting["answers"] = fitting["answers"][: len(fitting["answers"]) // 2]

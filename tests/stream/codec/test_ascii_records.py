@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.codec import ascii_records as text
 from harness.stream.codec import items
+from harness.stream.codec import records as text
 from harness.stream.codec.decoder import Decoder, RecordRun, merge_adjacent
 from harness.stream.codec.readings import Readings, decode_readings
 from harness.stream.codec.records import (

@@ -8,9 +8,9 @@ import pytest
 
 from harness.errors import BadInput, UnknownName
 from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.device_state import SentMessage
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault, FaultInjector
-from harness.stream.emulator.serial_line import SentMessage
 from tests.stream.emulator.played import make_samples
 
 SET_UP = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfuMZ\rC"
