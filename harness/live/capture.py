@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Generic, TypeVar
@@ -53,13 +52,8 @@ class DroppingQueue(Generic[T]):
         self._items.put(None)
 
 
-@dataclass(frozen=True, slots=True)
-class CapturedFrame:
-    """A frame, and when it came out of the stream."""
-
-    frame: TrackerFrame
-    captured_s: float
-    """Host monotonic clock when the stream delivered the frame [s]."""
+CapturedFrame = tuple[TrackerFrame, float]
+"""A frame, and the time on the host's monotonic clock at which the stream delivered it [s]."""
 
 
 class CaptureThread:
@@ -87,7 +81,7 @@ class CaptureThread:
         try:
             for frame in self._stream:
                 self.frames += 1
-                self._queue.put(CapturedFrame(frame, self._clock()))
+                self._queue.put((frame, self._clock()))
         except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:
