@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.calibrate.performer_preview import PerformerPose
+from harness.calibrate.poses import POSES
+from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile, BadInput
-from harness.live.viewer import ViewerOutput, _prepare_folder
+from harness.live.viewer import SHEET_NAME, ViewerOutput, _prepare_folder, draw_poses
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
@@ -140,3 +143,19 @@ def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:
     assert np.abs(pair[580:] - later[580:]).max() > 0.3 * pair.max()
     assert np.abs(alone - next_alone).max() < 0.02 * alone.max()
     assert np.abs(pair - next_pair).max() < 0.02 * pair.max()
+
+
+pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
+
+
+def test_each_pose_and_all_on_a_sheet(tmp_path: Path) -> None:
+    drawn = draw_poses(POSES[:2], standard_skeleton(), tmp_path, force=False)
+    assert [path.name for path in drawn] == ["pose_1.png", "pose_2.png", SHEET_NAME]
+    assert sorted(tmp_path.iterdir()) == drawn
+    pictures = [Image.open(path).convert("RGB") for path in drawn]
+    assert pictures[0].size == pictures[1].size == (640, 640)
+    assert pictures[0].tobytes() != pictures[1].tobytes()
+    assert pictures[2].size == (1280, 354)
+    (tmp_path / "00000001.png").write_text("of a session")
+    with pytest.raises(BadFile, match="there are 1 pictures in it"):
+        draw_poses(POSES[:2], standard_skeleton(), tmp_path, force=False)

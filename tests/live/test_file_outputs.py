@@ -85,7 +85,7 @@ KILLED = """
 import os, sys
 import numpy as np
 from pathlib import Path
-from tests.live.test_incremental_file import BODY, RATE_HZ, walked, written
+from tests.live.test_file_outputs import BODY, RATE_HZ, walked, written
 written(Path(sys.argv[1]), walked(np.random.default_rng(1), 90), list(range(90)))
 os.kill(os.getpid(), 9)
 """
