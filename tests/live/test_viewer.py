@@ -44,6 +44,9 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
         for number in range(1, 2001):
             shown.send(live_pose(qpos, number, kinematics=kinematics))
         found = wait_for(2, tmp_path / "frames")
+        shown._process.kill()
+        with pytest.raises(OSError, match="ended"):
+            shown.send(live_pose(qpos))
     finally:
         shown.close()
     found = sorted((tmp_path / "frames").glob("*.png"))
@@ -68,14 +71,6 @@ def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
     _prepare_folder(tmp_path, force=False)
 
 
-def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
-    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
-    shown._process.kill()
-    with pytest.raises(OSError, match="ended"):
-        shown.send(live_pose(humanoid.tpose(OWN)))
-    shown.close()
-
-
 def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadInput, match="needs a folder"):
         ViewerOutput("frames", OWN, force=False)
@@ -87,19 +82,6 @@ def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "file").write_text("")
     with pytest.raises(BadFile, match="cannot be created"):
         ViewerOutput("frames", OWN, tmp_path / "file", force=False)
-
-
-def test_a_pose_is_shown_until_the_next(tmp_path: Path) -> None:
-    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
-    try:
-        for number in (1, 2):
-            shown.show_pose(number, np.array(humanoid.tpose(OWN)))
-            until_s = time.monotonic() + 60.0
-            while not (tmp_path / f"{number:08d}.png").exists() and time.monotonic() < until_s:
-                time.sleep(0.02)
-    finally:
-        shown.close()
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["00000001.png", "00000002.png"]
 
 
 def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:

@@ -100,32 +100,6 @@ def test_chunks_change_only_the_times_of_reception(chunk: int) -> None:
         assert all(np.array_equal(a, b) for a, b in zip(station_columns(first), station_columns(second), strict=True))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["flipped", "lost", "added"])
-def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
-    kind: str, rng: np.random.Generator
-) -> None:
-    """Readings that are missing, changed or no longer trusted: one, rarely two, and never three in 600 trials."""
-    costs = []
-    for trial in range(600):
-        stamp_s = stamps_s(ROUNDS)
-        data = device_bytes(stamp_s, seed=trial)
-        truth = reading_rows(decode_frames(in_chunks(data, stamp_s)))
-        at = int(rng.integers(RECORD, len(data) - RECORD))
-        bit, byte = 1 << int(rng.integers(8)), bytes([int(rng.integers(256))])
-        if kind == "flipped":
-            data = data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
-        else:
-            data = data[:at] + byte * (kind == "added") + data[at + (kind == "lost") :]
-        frames = decode_frames(in_chunks(data, stamp_s))
-        trusted = reading_rows([f for f in frames if not f.suspect.any()]) | {
-            row for f in frames for row in reading_rows([f]) if not f.suspect[int(row[-1])]
-        }
-        costs.append(len(truth - trusted))
-    assert np.mean(np.array(costs) > 1) < 0.05, np.bincount(costs)
-    assert max(costs) <= 2, np.bincount(costs)
-
-
 def test_replies_and_garbage_are_counted_and_not_mistaken_for_records() -> None:
     stamp_s = stamps_s(ROUNDS)
     data = device_bytes(stamp_s)
@@ -170,7 +144,7 @@ def check_sound(frames: list[TrackerFrame]) -> None:
     assert all(a < b for a, b in pairwise(received_s)), "host times strictly increase"
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_frames_are_sound_whatever_records_contain(choose: st.DataObject) -> None:
     """Well-formed records with any bytes in them: signalling NaN, infinities, erratic times, any sequence."""
@@ -201,7 +175,7 @@ def test_frames_stay_sound_with_many_damaged_bytes(share: float) -> None:
         assert sum(int(f.position_valid.sum()) for f in frames) >= 0.9 * intact
 
 
-@pytest.mark.parametrize("trials", [500, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("trials", [200, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_a_record_with_a_wrong_station_is_always_marked(trials: int) -> None:
     """Among sound records, sequence or time reveals it.
 
@@ -215,32 +189,6 @@ def test_a_record_with_a_wrong_station_is_always_marked(trials: int) -> None:
         for frame in decode_frames(in_chunks(bytes(data), stamp_s)):
             for row in np.flatnonzero(frame.position_valid & ~frame.suspect):
                 assert np.abs(frame.position_m[row] - row).max() < 0.3, (trial, record, row)
-
-
-@pytest.mark.slow
-def test_a_million_mutations() -> None:
-    """Bytes lost, added, changed, swapped and repeated in long captures: no crash, bounded memory, sound frames."""
-    rng, mutations = np.random.default_rng(1), 0
-    while mutations < 1_000_000:
-        stamp_s = stamps_s(500)
-        data = bytearray(device_bytes(stamp_s, seed=mutations))
-        for _ in range(int(rng.integers(1, 2000))):
-            at = int(rng.integers(len(data)))
-            kind = int(rng.integers(4))
-            if kind == 0:
-                del data[at]
-            elif kind == 1:
-                data.insert(at, int(rng.integers(256)))
-            elif kind == 2:
-                data[at] = int(rng.integers(256))
-            else:
-                data[at : at + 50] = data[at : at + 50] * 2
-            mutations += 1
-        reader, frames = FrameReader(FOUR), []
-        for k in range(0, len(data), 1000):
-            frames += reader.feed(bytes(data[k : k + 1000]), 100.0 + k / 1000.0 * 0.2)
-            assert reader.pending < 300
-        check_sound([*frames, *reader.finish()])
 
 
 def record_chunks(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:

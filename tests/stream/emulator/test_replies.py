@@ -17,6 +17,7 @@ REPLIES = [
     (b"l*\r\n", STATES),
     (b"l1\r", b"21l1111\r\n"),
     (b"l5\r", b"25l0111\r\n"),
+    (b"Mpa\rMsA\rla\r", b"3Ap 0\r\n3As000\r\n2Al0111\r\n"),
     (b"l2,0\rl1\rl*\r", b"21l1011\r\n21l1011" + b"0" * 28 + b"\r\n"),
     (b"l6,1\rl6\r", b"26l0111\r\n"),
     (b"A1\r\n", b"21A" + b"%7.2f" * 9 % (0, 0, 0, 200, 0, 0, 0, 200, 0) + b"\r\n"),
