@@ -1,4 +1,4 @@
-"""The capture thread, which only reads the tracker, so that no byte waits while a pose is solved."""
+"""The capture thread, which only reads the tracker, and the queue to the solving thread: no byte waits for a pose."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,9 @@
-"""Live output to a table of poses with the times of every frame, to join them with other recordings."""
+"""Live output to files: a table of poses with the times of every frame, and BVH.
+
+Every frame that was saved is in them, however the program ends. Between two saves nothing is written, so that a file
+ends with a whole line whenever the process is killed. An existing file is refused unless `force` is set, and is then
+replaced when the first frame is saved.
+"""
 
 import os
 from io import FileIO

@@ -1,4 +1,4 @@
-"""Shared memory through which a live session hands every frame to a viewer's process without waiting for it."""
+"""Shared memory through which a live session hands poses to a viewer's process without waiting for it."""
 
 from dataclasses import dataclass
 from typing import Any, Literal

@@ -2,6 +2,9 @@
 
 The messages are those of protocol.vmc.info ("Marionette" specification, V2.7): `/VMC/Ext/OK`, `/VMC/Ext/T`,
 `/VMC/Ext/Root/Pos` and a `/VMC/Ext/Bone/Pos` for each bone: name, position x, y, z [m], quaternion x, y, z, w.
+
+Unity's axes are left-handed: x right, y up, z forward. In VRM avatars, and so in the VMC protocol, every rotation is
+the identity in the T-pose, and bones keep their distances. docs/device.md has the table of bones.
 """
 
 import socket

@@ -1,4 +1,4 @@
-"""Counts of what the stations of a stream reported: records, readings, suspect ones and quality."""
+"""Frames in numbers: counts of what stations reported, a summary of a stream, and rows for other programs."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any

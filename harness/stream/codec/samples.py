@@ -1,4 +1,6 @@
-"""The readings that an emulated device plays in a loop."""
+"""The readings that an emulated device plays in a loop, and what its filter knows besides: prediction, enhancement,
+ranges.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Exchange with the device: queries and replies over a line that may carry data records as well."""
+"""Exchange with the device over a line that may carry data records as well, and detection of a device at a port."""
 
 import re
 import time

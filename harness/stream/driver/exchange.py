@@ -7,7 +7,7 @@ import numpy as np
 from harness.errors import BadInput
 from harness.stream.codec import commands, replies
 from harness.stream.codec.commands import parse_command
-from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
+from harness.stream.codec.decoder import Decoder, DecoderEvent, RecordRun, Reply
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.readings import decode_readings
 from harness.stream.codec.records import RecordFormat
@@ -35,7 +35,7 @@ def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Answ
         "command": text,
         "sent": sent.hex(" "),
         "received": received.hex(" "),
-        "answers": list(decode_answers(received, wire)),
+        "answers": decode_answers(received, wire),
     }
 
 
@@ -71,23 +71,20 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
     return WireFormat(states.stations, rate_hz, items.pop(), settings, characters, zeroed=False)
 
 
-def decode_answers(data: bytes, wire: WireFormat | None) -> tuple[Answer, ...]:
+def decode_answers(data: bytes, wire: WireFormat | None) -> list[Answer]:
     """Decode replies, and data records where their format is known."""
     if wire is None:
-        return tuple(_decode_reply(line) for line in data.split(b"\n") if line.strip(b"\r"))
+        return [_decode_reply(line) for line in data.split(b"\n") if line.strip(b"\r")]
     decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
     events: list[DecoderEvent] = [*decoder.feed(data), *decoder.finish()]
-    return tuple(answer for event in events for answer in _decode_event(event, data, wire))
-
-
-def _decode_event(event: DecoderEvent, data: bytes, wire: WireFormat) -> list[Answer]:
-    match event:
-        case Reply():
-            return [_decode_reply(event.line)]
-        case Garbage():
-            return [_decode_reply(data[event.offset : event.offset + event.size])]
-        case RecordRun():
-            return _decode_records(event, wire)
+    answers: list[Answer] = []
+    for event in events:
+        if isinstance(event, RecordRun):
+            answers += _decode_records(event, wire)
+        else:
+            line = event.line if isinstance(event, Reply) else data[event.offset : event.offset + event.size]
+            answers.append(_decode_reply(line))
+    return answers
 
 
 def _decode_reply(line: bytes) -> Answer:

@@ -1,4 +1,4 @@
-"""Selection of the device's stations that are read, and their names."""
+"""The stations of the device that are read, and which of them fall silent or come back."""
 
 import math
 from collections.abc import Collection, Mapping

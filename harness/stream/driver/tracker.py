@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
-from harness.stream.codec.continuous_reader import ContinuousFrameReader
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ContinuousFrameReader, WireFormat
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.connection import DeviceConnection, DriverClosed, Host
 from harness.stream.driver.transport import LineLost, Transport

@@ -98,20 +98,17 @@ class EmulatorConfig:
             raise BadInput(
                 f"identification {self.identification!r} is not possible.", "Give up to 31 ASCII characters."
             )
-        if self.status_bytes not in (54, 55):
-            raise BadInput(
-                f"status_bytes = {self.status_bytes} is not possible.", "Status records have 55 or 54 bytes."
-            )
         if self.baud not in SUPPORTED_BAUD_RATES:
             raise BadInput(f"{self.baud} baud.", f"An IS-900 supports {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
-        if self.stylus_bytes not in (1, 2):
-            raise BadInput(f"stylus_bytes = {self.stylus_bytes} is not possible.", "Item 16 has 1 or 2 bytes.")
-        if self.queue_records < 1:
-            raise BadInput(f"queue_records = {self.queue_records} is not possible.", "Give at least 1.")
-        if not 0 < self.udp_port < 65536:
-            raise BadInput(f"udp_port = {self.udp_port} is not possible.", "Give a number from 1 to 65535.")
-        if not 0.0 <= self.restart_s <= 3600.0:
-            raise BadInput(f"restart_s = {self.restart_s:g} is not possible.", "Give a number from 0 to 3600.")
+        for name, possible, advice in (
+            ("status_bytes", self.status_bytes in (54, 55), "Status records have 55 or 54 bytes."),
+            ("stylus_bytes", self.stylus_bytes in (1, 2), "Item 16 has 1 or 2 bytes."),
+            ("queue_records", self.queue_records >= 1, "Give at least 1."),
+            ("udp_port", 0 < self.udp_port < 65536, "Give a number from 1 to 65535."),
+            ("restart_s", 0.0 <= self.restart_s <= 3600.0, "Give a number from 0 to 3600."),
+        ):
+            if not possible:
+                raise BadInput(f"{name} = {getattr(self, name):g} is not possible.", advice)
 
     def plugged(self, stations: int) -> str:
         """Return the characters of this many stations. Raises BadInput when they do not fit."""

@@ -1,4 +1,4 @@
-"""Timing of the played readings: which sample is taken when, and what the device's clock reads then."""
+"""Playing of samples: which reading is taken when, and its record with prediction, enhancement and geometry."""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -19,8 +19,7 @@ from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device_state import SentMessage
 from harness.stream.emulator.emulator import Emulator
-from harness.stream.emulator.port import Port, parse_address
-from harness.stream.emulator.tcp_port import LogCallback, TcpPort
+from harness.stream.emulator.tcp_port import LogCallback, Port, TcpPort, parse_address
 from harness.stream.emulator.udp_broadcast import LOOPBACK, UdpBroadcast, UdpPort
 
 SentCallback = Callable[[SentMessage], None]

@@ -1,4 +1,6 @@
-"""Commands that change a setting and have no reply: settings in, settings out (docs/is900.md 4)."""
+"""Commands that change settings, and queries of settings (docs/is900.md 4 and 6): settings and arguments in, settings or
+replies out.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -20,7 +22,6 @@ from harness.stream.emulator.settings import (
     StationSettings,
     align,
     alignment_cm,
-    clear_boresight,
 )
 
 Setter = Callable[[DeviceSettings, CommandArgument], DeviceSettings]
@@ -50,11 +51,6 @@ def _set_alignment(settings: DeviceSettings, argument: CommandArgument) -> Devic
     if aligned is None:
         raise CommandError(OUT_OF_RANGE, 2)
     return settings.with_station(name, aligned)
-
-
-def _clear_boresight(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    name = argument.station()
-    return settings.with_station(name, clear_boresight(settings.station(name)))
 
 
 def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -178,7 +174,7 @@ SETTER_COMMANDS: dict[str, Setter] = {
 
 SET_ONLY_COMMANDS: dict[str, Setter] = {
     "R": _station_reset(origin_m=ZERO_VECTOR, tracker_from_aligned=IDENTITY_QUATERNION),
-    "b": _clear_boresight,
+    "b": _station_reset(heading_boresight=IDENTITY_QUATERNION, full_boresight=IDENTITY_QUATERNION),
     "o": _set_serial,
     "x": _no_change,
     "v": _no_change,

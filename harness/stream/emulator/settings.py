@@ -1,4 +1,9 @@
-"""All settings of the device as one immutable value, which is saved and restored by keeping it."""
+"""All settings of the device as one immutable value, and the effect of a station's geometry on its readings.
+
+The sources give the purpose of alignment, boresight and tip offset (docs/is900.md 4.1), but neither their sequence nor
+the side of multiplication. Our interpretation is: the tip in the station's axes, then the alignment, then boresight,
+which affects orientation alone.
+"""
 
 from dataclasses import dataclass, field, replace
 

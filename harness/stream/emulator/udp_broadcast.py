@@ -1,4 +1,4 @@
-"""The packets that a device broadcasts by UDP while `MEthUdp` is on (docs/is900.md 9). No I/O; time is an argument."""
+"""The packets that a device broadcasts by UDP while `MEthUdp` is on (docs/is900.md 9), and the socket that sends them."""
 
 import ipaddress
 import socket
@@ -8,8 +8,8 @@ from harness.errors import BadInput
 from harness.stream.codec.datagram import Datagram
 from harness.stream.codec.records import RecordValues, yaw_pitch_roll_deg
 from harness.stream.emulator.device_state import DeviceState
-from harness.stream.emulator.port import check_loopback, parse_address
 from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
+from harness.stream.emulator.tcp_port import check_loopback, parse_address
 
 LOOPBACK = "127.0.0.1"
 

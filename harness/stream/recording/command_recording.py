@@ -1,4 +1,4 @@
-"""Recording of single commands and what a device answers, without any other set-up."""
+"""Recording of single commands and what a device answers, without any other set-up; and the answers as text."""
 
 import math
 import time

@@ -76,14 +76,8 @@ class _LineServer:
         log: Callable[[str], None],
         host: Host,
     ) -> None:
-        self._port, self._link, self._config, self._writer, self._log, self._host = (
-            port,
-            link,
-            config,
-            writer,
-            log,
-            host,
-        )
+        self._port, self._link, self._config = port, link, config
+        self._writer, self._log, self._host = writer, log, host
         self._line: DeviceConnection | None = None
         self._transport: SelectTransport | None = None
         self._pty: ClientPty | None = None

@@ -1,4 +1,4 @@
-"""Recording of a device until told to stop."""
+"""Recording of a device until told to stop, or between two moments of a session."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -145,9 +145,12 @@ def _count_interrupt(counts: dict[str, int]) -> Iterator[None]:
 def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     beyond = f", {health['out_of_range']:.0f} positions out of range" if health["out_of_range"] else ""
-    tracked = int((frame.position_valid | frame.orientation_valid).sum())
     rate = f", {health['rate_hz']:.1f} Hz" if "rate_hz" in health else ""
-    return (
-        f"{health['frames']:.0f} frames{rate}, {tracked} of {len(device.stations)} stations "
-        f"tracked{beyond}, {1e-3 * writer.counts[RECEIVED]:.0f} kB"
-    )
+    kilobytes = 1e-3 * writer.counts[RECEIVED]
+    return f"{health['frames']:.0f} frames{rate}, {tracked_text(frame)}{beyond}, {kilobytes:.0f} kB"
+
+
+def tracked_text(frame: TrackerFrame) -> str:
+    """How many stations are tracked: `3 of 4 stations tracked`."""
+    tracked = int((frame.position_valid | frame.orientation_valid).sum())
+    return f"{tracked} of {len(frame.quality)} stations tracked"

@@ -116,14 +116,16 @@ class Recording:
     @property
     def marks(self) -> list[dict[str, Any]]:
         """Marks of stretches, with the time on the host's clock [s] at which each begins."""
-        blocks = [block for block in self.blocks() if block.kind == MARK]
-        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
+        return self.timed_contents(MARK, self.blocks())
 
     @property
     def answers(self) -> list[dict[str, Any]]:
         """Commands that a person sent, with their answers and the time on the host's clock [s]."""
-        blocks = [block for block in self.blocks() if block.kind == ANSWERED]
-        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
+        return self.timed_contents(ANSWERED, self.blocks())
+
+    def timed_contents(self, kind: str, blocks: Iterable[RecordingBlock]) -> list[dict[str, Any]]:
+        """The JSON of the blocks of a kind, with their time on the host's clock [s]."""
+        return [{"monotonic_s": b.monotonic_s, **self.parse_json(b)} for b in blocks if b.kind == kind]
 
     def format_of(self, configured: RecordingBlock) -> WireFormat:
         """Parse the wire format in a "conf" block. Raises BadFile."""
@@ -187,10 +189,8 @@ def _seek_first_block(path: Path, file: BinaryIO) -> bool:
 
 def read_marks(path: Path) -> list[dict[str, Any]]:
     """Return what `Recording.marks` has, from a file that is read in pieces. Raises BadFile as `read_recording`."""
-    parser = Recording(path, b"")
     with open_recording(path) as file:
-        blocks = (block for block in _whole_blocks(file) if block.kind == MARK)
-        return [{"monotonic_s": block.monotonic_s, **parser.parse_json(block)} for block in blocks]
+        return Recording(path, b"").timed_contents(MARK, _whole_blocks(file))
 
 
 def _noted_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:

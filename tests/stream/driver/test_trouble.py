@@ -11,8 +11,8 @@ import pytest
 from harness.core.seeds import generator
 from harness.experiment.scenario import load_scenario
 from harness.stream.codec.commands import station_command
-from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.items import SHORT_LIST
+from harness.stream.codec.reader import ContinuousFrameReader
 from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import ByteFaultKind, Fault
