@@ -1,4 +1,5 @@
-"""Records of an output list as tables: SI units to items, and items to binary or ASCII bytes and back (docs/is900.md 5).
+"""Records of an output list as tables: SI units to items, and items to binary or ASCII bytes and back
+(docs/is900.md 5).
 
 Numbers of ASCII records are right-aligned in columns and may touch (`-12.50-100.00`), so they are cut by column, never
 at blanks. Items of the 16-bit format have the same bytes as in binary.

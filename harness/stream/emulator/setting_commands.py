@@ -1,5 +1,5 @@
-"""Commands that change settings, and queries of settings (docs/is900.md 4 and 6): settings and arguments in, settings or
-replies out.
+"""Commands that change settings, and queries of settings (docs/is900.md 4 and 6): settings and arguments in,
+settings or replies out.
 """
 
 from collections.abc import Callable, Iterable

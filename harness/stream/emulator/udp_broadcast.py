@@ -1,4 +1,6 @@
-"""The packets that a device broadcasts by UDP while `MEthUdp` is on (docs/is900.md 9), and the socket that sends them."""
+"""The packets that a device broadcasts by UDP while `MEthUdp` is on (docs/is900.md 9), and the socket that sends
+them.
+"""
 
 import ipaddress
 import socket

@@ -152,17 +152,6 @@ def test_a_wrong_baud_rate_gives_noise(link: Path, rate: int, answered: bool) ->
         os.close(client)
 
 
-def test_tcp_serves_one_client_after_another(tmp_path: Path) -> None:
-    with serve_emulator(make_samples(), tcp="127.0.0.1:0") as emulator:
-        address = ("127.0.0.1", int(emulator.name.rpartition(":")[2]))
-        for _ in range(3):
-            with socket.create_connection(address, TIMEOUT_S) as client:
-                client.sendall(b"S")
-                assert read_bytes(client.fileno(), 55)[:6] == b"21S3F0"
-        with pytest.raises(BadInput, match="Choose another port"):
-            open_port(None, f"127.0.0.1:{address[1]}")
-
-
 def connect(emulator: EmulatorServer) -> socket.socket:
     return socket.create_connection(("127.0.0.1", int(emulator.name.rpartition(":")[2])), TIMEOUT_S)
 
@@ -177,6 +166,8 @@ def test_idle_tcp_clients_block_nobody() -> None:
                 assert read_bytes(client.fileno(), 55)[:6] == b"21S3F0"
         partial.sendall(b",21,1\rO1\r")
         assert read_bytes(partial.fileno(), 13) == b"21O 2 421 1\r\n"
+        with pytest.raises(BadInput, match="Choose another port"):
+            open_port(None, emulator.name.removeprefix("tcp://"))
 
 
 def test_a_client_that_has_the_device_keeps_it_until_it_is_idle() -> None:
