@@ -6,11 +6,13 @@ from typing import Any, Literal
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.child_process import FunctionProcess
 from harness.core.estimate import Status
 from harness.live.pose import LivePose
 from harness.stream.frame import TrackerFrame
 
 ViewerKind = Literal["window", "frames"]
+_START_TIMEOUT_S = 60.0
 READY, CLOSED = "ready", "its window was closed"
 """Messages of the viewer's process: the first picture was drawn; the user closed the window."""
 CONFIGURATION = slice(3, 58)
@@ -31,6 +33,16 @@ class ViewerConfig:
     """Folder of the pictures; empty for a window."""
     rate_hz: float
     """Most pictures per second [Hz]."""
+
+
+def first_message(process: FunctionProcess) -> Any:
+    """The first message of a viewer's process, or an OSError that says why there is none."""
+    try:
+        return process.receive(_START_TIMEOUT_S)
+    except TimeoutError:
+        return OSError("it does not answer")
+    except EOFError:
+        return OSError(f"its process ended with exit code {process.exit_code}")
 
 
 class SharedPose:

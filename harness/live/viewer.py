@@ -23,11 +23,11 @@ from harness.core.interrupts import shield_children
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, MissingExtra
 from harness.live.pose import LivePose
-from harness.live.shared_memory import READY, SharedPose, ViewerConfig, ViewerKind
+from harness.live.shared_memory import READY, SharedPose, ViewerConfig, ViewerKind, first_message
 
 _PICTURE_PATTERN = "[0-9]" * 8 + ".png"
 """Names that `viewer_process` gives its pictures; other files in the folder are left alone."""
-_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 2.0
+_END_TIMEOUT_S = 2.0
 _RATE_HZ: dict[ViewerKind, float] = {"window": 30.0, "frames": 4.0}
 """Most pictures per second."""
 
@@ -55,7 +55,7 @@ class ViewerOutput:
             self._shared = SharedPose(SPAWN)
             self._process = FunctionProcess(_run_viewer_process, config, self._shared)
         try:
-            message = self._wait_for_start()
+            message = first_message(self._process)
         except BaseException:
             self.close()
             raise
@@ -63,15 +63,6 @@ class ViewerOutput:
             self.close()
             advice = "Check that this computer has OpenGL, or leave the option out."
             raise BadInput(f"{self.name} cannot be drawn: {message}.", advice)
-
-    def _wait_for_start(self) -> str:
-        """The viewer's first message, or why there is none."""
-        try:
-            return str(self._process.receive(_START_TIMEOUT_S))
-        except TimeoutError:
-            return "it does not answer"
-        except EOFError:
-            return f"its process ended with exit code {self._process.exit_code}"
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""
