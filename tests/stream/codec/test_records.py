@@ -100,23 +100,27 @@ def test_sixteen_bit_form_is_exact_on_its_own_grid() -> None:
 
 
 @pytest.mark.parametrize(
-    ("codes", "length"),
+    ("codes", "ascii_length", "binary_length"),
     [
-        ((2, 4, 1), 29),
-        ((40, 2, 4, 1), 30),
-        ((40, 2, 4, 22, 23, 1), 33),
-        ((2, 4, 22, 23, 1), 32),
-        ((2, 11, 1), 33),
-        ((2, 11, 0), 32),
-        ((2, 11, 21, 0), 36),
-        ((2, 11, 21, 22, 0), 37),
-        ((2, 11, 21, 22, 23, 0), 39),
-        ((40, 2, 11, 21, 1), 38),
-        ((40, 18, 20, 21, 1), 24),
+        ((2, 4, 1), 47, 29),
+        ((40, 2, 4, 1), 51, 30),
+        ((40, 2, 4, 22, 23, 1), 64, 33),
+        ((2, 4, 22, 23, 1), 60, 32),
+        ((2, 11, 1), 54, 33),
+        ((2, 11, 0), 53, 32),
+        ((2, 11, 21, 0), 67, 36),
+        ((2, 11, 21, 22, 0), 72, 37),
+        ((2, 11, 21, 22, 23, 0), 80, 39),
+        ((40, 2, 4, 21, 22, 23, 1), 78, 37),
+        ((40, 2, 11, 21, 1), 72, 38),
+        ((40, 18, 20, 21, 1), 37, 24),
+        ((18, 19, 20, 41, 42, 43, 44, 45, 46, 47, 48, 49), 3 + 20 + 20 + 24 + 28, 3 + 20 + 8 + 12 + 16),
     ],
 )
-def test_binary_lengths_match_the_documented_table(codes: tuple[int, ...], length: int) -> None:
-    assert items.record_size(codes) == length
+def test_lengths_match_the_documented_table(codes: tuple[int, ...], ascii_length: int, binary_length: int) -> None:
+    assert items.record_size(codes) == binary_length
+    assert items.record_size(codes, binary=False) == ascii_length
+    assert len(encode_bytes(codes, random_values(1), ascii_format())) == ascii_length
 
 
 def test_an_item_without_a_known_size_is_refused() -> None:
@@ -246,27 +250,6 @@ def test_example_e_quality_time_buttons_and_joystick() -> None:
         [False],
     )
     np.testing.assert_allclose(readings.measured_s, 12.345, atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("codes", "length"),
-    [
-        ((2, 4, 1), 47),
-        ((40, 2, 4, 1), 51),
-        ((40, 2, 4, 22, 23, 1), 64),
-        ((2, 4, 22, 23, 1), 60),
-        ((2, 11, 1), 54),
-        ((2, 11, 0), 53),
-        ((2, 11, 21, 0), 67),
-        ((2, 11, 21, 22, 0), 72),
-        ((2, 11, 21, 22, 23, 0), 80),
-        ((40, 2, 4, 21, 22, 23, 1), 78),
-        ((18, 19, 20, 41, 42, 43, 44, 45, 46, 47, 48, 49), 3 + 20 + 20 + 24 + 28),
-    ],
-)
-def test_lengths_match_the_documented_table(codes: tuple[int, ...], length: int) -> None:
-    assert items.record_size(codes, binary=False) == length
-    assert len(encode_bytes(codes, random_values(1), ascii_format())) == length
 
 
 def test_adjacent_wide_numbers_are_cut_by_column() -> None:
