@@ -20,9 +20,8 @@ from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import position_range_m
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 

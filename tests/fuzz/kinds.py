@@ -46,10 +46,9 @@ from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
-from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.summary import StreamSummary
+from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
 from harness.study.placement.config import base_scenario, load_placement_study
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING

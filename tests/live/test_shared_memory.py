@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
-from harness.live.pose_ring import PoseRing
+from harness.live.shared_memory import PoseRing
 from tests.live.posing import configuration, live_pose
 
 KINEMATICS = Kinematics(humanoid.build_body())

@@ -1,19 +1,28 @@
-"""Commands that change a setting and have no reply: settings in, settings out (docs/is900.md 4)."""
+"""Commands that change settings, and queries of settings (docs/is900.md 4 and 6): settings and arguments in,
+settings or replies out.
+"""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from harness.errors import HarnessError
+from harness.stream.codec import replies
 from harness.stream.codec.items import record_type
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
-from harness.stream.codec.replies import Emitter
-from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import MISSING, OUT_OF_RANGE, CommandArgument, CommandError
 from harness.stream.emulator.config import SUPPORTED_BAUD_RATES
-from harness.stream.emulator.settings import IDENTITY_QUATERNION, ZERO_VECTOR, DeviceSettings
+from harness.stream.emulator.settings import (
+    IDENTITY_QUATERNION,
+    STATION_NAMES,
+    ZERO_VECTOR,
+    DeviceSettings,
+    StationSettings,
+    align,
+    alignment_cm,
+)
 
 Setter = Callable[[DeviceSettings, CommandArgument], DeviceSettings]
 _CM = 0.01
@@ -38,15 +47,10 @@ def _set_output_list(settings: DeviceSettings, argument: CommandArgument) -> Dev
 def _set_alignment(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     name = argument.station()
     origin, on_x, on_y = _CM * np.array(argument.numbers(9)).reshape(3, 3)
-    aligned = geometry.align(settings.station(name), origin, on_x, on_y)
+    aligned = align(settings.station(name), origin, on_x, on_y)
     if aligned is None:
         raise CommandError(OUT_OF_RANGE, 2)
     return settings.with_station(name, aligned)
-
-
-def _clear_boresight(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    name = argument.station()
-    return settings.with_station(name, geometry.clear_boresight(settings.station(name)))
 
 
 def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -75,7 +79,7 @@ def _set_genlock(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     number = CommandArgument(argument.fields[0]).integer(1, 9999999, start=0)
     x, y, z, nx, ny, nz, identity = argument.numbers(7)
-    emitter = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
+    emitter = replies.Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
     others = (emitter for emitter in settings.draft_emitters if emitter.number != number)
     return replace(settings, draft_emitters=tuple(sorted((*others, emitter), key=lambda emitter: emitter.number)))
 
@@ -170,7 +174,7 @@ SETTER_COMMANDS: dict[str, Setter] = {
 
 SET_ONLY_COMMANDS: dict[str, Setter] = {
     "R": _station_reset(origin_m=ZERO_VECTOR, tracker_from_aligned=IDENTITY_QUATERNION),
-    "b": _clear_boresight,
+    "b": _station_reset(heading_boresight=IDENTITY_QUATERNION, full_boresight=IDENTITY_QUATERNION),
     "o": _set_serial,
     "x": _no_change,
     "v": _no_change,
@@ -200,3 +204,90 @@ SET_ONLY_COMMANDS: dict[str, Setter] = {
 
 SINGLE_FIELD_SETTERS = {"MU", "Mg", "MSchAlg", "MConfigLockMode", "MEthIp", "MEthUdp", "MEthUdpPort"}
 """Those of `SETTER_COMMANDS` that set with their first field."""
+
+
+Query = Callable[[DeviceSettings, CommandArgument], Iterable[replies.ParsedReply]]
+_NO_INERTIA_CUBE = -1
+"""The answer for a station without one (docs/is900.md 14)."""
+_STATE_FLAGS = 32
+"""Number of flags in the reply to `l*`."""
+
+
+def _station_query(reply: Callable[[str, StationSettings], replies.ParsedReply]) -> Query:
+    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
+        name = argument.station()
+        return [reply(name, settings.station(name))]
+
+    return query
+
+
+def _device_query(reply: Callable[[DeviceSettings], replies.ParsedReply]) -> Query:
+    def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
+        argument.require_empty()
+        return [reply(settings)]
+
+    return query
+
+
+def _text_reply(text: str) -> replies.ParsedReply:
+    return replies.UnknownReply(text.encode("ascii"))
+
+
+def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
+    """Reply to `l`; without a station it tells the first four (docs/is900.md 6.3)."""
+    if argument.text.strip() == "*":
+        active = [station.active for station in settings.stations]
+        return [replies.StationStates(None, (*active, *[False] * (_STATE_FLAGS - len(active))))]
+    name = argument.station() if argument.text.strip() else "1"
+    return [replies.StationStates(name, tuple(settings.station(queried).active for queried in (name, *"234")))]
+
+
+def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[replies.ParsedReply]:
+    if not argument.text.strip():
+        return settings.emitters
+    number = argument.integer(1, 9999999, start=0)
+    matches = [emitter for emitter in settings.emitters if emitter.number == number]
+    if not matches:
+        raise CommandError(OUT_OF_RANGE)
+    return matches
+
+
+QUERIES: dict[str, Query] = {
+    "O": _station_query(lambda name, station: replies.OutputList(name, station.items)),
+    "l": _station_states,
+    "A": _station_query(lambda name, station: replies.GeometryReply(name, "A", alignment_cm(station))),
+    "G": _station_query(lambda name, station: replies.GeometryReply(name, "G", station.reference_deg)),
+    "H": _station_query(lambda name, station: replies.GeometryReply(name, "H", station.hemisphere)),
+    "N": _station_query(
+        lambda name, station: replies.GeometryReply(name, "N", tuple(100.0 * value for value in station.tip_m))
+    ),
+    "V": _station_query(lambda name, station: replies.GeometryReply(name, "V", station.envelope_m)),
+    "MS": _device_query(
+        lambda settings: replies.SystemRecord(
+            boresight_as_fastrak=settings.boresight_as_fastrak,
+            microseconds=settings.microseconds,
+            lights=settings.lights,
+        )
+    ),
+    "Ms": _station_query(lambda name, station: replies.StationRecord(name, station.enhancement, station.compass)),
+    "Mp": _station_query(lambda name, station: replies.PredictionReply(name, station.prediction_ms)),
+    "MQ": _station_query(lambda name, station: replies.SensitivityReply(name, station.sensitivity)),
+    "MG": _device_query(lambda settings: replies.GenlockReply(settings.genlock, settings.genlock_hz)),
+    "MU": _device_query(lambda settings: replies.IntegerReply("1", "U", settings.timeout_ms)),
+    "Mg": _device_query(lambda settings: replies.IntegerReply("1", "g", settings.gain)),
+    "MCF": _emitter_list,
+    "MCI": _station_query(
+        lambda name, station: replies.IntegerReply(
+            name, "I", 1 + STATION_NAMES.index(name) if station.active else _NO_INERTIA_CUBE
+        )
+    ),
+    "MLogState": _device_query(lambda settings: _text_reply(f"31LS{int(settings.command_log)}")),
+    "MSchAlg": _device_query(lambda settings: _text_reply(f"31SchAlg{settings.scheduling}")),
+    "MConfigLockMode": _device_query(lambda settings: _text_reply(f"31CLM{settings.lock}")),
+    "MEthIp": _device_query(lambda settings: _text_reply(f"31EI{settings.address}")),
+    "MEthUdp": _device_query(lambda settings: _text_reply(f"31EU{int(settings.udp)}")),
+    "MEthUdpPort": _device_query(lambda settings: _text_reply(f"31EUP{settings.udp_port}")),
+    "MSystemTest1": _device_query(lambda settings: _text_reply("51T1 OK")),
+    "MSystemTest2": _device_query(lambda settings: _text_reply("51T2 OK")),
+}
+"""The reply to each query. Texts after `51T`, `31LS` and so on are ours where no source quotes them."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from harness.simulate.link import TrackerConfig, transmit
-from harness.stream.emulator.message import Message
-from harness.stream.emulator.serial_line import MAX_QUEUED_REPLIES, SerialLine
+from harness.stream.emulator.device_state import Message
+from harness.stream.emulator.emulator import MAX_QUEUED_REPLIES, SerialLine
 
 RECORD = bytes(38)
 

@@ -15,9 +15,8 @@ from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
 from harness.core.humanoid24 import unpack
 from harness.errors import BadFile
-from harness.live.bvh import BvhOutput
+from harness.live.file_outputs import BvhOutput, PoseTableOutput
 from harness.live.pose import LivePose
-from harness.live.pose_table import PoseTableOutput
 from harness.mocap.read.bvh import read_bvh_clip
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.posed_motion import PosedMotion
@@ -86,7 +85,7 @@ KILLED = """
 import os, sys
 import numpy as np
 from pathlib import Path
-from tests.live.test_incremental_file import BODY, RATE_HZ, walked, written
+from tests.live.test_file_outputs import BODY, RATE_HZ, walked, written
 written(Path(sys.argv[1]), walked(np.random.default_rng(1), 90), list(range(90)))
 os.kill(os.getpid(), 9)
 """

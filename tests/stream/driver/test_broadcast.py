@@ -22,8 +22,8 @@ from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, DriverTiming, Is900Broadcast, LineEvent, open_tracker
 from harness.stream.driver.transport import open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator
-from harness.stream.emulator.server import RunningEmulator
-from harness.stream.emulator.udp_port import parse_udp_address
+from harness.stream.emulator.server import EmulatorServer
+from harness.stream.emulator.udp_broadcast import parse_udp_address
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
@@ -42,7 +42,7 @@ def free_port() -> int:
 
 
 @contextmanager
-def broadcast(samples: DeviceSamples | None = None, **config: Any) -> Iterator[tuple[RunningEmulator, str]]:
+def broadcast(samples: DeviceSamples | None = None, **config: Any) -> Iterator[tuple[EmulatorServer, str]]:
     """An emulator that broadcasts, and the port at which the driver hears it."""
     number = free_port()
     options = EmulatorConfig(**{"udp": True, "udp_port": number, **config})
