@@ -17,6 +17,7 @@ from harness.report.comparison.wording import (
     MEANINGS,
     OUTCOME_TITLES,
     clips_of,
+    comparison_sentence,
     count_verdicts,
     deciding_parts,
     excerpt_pair,
@@ -27,7 +28,6 @@ from harness.report.comparison.wording import (
     listed_issues,
     parts_of,
     percent_of_a,
-    sentence,
     sort_by_verdict,
 )
 from harness.report.kit.markup import Markup, join, tag
@@ -48,7 +48,7 @@ from harness.report.kit.page import (
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
-from harness.report.kit.text import list_first, shorten
+from harness.report.kit.text import list_first, truncate
 from harness.report.kit.verdict_badge import verdict_badge
 
 _WIDTH = 160
@@ -104,7 +104,7 @@ def comparison_page(comparison: Comparison) -> Page:
         verb="compare",
         name=f"{comparison.b} against {comparison.a}",
         verdict=Verdict(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
-        headline=sentence(comparison),
+        headline=comparison_sentence(comparison),
         lead=[
             TerminalOnly([Bullets(_cut(parts, _MOST_PRINTED, "{} more lines: --html"), prefix="")]),
             *([Tally(count_verdicts(lines), MARKS, MEANINGS)] if lines else []),
@@ -118,7 +118,7 @@ def comparison_page(comparison: Comparison) -> Page:
             "Training data": list_first(comparison.training_notes, _MOST_NAMED),
             "Cells matched": f"{comparison.matched:,}",
             **{
-                title: f"{len(texts):,} ({list_first([shorten(text, _LETTERS) for text in texts])})"
+                title: f"{len(texts):,} ({list_first([truncate(text, _LETTERS) for text in texts])})"
                 for title, texts in listed_issues(comparison).items()
             },
             "Circumstances": f"differ in {list_first(names, 2 * _MOST_NAMED)}" if names else "the same",

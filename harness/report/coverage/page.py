@@ -21,7 +21,7 @@ def coverage_page(content: CoverageContent) -> Page:
     return Page(
         verb="inspect",
         name=content.name,
-        headline=heading(content),
+        headline=coverage_sentence(content),
         facts={
             "Emitters": content.emitters,
             "Reach": content.reach,
@@ -40,7 +40,7 @@ def coverage_page(content: CoverageContent) -> Page:
     )
 
 
-def heading(content: CoverageContent) -> str:
+def coverage_sentence(content: CoverageContent) -> str:
     """The coverage of the cube in one sentence, and the station that hears least."""
     volume = content.rows[0]
     text = (

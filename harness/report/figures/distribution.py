@@ -11,7 +11,7 @@ from harness.report.figures.selection import FigureSelection
 from harness.report.figures.traces import choose_condition, read_series
 from harness.report.kit.chart import add_legend
 from harness.report.kit.distribution_chart import draw_distribution
-from harness.report.kit.metric_labels import metric_label, quantity
+from harness.report.kit.metric_labels import metric_label, metric_name
 from harness.report.kit.print_figure import PrintFigure
 from harness.report.kit.style import print_line_style
 from harness.report.run.data import WORST_METRICS
@@ -45,7 +45,7 @@ def distribution_figure(run: ConditionSet, selection: FigureSelection) -> PrintF
 
     return PrintFigure(
         "cdf" if metric == WORST_METRICS[0] else f"cdf_{metric}",
-        f"Share of frames whose {quantity(metric)} is below a value: {frames:,} frames of {where}. Curves further left "
+        f"Share of frames whose {metric_name(metric)} is below a value: {frames:,} frames of {where}. Curves further left "
         f"are better. The axis is logarithmic.{describe_absent(condition.series, measured)}{run.missing_note}",
         draw,
         _HEIGHT_MM,

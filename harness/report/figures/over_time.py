@@ -12,7 +12,7 @@ from harness.report.figures.selection import FigureSelection
 from harness.report.figures.traces import choose_condition, rank_highlights, read_series
 from harness.report.kit.chart import add_legend
 from harness.report.kit.highlights import Highlights
-from harness.report.kit.metric_labels import metric_label, quantity
+from harness.report.kit.metric_labels import metric_label, metric_name
 from harness.report.kit.print_figure import PrintFigure
 from harness.report.kit.text import to_file_name
 from harness.report.kit.time_chart import draw_over_time
@@ -42,7 +42,7 @@ def over_time_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigu
     where = f"{clip}{why}" + (f", {condition.name}" if condition.name else "")
     return PrintFigure(
         f"time_{to_file_name(clip)}" + ("" if metric == WORST_METRICS[0] else f"_{metric}"),
-        f"{quantity(metric).capitalize()} over time on {where}. {highlights.description} "
+        f"{metric_name(metric).capitalize()} over time on {where}. {highlights.description} "
         "The warm-up is left out. The axis is logarithmic."
         f"{describe_absent(condition.series, traces)}{run.missing_note}",
         lambda figure: _draw(figure, traces, metric, highlights),

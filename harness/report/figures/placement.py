@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.core.number_format import count_noun
 from harness.errors import NothingMeasured
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.print_figure import PrintFigure
 from harness.report.placement.pareto import draw_pareto, measured_best
 from harness.report.placement.wording import measured_errors
@@ -26,7 +26,7 @@ def placement_figure(folder: Path) -> PrintFigure:
         raise NothingMeasured(folder, len(findings.failures))
 
     def draw(figure: "Figure") -> None:
-        draw_pareto(figure, findings, f"{quantity(findings.metric)} [{findings.unit}]")
+        draw_pareto(figure, findings, f"{metric_name(findings.metric)} [{findings.unit}]")
         handles, names = figure.axes[0].get_legend_handles_labels()
         marks = dict(zip(names, handles, strict=True))
         figure.legend(marks.values(), marks.keys(), loc="outside upper left", ncols=len(marks))
@@ -39,7 +39,7 @@ def _caption(findings: PlacementFindings) -> str:
     few = "" if clips >= MIN_UNITS else " Differences cannot be shown with so few clips, so all sets count as tied."
     failed = len(findings.failures)
     return (
-        f"Mean {quantity(findings.metric)} of sets of stations on {count_noun(clips, 'clip')} of {findings.motion}. "
+        f"Mean {metric_name(findings.metric)} of sets of stations on {count_noun(clips, 'clip')} of {findings.motion}. "
         "Diamonds: the best set of each size with the 95 % interval of its mean, filled if no smaller set is better. "
         f"Circles: sets of the same size that are not significantly worse.{few}"
         + (f" {count_noun(failed, 'cell')} of {findings.planned:,} failed." if failed else "")

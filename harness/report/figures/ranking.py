@@ -5,7 +5,7 @@ from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, check_metric, describe_absent
 from harness.report.figures.selection import FigureSelection
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.print_figure import PrintFigure
 from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, explain_marks
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -27,7 +27,7 @@ def ranking_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure
     return PrintFigure(
         "ranking" if metric == PRIMARY_METRIC else f"ranking_{metric}",
         _caption(run, metric, [each for each, _ in ranked], panels),
-        lambda figure: draw_ranking(figure, panels, quantity(metric), unit),
+        lambda figure: draw_ranking(figure, panels, metric_name(metric), unit),
         _HEIGHT_MM,
     )
 
@@ -38,7 +38,7 @@ def _caption(run: ConditionSet, metric: str, shown: list[RunCondition], panels: 
     )
     fewer = any(len(panel.ranking.clips) < len(each.clips) for each, panel in zip(shown, panels, strict=True))
     clips = " and ".join(counts) + (" that all methods were measured on" if fewer else "")
-    sentences = [f"Mean {quantity(metric)} on {clips}.", explain_marks(panels)]
+    sentences = [f"Mean {metric_name(metric)} on {clips}.", explain_marks(panels)]
     unranked = len(run.conditions) - len(panels)
     sentences += [f"In {count_noun(unranked, 'condition')} the methods share no clip."] if unranked else []
     expected = (name for each in shown for name in each.series)

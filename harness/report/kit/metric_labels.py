@@ -43,11 +43,11 @@ _QUANTITIES = {
 """Metric -> quantity; others are called by their name."""
 
 
-def quantity(metric: str) -> str:
+def metric_name(metric: str) -> str:
     """The quantity of a metric in words, such as "joint angle error"."""
     return _QUANTITIES.get(metric, metric.replace("_", " "))
 
 
 def metric_label(metric: str) -> str:
     """The quantity and its unit, "joint angle error [deg]", as axes and heads of tables show them."""
-    return f"{quantity(metric)} [{DEFINITIONS[metric].unit}]"
+    return f"{metric_name(metric)} [{DEFINITIONS[metric].unit}]"

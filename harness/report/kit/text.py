@@ -21,7 +21,7 @@ def last_line(traceback: str) -> str:
     return (traceback.strip().splitlines() or ["no message"])[-1]
 
 
-def shorten(text: str, most: int) -> str:
+def truncate(text: str, most: int) -> str:
     """The text in one line of at most `most` characters, cut with an ellipsis."""
     text = " ".join(text.split())
     return text if len(text) <= most else f"{text[: most - 1]}…"

@@ -11,7 +11,7 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
 from harness.report.lab.departures import condense_departures
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def check_chart(every: Sequence[Departure], expected_from: str) -> Chart | None:
         return None
     names = [_check_name(check) for check in checks]
     texts = "; ".join(
-        f"{name} {quantity(check.key).of(check.measured)}{', a departure' if check.is_named else ''}"
+        f"{name} {find_quantity(check.key).of(check.measured)}{', a departure' if check.is_named else ''}"
         for name, check in zip(names, checks, strict=True)
     )
     return draw_chart(
@@ -47,7 +47,7 @@ def check_chart(every: Sequence[Departure], expected_from: str) -> Chart | None:
 
 
 def _check_name(check: Departure) -> str:
-    label = quantity(check.key).label
+    label = find_quantity(check.key).label
     return f"{label}, {check.station}" if check.station else label
 
 

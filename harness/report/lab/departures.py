@@ -6,7 +6,7 @@ from harness.core.number_format import count_noun, format_fixed, format_p_value
 from harness.measure.departures import Departure
 from harness.report.kit.page import DataTable
 from harness.report.kit.text import list_first
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity
 
 ALL_STATIONS = "all"
 _CLEAR_RATIO = 0.05
@@ -39,7 +39,7 @@ def condense_departures(checks: Sequence[Departure]) -> list[Departure]:
 
 def _fault(check: Departure) -> str:
     """Name of a departure, and how many times as large it is as expected."""
-    shown = quantity(check.key)
+    shown = find_quantity(check.key)
     of = f" of {check.station}" if check.station else ""
     ratio = _ratio_text(check.measured.value, check.expected.value).removeprefix(", ")
     return f"{shown.label}{of} ({ratio or shown.of(check.measured).number})"
@@ -51,7 +51,7 @@ def departure_texts(checks: Sequence[Departure]) -> list[str]:
 
 
 def _departure_text(check: Departure) -> str:
-    shown = quantity(check.key)
+    shown = find_quantity(check.key)
     name = f"{shown.label[0].upper()}{shown.label[1:]}" + (f" of {check.station}" if check.station else "")
     number = f"{shown.of(check.measured)}, expected {shown.exact(check.expected.value)}"
     return f"{name}: {number}{_ratio_text(check.measured.value, check.expected.value)}."
@@ -70,10 +70,10 @@ def departures_table(checks: Sequence[Departure]) -> DataTable:
     """Measured and expected numbers of checks, the least likely first."""
     rows = [
         [
-            quantity(check.key).label,
+            find_quantity(check.key).label,
             check.station or ALL_STATIONS,
-            quantity(check.key).of(check.measured),
-            quantity(check.key).exact(check.expected.value),
+            find_quantity(check.key).of(check.measured),
+            find_quantity(check.key).exact(check.expected.value),
             format_p_value(check.p),
             format_p_value(check.p_holm),
         ]

@@ -117,14 +117,9 @@ _SUFFIXES: tuple[tuple[str, str, float], ...] = (
 """Ends of keys that have no name here, with their unit."""
 
 
-def quantity(key: str) -> Quantity:
+def find_quantity(key: str) -> Quantity:
     """The name and unit of a key; an unknown key is its own name, with the unit that its end states."""
     if key in _NAMES:
         return _NAMES[key]
     stem = re.sub(r"\.\d+$", "", key)
     return next((Quantity(key, unit, factor) for end, unit, factor in _SUFFIXES if stem.endswith(end)), Quantity(key))
-
-
-def is_known(key: str) -> bool:
-    """Whether the key has a name of its own."""
-    return key in _NAMES

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from harness.core.interval import Interval
 from harness.core.number_format import format_fixed
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.metric_labels import metric_label, quantity
+from harness.report.kit.metric_labels import metric_label, metric_name
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, series_colour
 from harness.results.trust_findings import (
@@ -173,7 +173,7 @@ def equivalence_chart(findings: TrustFindings) -> Chart | None:
     if not rows:
         return None
     texts = "; ".join(
-        f"{row.arm} {quantity(row.metric)} {_in_margins(row.difference, row):.2g}, {row.verdict}" for row in rows
+        f"{row.arm} {metric_name(row.metric)} {_in_margins(row.difference, row):.2g}, {row.verdict}" for row in rows
     )
     return draw_chart(
         "equivalence",
@@ -207,7 +207,7 @@ def _draw_equivalence(figure: "Figure", rows: Sequence[Equivalence]) -> None:
         axes.annotate(text, (1.02, n), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
         reach = max(reach, 1.08 * abs(low), 1.08 * abs(high))
     axes.set_xlim(-reach, reach)
-    label_rows(axes, [f"{row.arm}, {quantity(row.metric)}" for row in rows])
+    label_rows(axes, [f"{row.arm}, {metric_name(row.metric)}" for row in rows])
     axes.set_xlabel("simulation − device [margins]")
 
 

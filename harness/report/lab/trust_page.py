@@ -8,7 +8,7 @@ from functools import partial
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_p_value, format_share
 from harness.errors import Outcome
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.page import (
     Badge,
     Bullets,
@@ -131,7 +131,7 @@ def _what_differs(findings: TrustFindings) -> str:
     """Pairs that contradict, and metrics beyond their margin."""
     pairs = [pair_title(pair) for pair in findings.pairs if pair.verdict == "contradict"]
     beyond = [
-        f"{one.arm} {quantity(one.metric)}" for one in findings.equivalences if one.verdict == "beyond the margin"
+        f"{one.arm} {metric_name(one.metric)}" for one in findings.equivalences if one.verdict == "beyond the margin"
     ]
     parts = []
     if pairs:

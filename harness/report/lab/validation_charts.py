@@ -9,7 +9,7 @@ from harness.measure.validation_report import ResidualSeries, ValidationReport
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, Chart
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +26,8 @@ def offsets_chart(report: ValidationReport) -> Chart | None:
     offsets = {key: report.numbers[key] for key in _OFFSETS if key in report.numbers}
     if len(offsets) < 2 or not all(number.is_measured for number in offsets.values()):
         return None
-    names = [quantity(key).label.removeprefix("time offset ") for key in offsets]
-    shown = [quantity(key).of(number) for key, number in offsets.items()]
+    names = [find_quantity(key).label.removeprefix("time offset ") for key in offsets]
+    shown = [find_quantity(key).of(number) for key, number in offsets.items()]
 
     def draw(figure: "Figure") -> None:
         axes = figure.subplots()

@@ -10,7 +10,7 @@ from harness.measure.validation_report import ValidationReport
 from harness.report.kit.metric_labels import metric_label
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity
 from harness.report.lab.unit_page import capture_text, stretches_table
 from harness.report.lab.validation_charts import offsets_chart, residuals_chart
 from harness.score.metrics import DEFINITIONS
@@ -106,20 +106,22 @@ def registration_sentences(report: ValidationReport) -> list[str]:
         f"({format_share(report.matched_share, 1)})."
     )
     shown = [
-        f"{quantity(key).label}: {quantity(key).of(one)}" for key, one in report.numbers.items() if one.is_measured
+        f"{find_quantity(key).label}: {find_quantity(key).of(one)}"
+        for key, one in report.numbers.items()
+        if one.is_measured
     ]
     return [matched, *([f"Estimated from the capture: {'; '.join(shown)}."] if shown else [])]
 
 
 def _numbers_table(report: ValidationReport) -> DataTable:
     """Time offsets, clock, scale and heading errors with their intervals."""
-    rows = [[quantity(key).label, quantity(key).of(one)] for key, one in report.numbers.items()]
+    rows = [[find_quantity(key).label, find_quantity(key).of(one)] for key, one in report.numbers.items()]
     caption = "Below the estimates: 95 % intervals."
     return DataTable(["number", "estimate"], rows, caption=caption, label="registration")
 
 
 def _number_reasons(report: ValidationReport) -> list[str]:
-    return [f"{quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
+    return [f"{find_quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
 
 
 def _poses_table(report: ValidationReport) -> DataTable:

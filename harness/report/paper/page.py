@@ -101,7 +101,7 @@ def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
     return Page(
         verb="paper",
         name=f"{findings.paper} · {findings.motion}",
-        headline=sentence(claims),
+        headline=claims_sentence(claims),
         lead=[Tally(count_verdicts(printed), MARKS, MEANINGS)] if claims else [],
         facts={
             "Paper": findings.reference,
@@ -139,7 +139,7 @@ def printed_claims(claims: Iterable[BenchmarkStatement], reading: Reading) -> li
     return found if any(claim.reading == reading for claim in found) else []
 
 
-def sentence(claims: Sequence[BenchmarkStatement]) -> str:
+def claims_sentence(claims: Sequence[BenchmarkStatement]) -> str:
     """The number of printed statements of each verdict: with the methods as printed, and with ours."""
     readings = {reading: printed_claims(claims, reading) for reading in READINGS}
     found = {READINGS[reading]: some for reading, some in readings.items() if some}
@@ -189,7 +189,7 @@ def statements_text(findings: PaperFindings) -> str:
     """The printed statements with the results of both readings, in lines of at most `WIDTH` characters."""
     claims, table = all_claims(findings), statements_table(findings)
     head = page_text(Page("", "", findings.reference, {}, []), WIDTH).split("\n")
-    head += [f"{findings.paper} on {findings.motion}, seed {findings.seed}.", sentence(claims)]
+    head += [f"{findings.paper} on {findings.motion}, seed {findings.seed}.", claims_sentence(claims)]
     others = sum(claim.kind != "printed" for claim in claims)
     more = (
         ["", f"{count_noun(others, 'further claim')}: derived, repeated or of speed; see the page."] if others else []

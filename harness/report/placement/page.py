@@ -38,11 +38,11 @@ from harness.report.placement.wording import (
     held_out_error,
     list_sets,
     original_candidates,
+    placement_sentence,
     plain_name,
     power_sentences,
     ranks_by_condition,
     search_gain_sentence,
-    sentence,
     set_error,
     set_name,
     worth_label,
@@ -95,7 +95,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     return Page(
         verb="placement",
         name=findings.name,
-        headline=sentence(findings),
+        headline=placement_sentence(findings),
         lead=[_best_table(findings)],
         facts={
             "Question": findings.title,

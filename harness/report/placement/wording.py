@@ -67,7 +67,7 @@ def _plural(name: str) -> str:
     return " ".join([*before, _IRREGULAR.get(last, f"{last}s")])
 
 
-def sentence(findings: PlacementFindings) -> str:
+def placement_sentence(findings: PlacementFindings) -> str:
     """The answer: the best set of each size that was asked about.
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.

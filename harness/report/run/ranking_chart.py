@@ -5,7 +5,7 @@ from dataclasses import replace
 from harness.compare.ranking import MethodRanking
 from harness.core.number_format import format_number
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, explain_marks
 from harness.report.kit.style import Chart
@@ -39,9 +39,9 @@ def _chart(number: int, title: str, ranking: MethodRanking) -> Chart:
     return draw_chart(
         f"ranking_{number}",
         "Ranking" + (f": {title}" if title else ""),
-        f"Mean {quantity(PRIMARY_METRIC)}. {explain_marks([panel])}{more}",
-        f"Mean {quantity(PRIMARY_METRIC)} [{unit}] of each method: {means}.",
-        lambda figure: draw_ranking(figure, [panel], quantity(PRIMARY_METRIC), unit),
+        f"Mean {metric_name(PRIMARY_METRIC)}. {explain_marks([panel])}{more}",
+        f"Mean {metric_name(PRIMARY_METRIC)} [{unit}] of each method: {means}.",
+        lambda figure: draw_ranking(figure, [panel], metric_name(PRIMARY_METRIC), unit),
         3.0,
         width_in=_WIDTH_IN,
     )

@@ -13,7 +13,7 @@ from harness.core.number_format import format_number
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.highlights import choose_highlights
 from harness.report.kit.markup import Markup, join, tag
-from harness.report.kit.metric_labels import quantity
+from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.motion_player import motion_player
 from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.report.run import charts, parameter_effects, uncertainty
@@ -127,7 +127,7 @@ def _still(run: RunData, window: WorstWindow, plots: Path) -> Still:
     value = format_number(float(trace.errors[window.metric][row]), DEFINITIONS[window.metric].unit)
     where = f"{trace.series} at its worst instant: {trace.clip}, {trace.time_s[row]:.2f} s"
     unit = DEFINITIONS[window.metric].unit
-    return Still(f"{where}, {quantity(window.metric)} {value} {unit}", plots / "worst_instant.png")
+    return Still(f"{where}, {metric_name(window.metric)} {value} {unit}", plots / "worst_instant.png")
 
 
 def _worst_row(run: RunData, window: WorstWindow) -> int:

@@ -11,7 +11,7 @@ from harness.core.number_format import count_noun, format_number
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
 from harness.report.kit.rows import label_rows
 from harness.report.kit.style import GRID, Chart, series_style
-from harness.report.kit.text import shorten, to_file_name
+from harness.report.kit.text import to_file_name, truncate
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
 
@@ -138,7 +138,7 @@ def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tu
         style = series_style(curve.colour_index)
         measured = [n for n, point in enumerate(curve.points) if point.mean is not None]
         x, y = [key.numbers[n] for n in measured], [float(curve.points[n].mean or 0.0) for n in measured]
-        axes.plot(x, y, markersize=4.0, label=shorten(curve.name, _MOST_LETTERS), **style)
+        axes.plot(x, y, markersize=4.0, label=truncate(curve.name, _MOST_LETTERS), **style)
         ends.append((y[-1], curve.name, style["color"]))
         for n in measured:
             low, high = curve.points[n].low, curve.points[n].high
@@ -159,7 +159,7 @@ def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
     """Draw a row for each value with a dot for each series."""
     step = 0.8 / max(len(shown), 1)
     for row, curve in enumerate(shown):
-        style, label = series_style(curve.colour_index), shorten(curve.name, _MOST_LETTERS)
+        style, label = series_style(curve.colour_index), truncate(curve.name, _MOST_LETTERS)
         for value, point in enumerate(curve.points):
             if point.mean is None:
                 continue

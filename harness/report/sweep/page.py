@@ -28,7 +28,7 @@ from harness.report.sweep.charts import (
 )
 from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, unit_of
 from harness.report.sweep.reader import read_sweep
-from harness.report.sweep.wording import FailureGroup, describe_effect, group_failures, list_values, sentence
+from harness.report.sweep.wording import FailureGroup, describe_effect, group_failures, list_values, sweep_sentence
 from harness.results.index import INDEX_FILE
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -55,7 +55,7 @@ def sweep_page(sweep: SweepData) -> Page:
     return Page(
         verb="sweep",
         name=sweep.name,
-        headline=sentence(sweep),
+        headline=sweep_sentence(sweep),
         facts={
             "Scenarios": list_first(sweep.scenarios, 8),
             "Clips": count_clips(sweep.clips, sweep.sampling),
@@ -85,7 +85,7 @@ def sweep_text(sweep: SweepData) -> str:
         Section("Varied keys", "varied", [DataTable(["varied", f"lowest and highest mean {PRIMARY_METRIC}"], effects)]),
         Section("Failures", "failures", [Bullets(failures, prefix="FAILED "), *rest]),
     ]
-    return page_text(Page("sweep", sweep.name, sentence(sweep), {}, sections))
+    return page_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections))
 
 
 def _methods_table(sweep: SweepData) -> DataTable:

@@ -27,7 +27,7 @@ class FailureGroup:
     """Full traceback of the first cell."""
 
 
-def sentence(sweep: SweepData) -> str:
+def sweep_sentence(sweep: SweepData) -> str:
     """Progress and best method, in a few sentences."""
     return f"{progress_sentence(sweep)} {_best(sweep)}".strip()
 

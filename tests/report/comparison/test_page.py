@@ -20,10 +20,10 @@ from harness.report.comparison.wording import (
     MARKS,
     MEANINGS,
     OUTCOME_TITLES,
+    comparison_sentence,
     count_directions,
     count_verdicts,
     line_interval,
-    sentence,
 )
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html
@@ -67,9 +67,9 @@ def test_the_first_line_is_the_verdict() -> None:
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
-    assert said in sentence(shown)
+    assert said in comparison_sentence(shown)
     found = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-    assert f"{OUTCOME_TITLES[shown.outcome]} {sentence(shown)}" in found
+    assert f"{OUTCOME_TITLES[shown.outcome]} {comparison_sentence(shown)}" in found
     assert "nan" not in found.lower().split()
 
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from harness.report.coverage import charts
 from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
 from harness.report.coverage.content import CoverageContent
-from harness.report.coverage.page import coverage_page, heading, place_table, station_table
+from harness.report.coverage.page import coverage_page, coverage_sentence, place_table, station_table
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html, write_page
 from harness.report.kit.style import Chart
@@ -28,11 +28,11 @@ def written(folder: Path, content: CoverageContent) -> Path:
 
 
 def test_the_heading_names_the_coverage_and_the_station_that_hears_least() -> None:
-    assert heading(fabricate_coverage()) == (
+    assert coverage_sentence(fabricate_coverage()) == (
         "9 emitters: three or more are heard in 90 % of the cube below them, at a median DOP of 1.25; "
         "<b>torso</b> hears three for 25 % of golf_p1_01"
     )
-    assert heading(fabricate_coverage(stations=False)).endswith("at a median DOP of 1.25")
+    assert coverage_sentence(fabricate_coverage(stations=False)).endswith("at a median DOP of 1.25")
 
 
 def test_tables_have_the_numbers() -> None:

@@ -15,7 +15,7 @@ from harness.report.placement import page as placement_page
 from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
-from harness.report.placement.wording import sentence, set_name, smallest_sufficient_set
+from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
 from harness.results.placement_findings import BestSet, PlacementFindings, StationNames, StationSetResult
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 from tests.report.reading import text_of
@@ -68,9 +68,9 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
     chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
-    assert sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
+    assert placement_sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
     apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
-    assert sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
+    assert placement_sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
     fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
     chosen = smallest_sufficient_set(fps)
     assert chosen is not None
@@ -79,12 +79,12 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
 
 def test_too_few_clips_are_said_to_be_too_few() -> None:
     few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in sentence(few)
+    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in placement_sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended() -> None:
     nothing = study_of({("pelvis",): [None] * 8})
-    assert sentence(nothing) == "No set of stations was measured."
+    assert placement_sentence(nothing) == "No set of stations was measured."
     assert "not measured" in placement_text(nothing)
     assert pareto_chart(nothing) is None
 

@@ -30,7 +30,7 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
-from harness.report.sweep.wording import describe_effect, group_failures, sentence
+from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
 from harness.results.index import CellIndex
 from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.report.drawing import texts_apart
@@ -61,7 +61,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
-    said = sentence(sweep)
+    said = sweep_sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
     assert re.search(
         r"on 14 clips of 7 performers\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 7",
@@ -163,7 +163,7 @@ def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path)
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
-    assert sentence(sweep).count("has the lowest mean joint-angle error") == 2
+    assert sweep_sentence(sweep).count("has the lowest mean joint-angle error") == 2
 
 
 def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
@@ -195,10 +195,10 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
-    assert sentence(read_sweep(few)).endswith(
+    assert sweep_sentence(read_sweep(few)).endswith(
         "but cannot be called better than any of the other 2 (too few units: 5, of at least 6)."
     )
-    assert sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
+    assert sweep_sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
     for out in (few, alike):
         assert "<td><strong>" not in write_sweep_page(out).read_text(encoding="utf-8")
 
@@ -239,7 +239,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     methods = {"ik": 6.0, "good": 2.0, "late": 0.1}
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=10, methods=methods, lags={"late": 2})))
     assert sweep.series == ("ik", "good", "late (lag 2)")
-    causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
+    causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sweep_sentence(sweep))
     assert "good is best: " in causal
     assert "late" not in causal
     assert late.endswith("of 10 performers, with a lag of 2 frames. No other method was measured.")
@@ -247,8 +247,8 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     table = str(page_table(scenario_table(sweep, PRIMARY_METRIC)))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
     plain = read_sweep(fabricate_sweep(tmp_path / "plain", Plan(clips=10, methods=methods)))
-    assert "late is best: " in sentence(plain)
-    assert "lag" not in sentence(plain)
+    assert "late is best: " in sweep_sentence(plain)
+    assert "lag" not in sweep_sentence(plain)
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
