@@ -36,7 +36,7 @@ from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
+from harness.report.run.page import write_run_page
 from harness.report.sweep.page import sweep_text, write_sweep_page
 from harness.report.sweep.reader import read_sweep
 from harness.results.findings import read_findings

@@ -30,7 +30,7 @@ from harness.report.comparison.wording import (
     percent_of_a,
     sort_by_verdict,
 )
-from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.markup import Markup, join, tag, verdict_badge
 from harness.report.kit.page import (
     Badge,
     Block,
@@ -44,12 +44,10 @@ from harness.report.kit.page import (
     Stack,
     Tally,
     TerminalOnly,
-    Verdict,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.kit.text import list_first, truncate
-from harness.report.kit.verdict_badge import verdict_badge
 
 _WIDTH = 160
 _MOST_OPEN, _MOST_NAMED, _MOST_CLIPS, _MOST_LISTED, _MOST_PRINTED, _LETTERS = 24, 4, 200, 200, 6, 60
@@ -103,7 +101,7 @@ def comparison_page(comparison: Comparison) -> Page:
     return Page(
         verb="compare",
         name=f"{comparison.b} against {comparison.a}",
-        verdict=Verdict(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
+        verdict=(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
         headline=comparison_sentence(comparison),
         lead=[
             TerminalOnly([Bullets(_cut(parts, _MOST_PRINTED, "{} more lines: --html"), prefix="")]),

@@ -10,14 +10,6 @@ from harness.report.kit.style import Chart
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """The outcome of a page in a word of its own."""
-
-    word: str
-    outcome: Outcome
-
-
-@dataclass(frozen=True)
 class Badge:
     """A verdict in a cell: a mark and a word, so that it does not depend on colour alone, and the reason."""
 
@@ -94,7 +86,7 @@ class DataTable:
     """Cells are text, whole numbers, `Interval`, `Badge`, `Stack` or `Strong`; code stands between backticks."""
     title: str = ""
     caption: str = ""
-    """What the numbers are; only a browser shows it."""
+    """What the numbers are; a browser shows it."""
     label: str = ""
     """Name for readers who hear the page; by default the title."""
     fold: str = ""
@@ -107,16 +99,20 @@ class DataTable:
     """Whether a phone shows each row as a card, for rows of many words."""
     intervals_printed: bool = True
     """Whether a terminal shows intervals; not so in tables that are too wide for them."""
+    caption_printed: bool = False
+    """Whether a terminal prints the caption too, behind the title."""
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A chart, and its numbers, which a browser folds below it and a terminal prints."""
 
-    draw: Callable[[], Chart | None]
-    """Draws the chart; None without anything to show: the numbers are open then."""
+    chart: Chart | Callable[[], Chart | None]
+    """The chart, or what draws it; None without anything to show: the numbers are open then."""
     numbers: "DataTable | tuple[DataTable, ...]" = ()
     fold: str = "Numbers of this chart"
+    level: int | None = None
+    """Level of the chart's heading, 0 for a title in the caption; by default 3 where a section has several charts."""
 
     @property
     def tables(self) -> tuple[DataTable, ...]:
@@ -178,7 +174,8 @@ class Page:
     facts: Mapping[str, str]
     """Title -> text; a fact without text is left out."""
     sections: Sequence[Section]
-    verdict: Verdict | None = None
+    verdict: tuple[str, Outcome] | None = None
+    """The outcome, after the page's own word for it."""
     lead: Sequence[Block] = ()
     """What follows the headline at once."""
     missing: Sequence[str] = ()

@@ -18,7 +18,6 @@ from harness.report.kit.page import (
     Prose,
     Section,
     Tally,
-    Verdict,
 )
 from harness.report.kit.text import last_line, list_first
 from harness.report.lab.trust_charts import (
@@ -71,7 +70,7 @@ def trust_page(found: TrustFindings, command: str) -> Page:
     return Page(
         verb="trust",
         name=found.title,
-        verdict=Verdict(OUTCOME_TITLES[found.outcome], found.outcome),
+        verdict=(OUTCOME_TITLES[found.outcome], found.outcome),
         headline=verdict_sentence(found),
         lead=[
             *([Prose(_EXPLORATORY, is_warning=True)] if found.exploratory else []),

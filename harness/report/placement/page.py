@@ -111,7 +111,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
         },
         missing=missing,
         sections=[
-            Section("Body map", "body", [Drawing(partial(_drawn, chart)) for chart in maps]),
+            Section("Body map", "body", [Drawing(chart) for chart in maps]),
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
             Section("Published statements", "claims", [claims_table(findings.claims)]),
             Section("Rankings", "rankings", _rankings(findings)),
@@ -128,10 +128,6 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
             Section("Circumstances", "circumstances", _circumstances(findings), terminal=False),
         ],
     )
-
-
-def _drawn(chart: Chart) -> Chart:
-    return chart
 
 
 def _best_table(findings: PlacementFindings) -> DataTable:
