@@ -62,8 +62,7 @@ def _report_placement(args: argparse.Namespace) -> Outcome:
 
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
-    from harness.report.paper.page import write_paper_page
-    from harness.report.paper.readme import update_readme
+    from harness.report.paper.page import update_readme, write_paper_page
     from harness.results.findings import read_findings
     from harness.results.folder_kind import FINDINGS
 

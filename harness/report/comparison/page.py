@@ -9,8 +9,7 @@ from harness.compare.comparison import Comparison, Difference
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.units import count_units
 from harness.core.number_format import format_change_percent, format_p_value
-from harness.report.comparison.interval_chart import interval_charts
-from harness.report.comparison.slope_chart import slope_chart
+from harness.report.comparison.charts import interval_charts, slope_chart
 from harness.report.comparison.wording import (
     KINDS,
     MARKS,

@@ -1,12 +1,167 @@
 """The page of a constellation: emitters heard and dilution of precision, by place and by station."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
-from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
-from harness.report.coverage.content import CoverageContent, CoverageRow, StationRow, format_dilution
+from harness.core.plain_import import plain_import
+from harness.report.coverage.content import CoverageContent, CoverageRow, PlanView, StationRow, format_dilution
+from harness.report.kit.axes import label_rows
+from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.page import Block, BrowserOnly, DataTable, Drawing, Page, Prose, Section
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_HEARD_EDGES = (0, 1, 2, 3, 4, 6, 9, 13)
+"""Lowest number of emitters of each colour."""
+_HEARD_COLOURS = ("#d55e00", "#eb9a5c", "#f8d4b4", "#cfe3f2", "#94c1e2", "#5698cb", "#1f6fae", "#0b4a7c")
+"""Orange for fewer than three emitters, which fix no position; blue for three and more."""
+_DILUTION_EDGES = (0.0, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+_SHARE_COLOURS = (COLOURS[0], "#eb9a5c", "#f8d4b4", COLOURS[1])
+_ROW_IN, _FRAME_IN = 0.3, 0.95
+
+
+def heard_chart(content: CoverageContent) -> Chart:
+    """Plan views of the number of emitters heard."""
+    with plain_import():
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    norm = BoundaryNorm((*_HEARD_EDGES, 10_000), len(_HEARD_COLOURS))
+    labels = [f"{low}" if high == low + 1 else f"{low} to {high - 1}" for low, high in _neighbours(_HEARD_EDGES)]
+    style = {"cmap": ListedColormap(_HEARD_COLOURS), "norm": norm}
+    ticks = _Ticks([*labels, f"{_HEARD_EDGES[-1]} or more"], "emitters heard")
+    return _plan_chart(content, "heard", "Emitters heard by place", style, ticks, lambda view: view.heard.astype(float))
+
+
+def dilution_chart(content: CoverageContent) -> Chart:
+    """Plan views of the dilution of precision."""
+    with plain_import():
+        from matplotlib import colormaps
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    count = len(_DILUTION_EDGES)
+    colours = ListedColormap(colormaps["viridis_r"](np.linspace(0.0, 1.0, count)))
+    norm = BoundaryNorm((*_DILUTION_EDGES, 1e9), count)
+    labels = [f"{low:g} to {high:g}" if low else f"below {high:g}" for low, high in _neighbours(_DILUTION_EDGES)]
+    ticks = _Ticks([*labels, f"{_DILUTION_EDGES[-1]:g} or more"], "dilution of precision; no colour: no fix")
+    style = {"cmap": colours, "norm": norm}
+    return _plan_chart(content, "dilution", "Dilution of precision by place", style, ticks, lambda view: view.dilution)
+
+
+def station_chart(content: CoverageContent) -> Chart:
+    """Shares of the time in which each station hears no emitter, one, two, and three or more."""
+    rows = content.stations
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.subplots()
+        left = np.zeros(len(rows))
+        for n, label in enumerate(("none", "one", "two", "three or more")):
+            share = np.array([100.0 * row.shares[n] for row in rows])
+            axes.barh(range(len(rows)), share, 0.7, left=left, color=_SHARE_COLOURS[n], label=label)
+            left = left + share
+        label_rows(axes, [row.station for row in rows])
+        axes.set_xlim(0.0, 100.0)
+        axes.set_xlabel("share of the time [%]")
+        add_legend(figure, axes)
+
+    values = "; ".join(
+        f"{row.station} {100.0 * row.shares[3]:.1f} % of the time (DOP {format_dilution(row.dilution)})" for row in rows
+    )
+    return draw_chart(
+        "stations",
+        f"Emitters heard by the stations of {content.clip}",
+        "An emitter is heard if its sound reaches one of the station's microphones past the body.",
+        f"Three or more emitters are heard by {values}.",
+        draw,
+        _FRAME_IN + _ROW_IN * len(rows),
+    )
+
+
+class _Ticks:
+    """Labels of the colours of a plan view, and the title of its colour bar."""
+
+    def __init__(self, labels: list[str], title: str) -> None:
+        self.labels, self.title = labels, title
+
+
+def _plan_chart(
+    content: CoverageContent,
+    name: str,
+    title: str,
+    style: dict[str, Any],
+    ticks: _Ticks,
+    values: Callable[[PlanView], Floats],
+) -> Chart:
+    def draw(figure: "Figure") -> None:
+        panels = figure.subplots(1, len(content.views), sharey=True, squeeze=False)[0]
+        for axes, view in zip(panels, content.views, strict=True):
+            image = _draw_view(axes, content, view, values(view), style)
+        panels[0].set_ylabel("x, forward [m]")
+        bar = figure.colorbar(
+            image, ax=list(panels), orientation="horizontal", shrink=0.8, aspect=45, spacing="uniform"
+        )
+        _label_colours(bar, ticks)
+
+    x_m, y_m = content.views[0].x_m, content.views[0].y_m
+    height_in = 1.25 + 2.55 * min(float(np.ptp(x_m) / np.ptp(y_m)), 2.0)
+    heights = " and ".join(f"{view.height_m:g} m" for view in content.views)
+    return draw_chart(
+        name,
+        title,
+        "Seen from above, without a body; a station faces each emitter. Dots: emitters. Square: the cube of the table.",
+        f"{title} at {heights} above the floor.",
+        draw,
+        height_in,
+    )
+
+
+def _draw_view(axes: "Axes", content: CoverageContent, view: PlanView, values: Floats, style: dict[str, Any]) -> Any:
+    from matplotlib.patches import Rectangle
+
+    step_x, step_y = np.diff(view.x_m[:2])[0] / 2, np.diff(view.y_m[:2])[0] / 2
+    extent = (view.y_m[0] - step_y, view.y_m[-1] + step_y, view.x_m[0] - step_x, view.x_m[-1] + step_x)
+    image = axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", **style)
+    axes.plot(
+        content.emitter_m[:, 1],
+        content.emitter_m[:, 0],
+        "o",
+        markersize=3.2,
+        color=INK,
+        markeredgecolor=PAPER,
+        markeredgewidth=0.6,
+    )
+    middle_m = 0.5 * (np.min(content.emitter_m, axis=0) + np.max(content.emitter_m, axis=0))
+    corner = (middle_m[1] - content.half_m, middle_m[0] - content.half_m)
+    axes.add_patch(Rectangle(corner, 2 * content.half_m, 2 * content.half_m, fill=False, edgecolor=INK, linewidth=1.1))
+    axes.set_title(f"{view.height_m:g} m above the floor")
+    axes.set_xlabel("y, to the right [m]")
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_color(FAINT)
+    return image
+
+
+def _label_colours(bar: Any, ticks: _Ticks) -> None:
+    """Name each colour of a bar at its middle."""
+    edges = np.array(bar.norm.boundaries)
+    bar.set_ticks(0.5 * (edges[:-1] + edges[1:]), labels=ticks.labels)
+    bar.ax.minorticks_off()
+    bar.ax.tick_params(length=0)
+    bar.set_label(ticks.title)
+    bar.outline.set_visible(False)
+
+
+def _neighbours(edges: tuple[Any, ...]) -> list[tuple[Any, Any]]:
+    return list(itertools.pairwise(edges))
+
 
 _DILUTION_NOTE = (
     "The dilution of precision (DOP) is the standard deviation of the position over that of a range: it tells how the "

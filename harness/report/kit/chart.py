@@ -11,7 +11,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
-from harness.report.kit.hover_chart import describe_plots, mark_series
+from harness.report.kit.inline_svg import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from harness.core.interval import Interval
 from harness.core.number_format import format_fixed
+from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.metric_labels import metric_label, metric_name
-from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, series_colour
+from harness.report.kit.text import metric_label, metric_name
 from harness.results.trust_findings import (
     Equivalence,
     EquivalenceVerdict,

@@ -8,7 +8,6 @@ from functools import partial
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_p_value, format_share
 from harness.errors import Outcome
-from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.page import (
     Badge,
     Bullets,
@@ -19,7 +18,7 @@ from harness.report.kit.page import (
     Section,
     Tally,
 )
-from harness.report.kit.text import last_line, list_first
+from harness.report.kit.text import last_line, list_first, metric_name
 from harness.report.lab.trust_charts import (
     distances_chart,
     equivalence_chart,

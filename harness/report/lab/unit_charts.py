@@ -16,9 +16,8 @@ from harness.measure.unit_report import (
     EpisodeMark,
     UnitReport,
 )
+from harness.report.kit.axes import label_rows, set_log_scale
 from harness.report.kit.chart import add_legend, decimate, draw_chart
-from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_log_scale
 from harness.report.kit.style import COLOURS, INK, Chart, series_style
 
 if TYPE_CHECKING:

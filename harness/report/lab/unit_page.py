@@ -21,8 +21,7 @@ from harness.measure.unit_report import (
     UnitReport,
 )
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section
-from harness.report.lab.check_chart import check_chart
-from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
+from harness.report.lab.departures import check_chart, departure_texts, departures_sentence, departures_table
 from harness.report.lab.quantities import find_quantity
 from harness.report.lab.unit_charts import (
     allan_chart,

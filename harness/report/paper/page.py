@@ -1,4 +1,4 @@
-"""The page of a reproduced paper: count of verdicts, every claim, then each experiment with figures and tables."""
+"""The page of a reproduced paper: count of verdicts, every claim, then each experiment; and its tables in a README."""
 
 import json
 import re
@@ -11,6 +11,7 @@ from urllib.parse import quote
 from harness.core.files import to_json_types
 from harness.core.number_format import count_noun
 from harness.report.kit.chart import clear_plots
+from harness.report.kit.marked_block import describe_code, replace_block
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.page import (
     Badge,
@@ -34,14 +35,7 @@ from harness.report.kit.text import describe_motion_source, to_file_name
 from harness.report.paper.charts import figure_charts
 from harness.report.paper.figure_table import figure_table, is_measured
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, Verdict
-from harness.results.findings import (
-    BarChart,
-    FindingsTable,
-    LineChart,
-    PaperExperiment,
-    PaperFindings,
-    read_findings,
-)
+from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings, read_findings
 from harness.results.folder_kind import FINDINGS
 
 READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
@@ -307,3 +301,11 @@ def run_link(folder: Path, name: str) -> str | None:
     if not path.parts or not run.is_dir() or not run.resolve().is_relative_to(folder.resolve()):
         return None
     return f"{path}/report.html" if (run / "report.html").is_file() else f"{path}/"
+
+
+def update_readme(readme: Path, findings: PaperFindings) -> None:
+    """Replace the tables of this paper and motion in `readme`, or append them; raises what `replace_block` raises."""
+    name = re.sub(r"[^\w.]+", "-", f"{findings.paper} {findings.motion}").strip("-")
+    title, made_by = f"### {findings.paper}, {findings.motion}", describe_code(findings.circumstances)
+    block = [f"    {line}".rstrip() for line in (findings.command, "", *statements_text(findings).split("\n"))]
+    replace_block(readme, f"paper {name}", [title, "", f"Made by {made_by}:", "", *block])

@@ -7,8 +7,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_share
+from harness.report.kit.axes import set_log_scale
 from harness.report.kit.chart import add_legend, decimate, draw_chart
-from harness.report.kit.scales import set_log_scale
 from harness.report.kit.style import FAINT, GRID, PAPER, Chart, series_style
 from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics
 

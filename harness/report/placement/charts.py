@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.interval import Interval
+from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.rows import label_rows
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
 from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best

@@ -1,13 +1,20 @@
-"""Drawing of the error of a placement study against the number of stations, for its page and for papers."""
+"""Error of a placement study against the number of stations, for its page and as the figure `placement` of papers."""
 
 import math
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from harness.compare.paired_statistics import MIN_UNITS
+from harness.core.number_format import count_noun
 from harness.core.seeds import generator
+from harness.errors import NothingMeasured
+from harness.report.figures.print_figure import PrintFigure
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, mark_scale, note_size
-from harness.report.placement.wording import set_name
-from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult
+from harness.report.kit.text import metric_name
+from harness.report.placement.wording import measured_errors, set_name
+from harness.results.folder_kind import FINDINGS
+from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,3 +98,33 @@ def _size_label(findings: PlacementFindings, size: int) -> str:
     rates = {tried.rate_hz for tried in findings.tried}
     rates_of_size = {tried.rate_hz for tried in findings.tried if len(tried.stations) == size}
     return f"{size}\n{'/'.join(f'{rate:g}' for rate in sorted(rates_of_size))} Hz" if len(rates) > 1 else str(size)
+
+
+_HEIGHT_MM = 85.0
+
+
+def placement_figure(folder: Path) -> PrintFigure:
+    """Error against the number of stations. BadFile without findings, NothingMeasured when no set has an error."""
+    findings = read_placement(folder / FINDINGS)
+    if not measured_best(findings):
+        raise NothingMeasured(folder, len(findings.failures))
+
+    def draw(figure: "Figure") -> None:
+        draw_pareto(figure, findings, f"{metric_name(findings.metric)} [{findings.unit}]")
+        handles, names = figure.axes[0].get_legend_handles_labels()
+        marks = dict(zip(names, handles, strict=True))
+        figure.legend(marks.values(), marks.keys(), loc="outside upper left", ncols=len(marks))
+
+    return PrintFigure("placement", _figure_caption(findings), draw, _HEIGHT_MM)
+
+
+def _figure_caption(findings: PlacementFindings) -> str:
+    clips = max(len(measured_errors(tried)) for _, tried in measured_best(findings))
+    few = "" if clips >= MIN_UNITS else " Differences cannot be shown with so few clips, so all sets count as tied."
+    failed = len(findings.failures)
+    return (
+        f"Mean {metric_name(findings.metric)} of sets of stations on {count_noun(clips, 'clip')} of {findings.motion}. "
+        "Diamonds: the best set of each size with the 95 % interval of its mean, filled if no smaller set is better. "
+        f"Circles: sets of the same size that are not significantly worse.{few}"
+        + (f" {count_noun(failed, 'cell')} of {findings.planned:,} failed." if failed else "")
+    )

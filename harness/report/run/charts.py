@@ -7,13 +7,10 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.report.kit.chart import add_legend, decimate, draw_chart, insert_gaps
-from harness.report.kit.distribution_chart import draw_distribution
-from harness.report.kit.highlights import Highlights
-from harness.report.kit.hover_chart import BAND_OF
-from harness.report.kit.metric_labels import metric_label
+from harness.report.kit.error_lines import Highlights, draw_distribution, draw_over_time
+from harness.report.kit.inline_svg import BAND_OF
 from harness.report.kit.style import GRID, PAPER, Chart, hide_frame
-from harness.report.kit.text import to_file_name
-from harness.report.kit.time_chart import draw_over_time
+from harness.report.kit.text import metric_label, to_file_name
 from harness.report.run.data import RunData, Trace
 from harness.report.run.tables import rows_by_setting
 from harness.results.cell import varied_text

@@ -9,12 +9,11 @@ from harness.compare.units import Sampling
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
+from harness.report.kit.axes import label_rows, set_root_scale
 from harness.report.kit.body_chart import BodyGroup, draw_bodies, joint_titles
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.highlights import Highlights
+from harness.report.kit.error_lines import Highlights
 from harness.report.kit.page import DataTable, Drawing
-from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_root_scale
 from harness.report.kit.style import COLOURS, FAINT, INK, Chart
 from harness.report.run.data import RunData, Trace
 from harness.score.pair import hinged_bones, joint_names

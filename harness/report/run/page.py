@@ -15,15 +15,14 @@ from harness.core.files import to_json_types
 from harness.core.number_format import NOT_MEASURED, format_number
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.document import chart_figure, data_uri, facts_list
-from harness.report.kit.highlights import choose_highlights
+from harness.report.kit.error_lines import choose_highlights
 from harness.report.kit.markup import Markup, join, scroll_box, tag
-from harness.report.kit.metric_labels import metric_name
 from harness.report.kit.motion_player import motion_player
 from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Drawing, Page, Prose, Section, Stack
 from harness.report.kit.page_html import write_page
 from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.report.kit.style import Chart
-from harness.report.kit.text import list_first
+from harness.report.kit.text import list_first, metric_name
 from harness.report.run.calibration import calibration_tables
 from harness.report.run.charts import effect_charts, error_distribution, error_over_time
 from harness.report.run.data import RunData, read_run

@@ -11,10 +11,9 @@ from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_m
 from harness.compare.units import Sampling, count_clips
 from harness.core.number_format import format_number
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.metric_labels import metric_name
-from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
-from harness.report.kit.ranking_chart import RankingPanel, draw_ranking, explain_marks
+from harness.report.kit.ranking import LAG_NOTE, RankingPanel, describe_ranking, draw_ranking, explain_marks, name_lag
 from harness.report.kit.style import Chart
+from harness.report.kit.text import metric_name
 from harness.report.run.data import Row, RunData, lag_of, last_varied, series_name
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.number_format import count_noun, format_number
+from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
-from harness.report.kit.rows import label_rows
 from harness.report.kit.style import GRID, Chart, series_style
 from harness.report.kit.text import to_file_name, truncate
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of

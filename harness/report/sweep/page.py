@@ -26,8 +26,7 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     sweep_chart,
 )
-from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, unit_of
-from harness.report.sweep.reader import read_sweep
+from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, read_sweep, unit_of
 from harness.report.sweep.wording import FailureGroup, describe_effect, group_failures, list_values, sweep_sentence
 from harness.results.index import INDEX_FILE
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC

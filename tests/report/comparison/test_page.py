@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 from harness.compare.comparison import Comparison, Difference
 from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
-from harness.report.comparison.interval_chart import _draw as draw_intervals
-from harness.report.comparison.interval_chart import interval_charts
+from harness.report.comparison.charts import BETTER_COLOUR, WORSE_COLOUR, interval_charts, slope_chart
+from harness.report.comparison.charts import _draw_intervals as draw_intervals
+from harness.report.comparison.charts import _draw_line as draw_slopes
 from harness.report.comparison.page import comparison_page, comparison_text, write_comparison_page
-from harness.report.comparison.slope_chart import BETTER_COLOUR, WORSE_COLOUR, slope_chart
-from harness.report.comparison.slope_chart import _draw as draw_slopes
 from harness.report.comparison.wording import (
     MARKS,
     MEANINGS,

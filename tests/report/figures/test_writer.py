@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, UnknownName
-from harness.report.figures.kinds import KINDS
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.writer import write_figure, write_results_table
+from harness.report.figures.print_figure import FigureSelection
+from harness.report.figures.writer import KINDS, write_figure, write_results_table
 from harness.results.index import CellIndex
 from tests.report.fabricate_placement import write_made_up
 from tests.report.figures.made_up import ranked_run

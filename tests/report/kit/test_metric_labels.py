@@ -1,6 +1,6 @@
 """Labels of metrics name the quantity and the unit."""
 
-from harness.report.kit.metric_labels import metric_label, metric_name
+from harness.report.kit.text import metric_label, metric_name
 from harness.score.metrics import DEFINITIONS
 
 

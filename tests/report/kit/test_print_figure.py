@@ -14,8 +14,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 from harness.errors import BadInput, UnknownName
+from harness.report.figures.print_figure import FORMATS, WIDTHS_MM, PrintFigure, draw_figure
 from harness.report.kit.chart import add_legend
-from harness.report.kit.print_figure import FORMATS, WIDTHS_MM, PrintFigure, draw_figure
 from harness.report.kit.style import COLOURS, MARKERS, MUTED, muted_line_style, print_line_style
 from tests.report.figures.made_up import drawn
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.report.kit.page import DataTable
 from harness.report.kit.page_html import page_table
 from harness.report.kit.ranking import LAG_NOTE
 from harness.report.run.data import read_run
@@ -48,7 +49,9 @@ def test_the_late_methods_are_named_and_ranked_apart(run_folder: Path) -> None:
 
 
 def test_each_group_has_its_bold_cell(run_folder: Path) -> None:
-    first = page_table(results_tables(read_run(run_folder))[0])
+    table = results_tables(read_run(run_folder))[0]
+    assert isinstance(table, DataTable)
+    first = page_table(table)
     bold = re.findall(r'<th scope="row">([^<]*)</th><td><strong>', first)
     assert sorted(bold) == ["gauss", LATE]
     assert LAG_NOTE in first

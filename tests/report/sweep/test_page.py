@@ -27,9 +27,8 @@ from harness.report.sweep.charts import (
     select_curves,
     sweep_chart,
 )
-from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
+from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
-from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
 from harness.results.index import CellIndex
 from harness.results.reported_metrics import PRIMARY_METRIC

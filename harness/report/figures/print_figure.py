@@ -1,4 +1,4 @@
-"""Figures for papers: PDF, SVG or PNG, as wide as a column or a page. The same data give the same bytes."""
+"""Figures for papers: what is chosen of a run, and files as wide as a column or a page, with the same bytes always."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from harness.core.plain_import import plain_import
 from harness.errors import BadInput, UnknownName
 from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,3 +74,17 @@ def _to_bytes(drawn: "Figure", name: str, fmt: str) -> bytes:
             return to_svg(drawn, name, PRINT_SETTINGS).encode()
         case _:
             return to_png(drawn, _PNG_DPI)
+
+
+@dataclass(frozen=True)
+class FigureSelection:
+    """What the user chose; the defaults leave the choice to the figure."""
+
+    metric: str = PRIMARY_METRIC
+    methods: tuple[str, ...] = ()
+    """Methods to show, in this order where order matters; empty: all."""
+    condition: str = ""
+    """Name of a condition or some of its parts (see `RunCondition.name`); empty: all, or the last varied values."""
+    clip: str = ""
+    control: str = ""
+    """The method that is highlighted next to the one with the lowest error."""

@@ -1,4 +1,4 @@
-"""The figure `time`: error over time on one clip; the leader and a control in colour, the other methods grey."""
+"""The figures of single frames: `time`, errors over time on one clip, and `cdf`, their cumulative distribution."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -6,16 +6,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.compare.ranking import shared_clips
+from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.report.figures.conditions import ConditionSet, RunCondition, check_metric, describe_absent
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import choose_condition, rank_highlights, read_series
+from harness.report.figures.conditions import (
+    ConditionSet,
+    RunCondition,
+    check_metric,
+    choose_condition,
+    describe_absent,
+    rank_highlights,
+    read_series,
+)
+from harness.report.figures.print_figure import FigureSelection, PrintFigure
 from harness.report.kit.chart import add_legend
-from harness.report.kit.highlights import Highlights
-from harness.report.kit.metric_labels import metric_label, metric_name
-from harness.report.kit.print_figure import PrintFigure
-from harness.report.kit.text import to_file_name
-from harness.report.kit.time_chart import draw_over_time
+from harness.report.kit.error_lines import Highlights, draw_distribution, draw_over_time
+from harness.report.kit.style import print_line_style
+from harness.report.kit.text import metric_label, metric_name, to_file_name
 from harness.report.run.data import WORST_METRICS, Row, Trace
 
 if TYPE_CHECKING:
@@ -45,7 +51,7 @@ def over_time_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigu
         f"{metric_name(metric).capitalize()} over time on {where}. {highlights.description} "
         "The warm-up is left out. The axis is logarithmic."
         f"{describe_absent(condition.series, traces)}{run.missing_note}",
-        lambda figure: _draw(figure, traces, metric, highlights),
+        lambda figure: _draw_over_time(figure, traces, metric, highlights),
         _HEIGHT_MM,
     )
 
@@ -61,7 +67,7 @@ def _choose_clip(condition: RunCondition, selection: FigureSelection) -> tuple[s
     return clip, f", of {len(clips)} clips the one with the largest mean error" if len(clips) > 1 else ""
 
 
-def _draw(figure: "Figure", traces: Mapping[str, Trace], metric: str, highlights: Highlights) -> None:
+def _draw_over_time(figure: "Figure", traces: Mapping[str, Trace], metric: str, highlights: Highlights) -> None:
     axes = figure.subplots()
     lines = {name: (t.time_s, np.where(t.scored, t.errors[metric], np.nan)) for name, t in traces.items()}
     draw_over_time(axes, lines, highlights, metric_label(metric))
@@ -69,3 +75,36 @@ def _draw(figure: "Figure", traces: Mapping[str, Trace], metric: str, highlights
     axes.set_xlim(min(times[0] for times in scored), max(times[-1] for times in scored))
     axes.set_xlabel("time [s]")
     add_legend(figure, axes)
+
+
+_CDF_HEIGHT_MM = 60.0
+
+
+def distribution_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
+    """Distribution of the errors of all scored frames of one condition, or of one clip of it."""
+    metric = selection.metric
+    check_metric(metric, WORST_METRICS, "metric of single frames that is drawn")
+    condition = choose_condition(run, selection)
+    traces = read_series(run.folder, condition, lambda _, row: selection.clip in ("", row["clip"]))
+    values = {name: np.concatenate([t.errors[metric][t.scored] for t in of]) for name, of in traces.items()}
+    measured = {name: of for name, of in values.items() if np.isfinite(of).any()}
+    if not measured:
+        raise BadInput(f"No frame of {run.folder} has {metric}.", "Choose another metric or clip.")
+    clips = selection.clip or count_noun(len(condition.clips), "clip")
+    where = f"{clips}, {condition.name}" if condition.name else clips
+    frames = max(int(np.isfinite(of).sum()) for of in measured.values())
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.subplots()
+        styles = {name: print_line_style(n) for n, name in enumerate(measured)}
+        draw_distribution(axes, measured, metric_label(metric), styles)
+        axes.set_ylabel("frames below the error [%]")
+        add_legend(figure, axes)
+
+    return PrintFigure(
+        "cdf" if metric == WORST_METRICS[0] else f"cdf_{metric}",
+        f"Share of frames whose {metric_name(metric)} is below a value: {frames:,} frames of {where}. Curves further "
+        f"left are better. The axis is logarithmic.{describe_absent(condition.series, measured)}{run.missing_note}",
+        draw,
+        _CDF_HEIGHT_MM,
+    )
