@@ -8,7 +8,7 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +28,7 @@ from harness.report.comparison.wording import (
 )
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Axes, Chart, Figure
 
 SIZE_IN = (3.3, 2.5)
 WORSE_COLOUR, BETTER_COLOUR = COLOURS[0], COLOURS[1]
@@ -66,14 +62,14 @@ def slope_chart(line: Difference, number: int) -> Chart:
     )
 
 
-def _draw_line(figure: "Figure", line: Difference) -> None:
+def _draw_line(figure: Figure, line: Difference) -> None:
     left, right = (figure.add_axes(place) for place in (_SLOPE_AXES, _DIFFERENCE_AXES))
     a, b = np.array(line.a), np.array(line.b)
     _draw_slopes(left, line, a, b)
     _draw_differences(right, line, b - a)
 
 
-def _draw_slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
+def _draw_slopes(axes: Axes, line: Difference, a: Floats, b: Floats) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.ticker import MaxNLocator
 
@@ -92,7 +88,7 @@ def _draw_slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def _draw_differences(axes: "Axes", line: Difference, difference: Floats) -> None:
+def _draw_differences(axes: Axes, line: Difference, difference: Floats) -> None:
     """Draw the clips' differences, their mean and its interval over the band of the margin."""
     from matplotlib.ticker import MaxNLocator
 
@@ -185,7 +181,7 @@ def _interval_chart(name: str, metric: str, lines: Sequence[Difference], varied:
     )
 
 
-def _draw_intervals(figure: "Figure", lines: Sequence[Difference], names: Sequence[str]) -> None:
+def _draw_intervals(figure: Figure, lines: Sequence[Difference], names: Sequence[str]) -> None:
     axes = figure.subplots()
     for row, line in enumerate(lines):
         margin = percent_of_a(line, line.margin)
@@ -203,7 +199,7 @@ def _draw_intervals(figure: "Figure", lines: Sequence[Difference], names: Sequen
     _scale(axes, lines)
 
 
-def _scale(axes: "Axes", lines: Sequence[Difference]) -> None:
+def _scale(axes: Axes, lines: Sequence[Difference]) -> None:
     """Make the axis symmetric about zero; logarithmic beyond the middle if one line would flatten all others."""
     from matplotlib.ticker import FixedLocator, MaxNLocator
 

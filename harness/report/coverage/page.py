@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,7 @@ from harness.report.coverage.content import CoverageContent, CoverageRow, PlanVi
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.page import Block, BrowserOnly, DataTable, Drawing, Page, Prose, Section
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Chart, Figure
 
 _HEARD_EDGES = (0, 1, 2, 3, 4, 6, 9, 13)
 """Lowest number of emitters of each colour."""
@@ -60,7 +56,7 @@ def station_chart(content: CoverageContent) -> Chart:
     """Shares of the time in which each station hears no emitter, one, two, and three or more."""
     rows = content.stations
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         left = np.zeros(len(rows))
         for n, label in enumerate(("none", "one", "two", "three or more")):
@@ -100,7 +96,7 @@ def _plan_chart(
     ticks: _Ticks,
     values: Callable[[PlanView], Floats],
 ) -> Chart:
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         panels = figure.subplots(1, len(content.views), sharey=True, squeeze=False)[0]
         for axes, view in zip(panels, content.views, strict=True):
             image = _draw_view(axes, content, view, values(view), style)
@@ -123,7 +119,7 @@ def _plan_chart(
     )
 
 
-def _draw_view(axes: "Axes", content: CoverageContent, view: PlanView, values: Floats, style: dict[str, Any]) -> Any:
+def _draw_view(axes: Axes, content: CoverageContent, view: PlanView, values: Floats, style: dict[str, Any]) -> Any:
     from matplotlib.patches import Rectangle
 
     step_x, step_y = np.diff(view.x_m[:2])[0] / 2, np.diff(view.y_m[:2])[0] / 2

@@ -1,7 +1,6 @@
 """The figures of single frames: `time`, errors over time on one clip, and `cdf`, their cumulative distribution."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,12 +19,9 @@ from harness.report.figures.conditions import (
 from harness.report.figures.print_figure import FigureSelection, PrintFigure
 from harness.report.kit.chart import add_legend
 from harness.report.kit.error_lines import Highlights, draw_distribution, draw_over_time
-from harness.report.kit.style import print_line_style
+from harness.report.kit.style import Figure, print_line_style
 from harness.report.kit.text import metric_label, metric_name, to_file_name
 from harness.report.run.data import WORST_METRICS, Row, Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _HEIGHT_MM = 60.0
 
@@ -67,7 +63,7 @@ def _choose_clip(condition: RunCondition, selection: FigureSelection) -> tuple[s
     return clip, f", of {len(clips)} clips the one with the largest mean error" if len(clips) > 1 else ""
 
 
-def _draw_over_time(figure: "Figure", traces: Mapping[str, Trace], metric: str, highlights: Highlights) -> None:
+def _draw_over_time(figure: Figure, traces: Mapping[str, Trace], metric: str, highlights: Highlights) -> None:
     axes = figure.subplots()
     lines = {name: (t.time_s, np.where(t.scored, t.errors[metric], np.nan)) for name, t in traces.items()}
     draw_over_time(axes, lines, highlights, metric_label(metric))
@@ -94,7 +90,7 @@ def distribution_figure(run: ConditionSet, selection: FigureSelection) -> PrintF
     where = f"{clips}, {condition.name}" if condition.name else clips
     frames = max(int(np.isfinite(of).sum()) for of in measured.values())
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         styles = {name: print_line_style(n) for n, name in enumerate(measured)}
         draw_distribution(axes, measured, metric_label(metric), styles)

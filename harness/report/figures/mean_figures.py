@@ -1,7 +1,6 @@
 """The figures of means: `ranking`, a panel for each condition, and `joints`, errors at each bone next to a control."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,15 +23,11 @@ from harness.report.figures.print_figure import MM_PER_IN, WIDTHS_MM, FigureSele
 from harness.report.kit.axes import label_rows
 from harness.report.kit.error_lines import Highlights
 from harness.report.kit.ranking import RankingPanel, draw_ranking, explain_marks
-from harness.report.kit.style import COLOURS, INK, PAPER, mark_scale
+from harness.report.kit.style import COLOURS, INK, PAPER, Axes, Figure, mark_scale
 from harness.report.kit.text import metric_name
 from harness.report.run.joint_errors import BONE_ROWS, means_by_unit
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _HEIGHT_MM = 60.0
 """Height before the rows are counted."""
@@ -100,7 +95,7 @@ def joints_figure(run: ConditionSet, selection: FigureSelection) -> PrintFigure:
     )
 
 
-def _draw_joints(figure: "Figure", means: Mapping[str, tuple[Floats, Floats]], highlights: Highlights) -> None:
+def _draw_joints(figure: Figure, means: Mapping[str, tuple[Floats, Floats]], highlights: Highlights) -> None:
     panels = _PANELS if figure.get_figwidth() * MM_PER_IN > WIDTHS_MM[0] + 1.0 else _PANELS[:1]
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for part, (axes, label) in enumerate(zip(grid, panels, strict=True)):
@@ -120,7 +115,7 @@ def _draw_joints(figure: "Figure", means: Mapping[str, tuple[Floats, Floats]], h
     figure.legend([handles[n] for n in order], [names[n] for n in order], loc="outside upper left", ncols=len(panels))
 
 
-def _draw_bars(axes: "Axes", values: Floats, label: str) -> None:
+def _draw_bars(axes: Axes, values: Floats, label: str) -> None:
     """A bar for the mean of each column of (units, 22) values, and its interval."""
     rows = np.arange(values.shape[1])
     axes.barh(rows, values.mean(axis=0), 0.68, color=COLOURS[4], label=label)

@@ -2,15 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from harness.core.plain_import import plain_import
 from harness.errors import BadInput, UnknownName
-from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
+from harness.report.kit.style import PRINT_SETTINGS, Figure, to_pdf, to_png, to_svg
 from harness.results.reported_metrics import PRIMARY_METRIC
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FORMATS = ("pdf", "svg", "png")
 WIDTHS_MM = (85, 170)
@@ -29,7 +25,7 @@ class PrintFigure:
     """File name without its suffix."""
     caption: str
     """Sentences for the caption: what is shown, on how many clips, and what the marks mean."""
-    draw: Callable[["Figure"], None]
+    draw: Callable[[Figure], None]
     """Draws on an empty figure; its width is that of the paper, and its height may be changed."""
     height_mm: float
 
@@ -66,7 +62,7 @@ def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
         return DrawnFigure(_to_bytes(drawn, figure.name, fmt), float(width_mm), height_mm)
 
 
-def _to_bytes(drawn: "Figure", name: str, fmt: str) -> bytes:
+def _to_bytes(drawn: Figure, name: str, fmt: str) -> bytes:
     match fmt:
         case "pdf":
             return to_pdf(drawn)

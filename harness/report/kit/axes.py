@@ -1,15 +1,14 @@
 """Axes: a vertical axis of named rows, and logarithmic and square-root scales with plain numbers."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from harness.report.kit.style import Axes
 
 
-def label_rows(axes: "Axes", names: Sequence[str]) -> None:
+def label_rows(axes: Axes, names: Sequence[str]) -> None:
     """Name the rows 0, 1, ... of the axes from the top, without ticks and grid lines between them."""
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
@@ -17,7 +16,7 @@ def label_rows(axes: "Axes", names: Sequence[str]) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
+def set_log_scale(axes: Axes, side: Literal["x", "y"]) -> None:
     """Make an axis logarithmic, with plain numbers, unless no value on it is above zero (a perfect method)."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -32,7 +31,7 @@ def set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
         axis.set_major_formatter(lambda value, _: f"{value:g}")
 
 
-def set_root_scale(axes: "Axes") -> None:
+def set_root_scale(axes: Axes) -> None:
     """Give the x axis a square-root scale from 0, with plain numbers."""
     axes.set_xscale("function", functions=(np.sqrt, np.square))
     axes.set_xlim(left=0.0)

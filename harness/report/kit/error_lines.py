@@ -2,17 +2,14 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.report.kit.axes import set_log_scale
 from harness.report.kit.chart import decimate, insert_gaps
-from harness.report.kit.style import COLOURS, DASHES, mark_scale, muted_line_style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from harness.report.kit.style import COLOURS, DASHES, Axes, mark_scale, muted_line_style
 
 CONTROL = "ik"
 """The control unless another one is chosen: inverse kinematics without a model of the motion."""
@@ -75,9 +72,7 @@ def find_series(series: Iterable[str], method: str) -> list[str]:
 _MARKERS_PER_LINE = 8
 
 
-def draw_over_time(
-    axes: "Axes", lines: Mapping[str, tuple[Floats, Floats]], highlights: Highlights, label: str
-) -> None:
+def draw_over_time(axes: Axes, lines: Mapping[str, tuple[Floats, Floats]], highlights: Highlights, label: str) -> None:
     """Draw times (F,) [s] and values (F,) of each series on a logarithmic axis; NaN and missing frames leave gaps."""
     for name, style in highlights.styles(lines).items():
         time_s, values = decimate(*insert_gaps(*lines[name]))
@@ -94,7 +89,7 @@ _MARKED = tuple(int(np.argmin(np.abs(_SHARES - share))) for share in (0.1, 0.3, 
 
 
 def draw_distribution(
-    axes: "Axes",
+    axes: Axes,
     series: Mapping[str, Floats],
     label: str,
     styles: Mapping[str, Mapping[str, Any]],

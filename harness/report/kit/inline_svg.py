@@ -7,13 +7,10 @@ reads the marks and scales. Without scripts the chart is a still picture with al
 import html
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from harness.report.kit.markup import Markup
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.report.kit.style import Axes, Figure
 
 _REFERENCES = re.compile(r'(?:href="#|url\(#)([^")]+)')
 _IDS = re.compile(r' id="([^"]*)"')
@@ -49,7 +46,7 @@ BAND_OF = "_band of "
 """Start of the label of a band that is shown and hidden with a line; the name of the line follows."""
 
 
-def mark_series(figure: "Figure") -> list[str]:
+def mark_series(figure: Figure) -> list[str]:
     """Mark each named line of the figure and its entry in the legend; returns the names, in the order of their marks.
 
     Lines of the same name in several axes are one series.
@@ -73,7 +70,7 @@ def mark_series(figure: "Figure") -> list[str]:
     return names
 
 
-def describe_plots(figure: "Figure") -> list[dict[str, Any] | None]:
+def describe_plots(figure: Figure) -> list[dict[str, Any] | None]:
     """Describe the axes with named lines: box in the SVG [pt], limits, scales and units; None for other axes.
 
     The layout of the figure must have been computed.
@@ -84,7 +81,7 @@ def describe_plots(figure: "Figure") -> list[dict[str, Any] | None]:
     ]
 
 
-def _describe_plot(figure: "Figure", axes: "Axes") -> dict[str, Any]:
+def _describe_plot(figure: Figure, axes: Axes) -> dict[str, Any]:
     width, height = 72.0 * figure.get_size_inches()
     place = axes.get_position()
     box = (place.x0 * width, (1.0 - place.y1) * height, place.x1 * width, (1.0 - place.y0) * height)
@@ -100,7 +97,7 @@ def _describe_axis(limits: tuple[float, float], scale: str, label: str) -> dict[
     return {"limits": [float(limit) for limit in limits], "log": scale == "log", "unit": unit}
 
 
-def _bottom_label(figure: "Figure", axes: "Axes") -> str:
+def _bottom_label(figure: Figure, axes: Axes) -> str:
     """The label of the horizontal axis, or of the one that shares it."""
     shared = (other.get_xlabel() for other in figure.axes if axes.get_shared_x_axes().joined(axes, other))
     return axes.get_xlabel() or next((label for label in shared if label), "")

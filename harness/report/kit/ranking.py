@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +11,8 @@ from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.ranking import MethodRanking
 from harness.compare.units import count_units
 from harness.core.number_format import count_noun, format_number, format_share
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, mark_scale
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale
 from harness.report.kit.text import list_first
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
 """End of the caption of a table with bold cells."""
@@ -142,7 +138,7 @@ def largest_drawn(panels: Sequence[RankingPanel]) -> float:
     return max(panel.largest_drawn for panel in panels)
 
 
-def draw_ranking(figure: "Figure", panels: Sequence[RankingPanel], quantity: str, unit: str) -> None:
+def draw_ranking(figure: Figure, panels: Sequence[RankingPanel], quantity: str, unit: str) -> None:
     """Draw the panels below each other: means on the left, differences to the lowest mean on the right.
 
     Without any other method to compare with there are means alone. The figure gets the height that the rows need.
@@ -185,7 +181,7 @@ def _places(names: Sequence[str]) -> list[float]:
     return [sum(heights[:n]) + 0.5 * (heights[n] - heights[0]) for n in range(len(heights))]
 
 
-def _draw_heading(row: Sequence["Axes"], heading: str) -> None:
+def _draw_heading(row: Sequence[Axes], heading: str) -> None:
     """Write the heading from the left edge of the figure; the layout leaves its height free, but not its width."""
     row[-1].set_title("\n".join(" " for _ in heading.splitlines()), loc="right")
     start = ("figure fraction", "axes fraction")
@@ -196,14 +192,14 @@ def _draw_heading(row: Sequence["Axes"], heading: str) -> None:
     note.set_in_layout(False)
 
 
-def _limit_axis(axes: "Axes", lowest: float, highest: float) -> None:
+def _limit_axis(axes: Axes, lowest: float, highest: float) -> None:
     """Keep intervals that are far wider than the means differ from stretching the axis."""
     low, high = axes.get_xlim()
     if highest > 0.0:  # methods without an error leave the axis as it is
         axes.set_xlim(max(low, lowest), min(high, highest))
 
 
-def _draw_means(axes: "Axes", ranking: MethodRanking, places: Sequence[float], largest: float, unit: str) -> None:
+def _draw_means(axes: Axes, ranking: MethodRanking, places: Sequence[float], largest: float, unit: str) -> None:
     for y, (name, values) in zip(places, ranking.values.items(), strict=True):
         style = _mark(ranking, name)
         if values.mean() > largest:
@@ -214,7 +210,7 @@ def _draw_means(axes: "Axes", ranking: MethodRanking, places: Sequence[float], l
         _draw_dot(axes, float(values.mean()), y, style)
 
 
-def _draw_differences(axes: "Axes", ranking: MethodRanking, places: Sequence[float], largest: float, unit: str) -> None:
+def _draw_differences(axes: Axes, ranking: MethodRanking, places: Sequence[float], largest: float, unit: str) -> None:
     axes.axvline(0.0, color=INK, linewidth=0.7)
     for y, name in zip(places, ranking.values, strict=True):
         style = _mark(ranking, name)
@@ -232,7 +228,7 @@ def _draw_differences(axes: "Axes", ranking: MethodRanking, places: Sequence[flo
     axes.spines["left"].set_visible(False)  # the line at zero stands for it
 
 
-def _write_at_edge(axes: "Axes", text: str, y: float, style: Mapping[str, Any]) -> None:
+def _write_at_edge(axes: Axes, text: str, y: float, style: Mapping[str, Any]) -> None:
     """A value beyond the right end of the axis, as an arrow and a number."""
     edge = axes.get_yaxis_transform()
     arrow: Mapping[str, Any] = {"marker": ">", "color": style["color"], "markersize": _DOT * mark_scale()}
@@ -249,12 +245,12 @@ def _mark(ranking: MethodRanking, name: str) -> Mapping[str, Any]:
     return _WORSE if ranking.results[name].verdict == "better" else _TIED
 
 
-def _draw_dot(axes: "Axes", x: float, y: float, style: Mapping[str, Any]) -> None:
+def _draw_dot(axes: Axes, x: float, y: float, style: Mapping[str, Any]) -> None:
     shown = {key: value for key, value in style.items() if key != "label"}
     axes.plot(x, y, linestyle="none", markersize=_DOT * mark_scale(), markeredgewidth=1.1 * mark_scale(), **shown)
 
 
-def _add_legend(figure: "Figure", panels: Sequence[RankingPanel]) -> None:
+def _add_legend(figure: Figure, panels: Sequence[RankingPanel]) -> None:
     """Explain the marks that occur."""
     from matplotlib.lines import Line2D
 

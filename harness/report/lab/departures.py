@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +10,9 @@ from harness.measure.departures import Departure
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page import DataTable
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Chart, Figure
 from harness.report.kit.text import list_first
 from harness.report.lab.quantities import find_quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 ALL_STATIONS = "all"
 _CLEAR_RATIO = 0.05
@@ -133,7 +128,7 @@ def _check_name(check: Departure) -> str:
     return f"{label}, {check.station}" if check.station else label
 
 
-def _draw_checks(figure: "Figure", checks: Sequence[Departure], names: Sequence[str]) -> None:
+def _draw_checks(figure: Figure, checks: Sequence[Departure], names: Sequence[str]) -> None:
     axes = figure.subplots()
     ends = []
     for row, check in enumerate(checks):
@@ -164,7 +159,7 @@ def _with_ratio(checks: Sequence[Departure]) -> list[Departure]:
     ]
 
 
-def _scale_ratios(axes: "Axes", low: float, high: float) -> None:
+def _scale_ratios(axes: Axes, low: float, high: float) -> None:
     """Make the x axis logarithmic from `low` to `high`, with plain ticks that stand far enough apart."""
     from matplotlib.ticker import NullLocator
 

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from harness.core.interval import Interval
 from harness.core.number_format import format_fixed
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, series_colour
+from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Axes, Chart, Figure, series_colour
 from harness.report.kit.text import metric_label, metric_name
 from harness.results.trust_findings import (
     Equivalence,
@@ -19,10 +19,6 @@ from harness.results.trust_findings import (
     TrustFindings,
 )
 from harness.score.metrics import DEFINITIONS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _ROW_IN, _PAIR_IN, _FRAME_IN, _RANK_IN = 0.3, 0.46, 0.85, 4.2
 _DEVICE: Mapping[str, Any] = {"color": COLOURS[1], "marker": "o"}
@@ -92,7 +88,7 @@ def pairs_chart(findings: TrustFindings) -> Chart | None:
     )
 
 
-def _draw_pairs(figure: "Figure", pairs: Sequence[PairAgreement], metric: str) -> None:
+def _draw_pairs(figure: Figure, pairs: Sequence[PairAgreement], metric: str) -> None:
     axes = figure.subplots()
     for row, pair in enumerate(pairs):
         for side, style, label, shift in (
@@ -114,7 +110,7 @@ def _draw_pairs(figure: "Figure", pairs: Sequence[PairAgreement], metric: str) -
     add_legend(figure, axes)
 
 
-def _draw_side(axes: "Axes", side: SideDifference, y: float, style: Mapping[str, Any], label: str | None) -> None:
+def _draw_side(axes: Axes, side: SideDifference, y: float, style: Mapping[str, Any], label: str | None) -> None:
     if side.mean is None:
         return
     if side.low is not None and side.high is not None:
@@ -150,7 +146,7 @@ def ranks_chart(findings: TrustFindings) -> Chart | None:
     )
 
 
-def _draw_ranks(figure: "Figure", arms: Sequence[tuple[str, float, float]], margin: float, metric: str) -> None:
+def _draw_ranks(figure: Figure, arms: Sequence[tuple[str, float, float]], margin: float, metric: str) -> None:
     axes = figure.subplots()
     values = [value for _, x, y in arms for value in (x, y)]
     pad = max(0.08 * (max(values) - min(values)), margin)
@@ -190,7 +186,7 @@ def _in_margins(value: float | None, row: Equivalence) -> float:
     return math.nan if value is None else value / row.margin
 
 
-def _draw_equivalence(figure: "Figure", rows: Sequence[Equivalence]) -> None:
+def _draw_equivalence(figure: Figure, rows: Sequence[Equivalence]) -> None:
     axes = figure.subplots()
     axes.axvspan(-1.0, 1.0, color=GRID, alpha=0.75, linewidth=0.0)
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
@@ -233,7 +229,7 @@ def _ratio(row: ErrorDistance) -> float:
     return (row.distance or 0.0) / (row.split_half or math.nan)
 
 
-def _draw_distances(figure: "Figure", rows: Sequence[ErrorDistance], level: float) -> None:
+def _draw_distances(figure: Figure, rows: Sequence[ErrorDistance], level: float) -> None:
     axes = figure.subplots()
     for n, row in enumerate(rows):
         differs = row.p_holm is not None and row.p_holm <= level

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,16 +13,12 @@ from harness.measure.validation_report import ResidualSeries, ValidationReport
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
-from harness.report.kit.style import COLOURS, FAINT, Chart
+from harness.report.kit.style import COLOURS, FAINT, Axes, Chart, Figure
 from harness.report.kit.text import metric_label
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
 from harness.report.lab.quantities import find_quantity
 from harness.report.lab.unit_page import capture_text, stretches_table
 from harness.score.metrics import DEFINITIONS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _OFFSETS = ("time_offset_orientation_s", "time_offset_position_s")
 _ROW_IN, _FRAME_IN, _SERIES_IN = 0.34, 0.75, 0.95
@@ -39,7 +34,7 @@ def offsets_chart(report: ValidationReport) -> Chart | None:
     names = [find_quantity(key).label.removeprefix("time offset ") for key in offsets]
     shown = [find_quantity(key).of(number) for key, number in offsets.items()]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for row, (number, colour) in enumerate(zip(shown, (COLOURS[1], COLOURS[0]), strict=True)):
             axes.plot([number.low, number.high], [row, row], color=colour, linewidth=2.2)
@@ -74,7 +69,7 @@ def residuals_chart(report: ValidationReport) -> Chart | None:
     )
 
 
-def _draw_residuals(figure: "Figure", series: tuple[ResidualSeries, ...]) -> None:
+def _draw_residuals(figure: Figure, series: tuple[ResidualSeries, ...]) -> None:
     panels = figure.subplots(len(series), 2, sharex=True, sharey="col", squeeze=False)
     for (left, right), one in zip(panels, series, strict=True):
         _draw_errors(left, one.time_s, 1e3 * one.position_m, COLOURS[1])
@@ -86,7 +81,7 @@ def _draw_residuals(figure: "Figure", series: tuple[ResidualSeries, ...]) -> Non
         axes.set_xlabel("time since the start [s]")
 
 
-def _draw_errors(axes: "Axes", time_s: Floats, values: Floats, colour: str) -> None:
+def _draw_errors(axes: Axes, time_s: Floats, values: Floats, colour: str) -> None:
     times, largest = insert_gaps(*largest_of_stretches(time_s, values))
     axes.plot(times, largest, color=colour, linewidth=0.9)
     finite = values[np.isfinite(values)]

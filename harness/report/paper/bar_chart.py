@@ -3,20 +3,16 @@
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_number
 from harness.report.kit.chart import add_legend
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, series_colour
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, series_colour
 from harness.report.paper.figure_table import SeriesValues, series_values
 from harness.results.findings import BarChart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _HATCHES = ("", "////", "....", "xxxx")
 """Fill patterns of grey bars."""
@@ -49,7 +45,7 @@ class _BarSeries:
         return np.maximum(np.nan_to_num(out), 0.0)
 
 
-def draw_bars(figure: "Figure", bars: BarChart, colour_indices: Mapping[str, int]) -> None:
+def draw_bars(figure: Figure, bars: BarChart, colour_indices: Mapping[str, int]) -> None:
     """Draw the chart; `colour_indices` gives each series the index of its colour."""
     axes, horizontal = figure.subplots(), is_horizontal(bars)
     thick = _GROUP / max(len(bars.series), 1)
@@ -121,7 +117,7 @@ def _bar_style(n: int) -> dict[str, Any]:
     return {"color": series_colour(n), "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
 
 
-def _draw_whiskers(axes: "Axes", row: _BarSeries, horizontal: bool) -> None:
+def _draw_whiskers(axes: Axes, row: _BarSeries, horizontal: bool) -> None:
     """Draw standard deviations as thin lines and intervals with caps."""
     line = axes.hlines if horizontal else axes.vlines
     line(row.along, np.maximum(row.length - row.spread, 0.0), row.length + row.spread, color=FAINT, linewidth=0.9)
@@ -131,7 +127,7 @@ def _draw_whiskers(axes: "Axes", row: _BarSeries, horizontal: bool) -> None:
         axes.plot(*at, "|" if horizontal else "_", color=INK, markersize=6, markeredgewidth=1.3)
 
 
-def _draw_numbers(axes: "Axes", row: _BarSeries, unit: str, horizontal: bool) -> None:
+def _draw_numbers(axes: Axes, row: _BarSeries, unit: str, horizontal: bool) -> None:
     """Write the value of every bar beyond its tip, and a dash for a missing bar."""
     for along, value, tip, published in zip(row.along, row.length, row.tips, row.published, strict=True):
         off = 10 if tip == published else 4
@@ -147,7 +143,7 @@ def _draw_numbers(axes: "Axes", row: _BarSeries, unit: str, horizontal: bool) ->
         )
 
 
-def _draw_published(axes: "Axes", rows: list[_BarSeries], horizontal: bool) -> None:
+def _draw_published(axes: Axes, rows: list[_BarSeries], horizontal: bool) -> None:
     """Draw a diamond at each published value, with one entry in the legend."""
     label: str | None = "published"
     for row in rows:
@@ -157,7 +153,7 @@ def _draw_published(axes: "Axes", rows: list[_BarSeries], horizontal: bool) -> N
             label = None
 
 
-def _label_axes(axes: "Axes", bars: BarChart, horizontal: bool) -> None:
+def _label_axes(axes: Axes, bars: BarChart, horizontal: bool) -> None:
     middles = np.arange(len(bars.groups))
     letters = _HORIZONTAL_LETTERS if horizontal else _LETTERS // max(len(bars.groups), 1)
     names = [textwrap.fill(group, letters) for group in bars.groups]

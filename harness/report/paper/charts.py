@@ -4,18 +4,14 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import count
-from typing import TYPE_CHECKING
 
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.style import Chart
+from harness.report.kit.style import Chart, Figure
 from harness.report.kit.text import to_file_name
 from harness.report.paper.bar_chart import draw_bars, explain_signs, height_in
 from harness.report.paper.figure_table import alt_text, is_measured
 from harness.report.paper.line_chart import draw_lines
 from harness.results.findings import BarChart, LineChart, PaperExperiment, PaperFindings
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LINES_IN = 3.4
 """Height of a line chart [in]."""
@@ -43,7 +39,7 @@ def _chart(name: str, content: BarChart | LineChart, colours: Mapping[str, int])
     if not is_measured(content):
         return None
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         if isinstance(content, LineChart):
             draw_lines(figure, content, colours)
         else:

@@ -1,17 +1,13 @@
 """Line charts of a paper's page; each line has its name at its end, or in a legend if there are many."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.report.kit.chart import add_legend, decimate, label_line_ends
-from harness.report.kit.style import series_style
+from harness.report.kit.style import Figure, series_style
 from harness.report.paper.figure_table import series_values
 from harness.results.findings import LineChart
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _MOST_NAMED = 10
 """Most lines that have their names at their ends; more lines have a legend."""
@@ -19,7 +15,7 @@ _MOST_MARKERS = 25
 """About the most points of a line that are marked."""
 
 
-def draw_lines(figure: "Figure", lines: LineChart, colour_indices: Mapping[str, int]) -> None:
+def draw_lines(figure: Figure, lines: LineChart, colour_indices: Mapping[str, int]) -> None:
     """Draw the chart; `colour_indices` gives each series the index of its colour. Gaps stay open."""
     from matplotlib.ticker import MaxNLocator
 

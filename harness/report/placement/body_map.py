@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,13 +19,9 @@ from harness.core.progress import report_step
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
-from harness.report.kit.style import FAINT, INK, Chart
+from harness.report.kit.style import FAINT, INK, Axes, Chart, Figure
 from harness.report.placement.wording import plain_name
 from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS = "viridis"
 _SOFTENING_M = 0.02
@@ -118,7 +113,7 @@ def _chart(
     texts = {n: f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order[:_MOST_NAMED]}
     texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -161,7 +156,7 @@ def _chart(
     )
 
 
-def label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
+def label_places(axes: Axes, at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
     """Write a name with a line to its ball for each place: above the arms, and in columns next to the rest."""
     height, width = size
     for right in (False, True):

@@ -2,14 +2,13 @@
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.interval import Interval
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, Figure, hide_frame
 from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
 from harness.report.placement.wording import (
@@ -28,9 +27,6 @@ from harness.results.placement_findings import (
     RankAgreement,
     Ranking,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
 _ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20
@@ -64,7 +60,7 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
     """Paired difference of each set to the first one, and the ranks that remain possible."""
     rows = ranking.rows[:_MOST_ROWS]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         axes.axvline(0.0, color=INK, linewidth=0.8)
         for y, row in enumerate(rows):
@@ -106,7 +102,7 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
     rows = sorted((w for w in contributions if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
     title = worth_label(findings, contributions[0])
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for y, row in enumerate(rows):
             significant = row.low is not None and row.high is not None and not row.low <= 0.0 <= row.high
@@ -136,7 +132,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
     steps = [(step, findings.of(step.stations)) for step in search.steps]
     measured = [(step, tried) for step, tried in steps if tried and tried.mean is not None]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         means = [mean_or_nan(tried) for _, tried in measured]
         axes.plot(means, range(len(measured)), color=_BEST, linewidth=1.2, alpha=0.6)
@@ -174,7 +170,7 @@ def stability_chart(findings: PlacementFindings) -> Chart:
     names = [condition.name for condition in findings.conditions]
     agreements = {frozenset((pair.a, pair.b)): pair for pair in findings.agreements}
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         from matplotlib import colormaps
         from matplotlib.patches import Rectangle
 

@@ -3,22 +3,18 @@
 import math
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.core.number_format import count_noun
 from harness.core.seeds import generator
 from harness.errors import NothingMeasured
 from harness.report.figures.print_figure import PrintFigure
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, mark_scale, note_size
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale, note_size
 from harness.report.kit.text import metric_name
 from harness.report.placement.wording import measured_errors, set_name
 from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _BEST, _TIED = COLOURS[1], COLOURS[0]
 _LETTERS_PER_IN, _FEWEST_LETTERS, _AXES_SHARE = 11.2, 8, 0.75
@@ -36,7 +32,7 @@ def mean_or_nan(tried: StationSetResult) -> float:
     return math.nan if tried.mean is None else tried.mean
 
 
-def draw_pareto(figure: "Figure", findings: PlacementFindings, label: str) -> None:
+def draw_pareto(figure: Figure, findings: PlacementFindings, label: str) -> None:
     """Draw every set as a point, the best of each size with its interval and name, and circles around tied sets."""
     axes, size_of_mark = figure.subplots(), 6.5 * mark_scale()
     means: dict[int, list[float]] = {}
@@ -80,14 +76,14 @@ def draw_pareto(figure: "Figure", findings: PlacementFindings, label: str) -> No
     axes.grid(False, axis="x")
 
 
-def _leave_space_below(figure: "Figure", axes: "Axes", lines: int) -> None:
+def _leave_space_below(figure: Figure, axes: Axes, lines: int) -> None:
     """Extend the vertical axis downwards, by the height of a name of so many lines."""
     low, high = axes.get_ylim()
     share = 0.03 + 1.15 * lines * note_size() / (_AXES_SHARE * 72.0 * figure.get_figheight())
     axes.set_ylim(low - share / (1.0 - share) * (high - low), high)
 
 
-def _wrap(figure: "Figure", name: str, sizes: int) -> str:
+def _wrap(figure: Figure, name: str, sizes: int) -> str:
     """The name in lines that fit between its neighbours."""
     letters = _LETTERS_PER_IN * figure.get_figwidth() / mark_scale() / sizes
     return textwrap.fill(name, max(int(letters), _FEWEST_LETTERS))
@@ -109,7 +105,7 @@ def placement_figure(folder: Path) -> PrintFigure:
     if not measured_best(findings):
         raise NothingMeasured(folder, len(findings.failures))
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         draw_pareto(figure, findings, f"{metric_name(findings.metric)} [{findings.unit}]")
         handles, names = figure.axes[0].get_legend_handles_labels()
         marks = dict(zip(names, handles, strict=True))

@@ -1,7 +1,6 @@
 """Charts of a run's page: error over time with station quality, error distribution, error against a varied key."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,16 +8,12 @@ from harness.core.arrays import Floats
 from harness.report.kit.chart import add_legend, decimate, draw_chart, insert_gaps
 from harness.report.kit.error_lines import Highlights, draw_distribution, draw_over_time
 from harness.report.kit.inline_svg import BAND_OF
-from harness.report.kit.style import GRID, PAPER, Chart, hide_frame
+from harness.report.kit.style import GRID, PAPER, Axes, Chart, Figure, hide_frame
 from harness.report.kit.text import metric_label, to_file_name
 from harness.report.run.data import RunData, Trace
 from harness.report.run.tables import rows_by_setting
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 AXIS_LABELS = {metric: metric_label(metric) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
 """Metric -> label of its axis."""
@@ -39,7 +34,7 @@ def error_over_time(run: RunData, behaviour: str, highlights: Highlights) -> Cha
     which = clip + (f", the clip with the largest error of {len(clips)}" if len(clips) > 1 else "")
     bands = [trace for name, trace in shown.items() if len(trace.sigma_deg) and highlights.role(name)]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         rows = len(on_clip[0].stations)
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * rows + 0.25))
         names = [name for name in run.charted_series if name in shown]
@@ -74,7 +69,7 @@ def error_distribution(run: RunData, highlights: Highlights) -> Chart:
         parts = [t.errors[metric][t.scored] for t in run.traces if t.series == name]
         return np.concatenate(parts or [np.empty(0)])
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         styles = highlights.styles(run.charted_series)
         for axes, (metric, label) in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS.items(), strict=True):
             named = {name: values(metric, name) for name in styles}
@@ -111,7 +106,7 @@ def _effect_chart(run: RunData, behaviour: str, key: str, highlights: Highlights
     by_series = rows_by_setting(run, behaviour)
     names = [name for name in run.charted_series if name in by_series]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         styles = highlights.styles(names)
         for axes, (metric, label) in zip(figure.subplots(1, 2), AXIS_LABELS.items(), strict=True):
             for name, style in styles.items():
@@ -144,7 +139,7 @@ def omitted_series_note(run: RunData) -> str:
     return f" Only the {lines} of {series} methods with the lowest errors are shown." if lines < series else ""
 
 
-def _draw_quality(axes: "Axes", trace: Trace) -> None:
+def _draw_quality(axes: Axes, trace: Trace) -> None:
     """A band for each station, coloured by its quality."""
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -162,7 +157,7 @@ def _draw_quality(axes: "Axes", trace: Trace) -> None:
     axes.set_xlabel("time [s]")
 
 
-def _draw_sigma_band(axes: "Axes", trace: Trace, highlights: Highlights) -> None:
+def _draw_sigma_band(axes: Axes, trace: Trace, highlights: Highlights) -> None:
     """Shade the area up to the mean standard deviation of a frame's hinges."""
     bottom, top = axes.get_ylim()
     mean_deg = np.where(trace.scored, trace.sigma_deg.mean(axis=1), np.nan)

@@ -1,7 +1,6 @@
 """Errors at each bone and hinge: means on the body, distributions, and errors against stated deviations."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +13,9 @@ from harness.report.kit.body_chart import BodyGroup, draw_bodies, joint_titles
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.error_lines import Highlights
 from harness.report.kit.page import DataTable, Drawing
-from harness.report.kit.style import COLOURS, FAINT, INK, Chart
+from harness.report.kit.style import COLOURS, FAINT, INK, Axes, Chart, Figure
 from harness.report.run.data import RunData, Trace
 from harness.score.pair import hinged_bones, joint_names
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BONE_ROWS = {
     **{"head": "head", "upperneck": "upper neck", "lowerneck": "lower neck", "thorax": "thorax"},
@@ -71,7 +66,7 @@ def body_drawing(means: JointMeans) -> Drawing:
     """Bodies with the mean error at each joint, the rotation on the left and the position on the right, and numbers."""
     groups = _body_groups(means)
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         draw_bodies(figure, groups)
 
     largest = [
@@ -132,7 +127,7 @@ def error_per_joint(run: RunData, highlights: Highlights) -> Chart:
     points = _pooled_errors(run, control) if control else None
     has_points = points is not None and len(points[0]) > 0
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2)
         for axes, names, part, title in (
             (left, bones, 0, "rotation relative to the parent [deg]"),
@@ -172,7 +167,7 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
     names = standard_skeleton().dof_names
     share = np.mean(error_deg <= sigma_deg, axis=0)
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         panels = figure.subplots(1, 2)
         halves = np.array_split(np.arange(len(names)), 2)
         for axes, hinges in zip(panels, halves, strict=True):
@@ -198,14 +193,14 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
     )
 
 
-def _draw_bands(axes: "Axes", sigma_deg: Floats) -> None:
+def _draw_bands(axes: Axes, sigma_deg: Floats) -> None:
     """Bands (D,) from 0 to one and to two standard deviations [deg]."""
     rows = np.arange(len(sigma_deg))
     for times, alpha in ((2.0, 0.14), (1.0, 0.24)):
         axes.barh(rows, times * sigma_deg, height=0.94, color=COLOURS[1], alpha=alpha, linewidth=0)
 
 
-def _draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
+def _draw_boxes(axes: Axes, values: Floats, colour: str) -> None:
     """A horizontal box for each column of (N, M) values. Axes.boxplot would import pyplot with its global state."""
     low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
     places = np.arange(values.shape[1])

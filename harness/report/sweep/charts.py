@@ -3,21 +3,16 @@
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.number_format import count_noun, format_number
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
-from harness.report.kit.style import GRID, Chart, series_style
+from harness.report.kit.style import GRID, Axes, Chart, Figure, series_style
 from harness.report.kit.text import to_file_name, truncate
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MAX_SERIES, MAX_SCENARIOS, MAX_INTERVALS = 10, 12, 600
 """Most series in a chart, scenarios with a chart for a key, and intervals on a page (each needs a bootstrap)."""
@@ -118,7 +113,7 @@ def _row_labels(key: VariedKey) -> list[str]:
     return out
 
 
-def _draw(figure: "Figure", key: VariedKey, shown: Sequence[Curve]) -> None:
+def _draw(figure: Figure, key: VariedKey, shown: Sequence[Curve]) -> None:
     axes = figure.subplots()
     if not key.numbers:
         _draw_dots(axes, key, shown)
@@ -131,7 +126,7 @@ def _draw(figure: "Figure", key: VariedKey, shown: Sequence[Curve]) -> None:
         add_legend(figure, axes)
 
 
-def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tuple[float, str, str]]:
+def _draw_lines(axes: Axes, key: VariedKey, shown: Sequence[Curve]) -> list[tuple[float, str, str]]:
     """Draw each curve; returns the last value, name and colour of each."""
     ends = []
     for curve in shown:
@@ -155,7 +150,7 @@ def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tu
     return ends
 
 
-def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
+def _draw_dots(axes: Axes, key: VariedKey, shown: Sequence[Curve]) -> None:
     """Draw a row for each value with a dot for each series."""
     step = 0.8 / max(len(shown), 1)
     for row, curve in enumerate(shown):
