@@ -32,8 +32,7 @@ from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text, table_lines
 from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, statement_row
 from harness.report.kit.text import describe_motion_source, to_file_name
-from harness.report.paper.charts import figure_charts
-from harness.report.paper.figure_table import figure_table, is_measured
+from harness.report.paper.charts import figure_charts, figure_table, is_measured
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, Verdict
 from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings, read_findings
 from harness.results.folder_kind import FINDINGS

@@ -14,10 +14,8 @@ from matplotlib.text import Annotation
 
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS
-from harness.report.paper.bar_chart import draw_bars, height_in, is_horizontal
-from harness.report.paper.charts import figure_charts
-from harness.report.paper.figure_table import figure_table
-from harness.report.paper.line_chart import draw_lines
+from harness.report.paper.charts import figure_charts, figure_table
+from harness.report.paper.figures import draw_bars, draw_lines, height_in, is_horizontal
 from harness.results.findings import BarChart, LineChart, PaperExperiment
 from tests.report.fabricate_paper import METHODS, curves, liu, sets
 
