@@ -1,7 +1,7 @@
 """The page of a constellation: emitters heard and dilution of precision, by place and by station."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -31,10 +31,11 @@ def heard_chart(content: CoverageContent) -> Chart:
         from matplotlib.colors import BoundaryNorm, ListedColormap
 
     norm = BoundaryNorm((*_HEARD_EDGES, 10_000), len(_HEARD_COLOURS))
-    labels = [f"{low}" if high == low + 1 else f"{low} to {high - 1}" for low, high in _neighbours(_HEARD_EDGES)]
+    labels = [f"{low}" if high == low + 1 else f"{low} to {high - 1}" for low, high in itertools.pairwise(_HEARD_EDGES)]
+    views = [view.heard.astype(float) for view in content.views]
+    bar = ("emitters heard", [*labels, f"{_HEARD_EDGES[-1]} or more"])
     style = {"cmap": ListedColormap(_HEARD_COLOURS), "norm": norm}
-    ticks = _Ticks([*labels, f"{_HEARD_EDGES[-1]} or more"], "emitters heard")
-    return _plan_chart(content, "heard", "Emitters heard by place", style, ticks, lambda view: view.heard.astype(float))
+    return _plan_chart(content, "heard", "Emitters heard by place", views, style, bar)
 
 
 def dilution_chart(content: CoverageContent) -> Chart:
@@ -46,10 +47,11 @@ def dilution_chart(content: CoverageContent) -> Chart:
     count = len(_DILUTION_EDGES)
     colours = ListedColormap(colormaps["viridis_r"](np.linspace(0.0, 1.0, count)))
     norm = BoundaryNorm((*_DILUTION_EDGES, 1e9), count)
-    labels = [f"{low:g} to {high:g}" if low else f"below {high:g}" for low, high in _neighbours(_DILUTION_EDGES)]
-    ticks = _Ticks([*labels, f"{_DILUTION_EDGES[-1]:g} or more"], "dilution of precision; no colour: no fix")
+    labels = [f"{low:g} to {high:g}" if low else f"below {high:g}" for low, high in itertools.pairwise(_DILUTION_EDGES)]
+    views = [view.dilution for view in content.views]
+    bar = ("dilution of precision; no colour: no fix", [*labels, f"{_DILUTION_EDGES[-1]:g} or more"])
     style = {"cmap": colours, "norm": norm}
-    return _plan_chart(content, "dilution", "Dilution of precision by place", style, ticks, lambda view: view.dilution)
+    return _plan_chart(content, "dilution", "Dilution of precision by place", views, style, bar)
 
 
 def station_chart(content: CoverageContent) -> Chart:
@@ -81,30 +83,29 @@ def station_chart(content: CoverageContent) -> Chart:
     )
 
 
-class _Ticks:
-    """Labels of the colours of a plan view, and the title of its colour bar."""
-
-    def __init__(self, labels: list[str], title: str) -> None:
-        self.labels, self.title = labels, title
-
-
 def _plan_chart(
     content: CoverageContent,
     name: str,
     title: str,
+    views: Sequence[Floats],
     style: dict[str, Any],
-    ticks: _Ticks,
-    values: Callable[[PlanView], Floats],
+    bar: tuple[str, list[str]],
 ) -> Chart:
+    """The values of each view in colour; `bar` is the title of the colour bar, and a label for each colour."""
+
     def draw(figure: Figure) -> None:
         panels = figure.subplots(1, len(content.views), sharey=True, squeeze=False)[0]
-        for axes, view in zip(panels, content.views, strict=True):
-            image = _draw_view(axes, content, view, values(view), style)
+        for axes, view, values in zip(panels, content.views, views, strict=True):
+            image = _draw_view(axes, content, view, values, style)
         panels[0].set_ylabel("x, forward [m]")
-        bar = figure.colorbar(
-            image, ax=list(panels), orientation="horizontal", shrink=0.8, aspect=45, spacing="uniform"
-        )
-        _label_colours(bar, ticks)
+        look: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.8, "aspect": 45, "spacing": "uniform"}
+        colours = figure.colorbar(image, ax=list(panels), **look)
+        edges = np.array(style["norm"].boundaries)
+        colours.set_ticks(list(0.5 * (edges[:-1] + edges[1:])), labels=bar[1])
+        colours.ax.minorticks_off()
+        colours.ax.tick_params(length=0)
+        colours.set_label(bar[0])
+        colours.outline.set_visible(False)
 
     x_m, y_m = content.views[0].x_m, content.views[0].y_m
     height_in = 1.25 + 2.55 * min(float(np.ptp(x_m) / np.ptp(y_m)), 2.0)
@@ -143,20 +144,6 @@ def _draw_view(axes: Axes, content: CoverageContent, view: PlanView, values: Flo
     for spine in axes.spines.values():
         spine.set_color(FAINT)
     return image
-
-
-def _label_colours(bar: Any, ticks: _Ticks) -> None:
-    """Name each colour of a bar at its middle."""
-    edges = np.array(bar.norm.boundaries)
-    bar.set_ticks(0.5 * (edges[:-1] + edges[1:]), labels=ticks.labels)
-    bar.ax.minorticks_off()
-    bar.ax.tick_params(length=0)
-    bar.set_label(ticks.title)
-    bar.outline.set_visible(False)
-
-
-def _neighbours(edges: tuple[Any, ...]) -> list[tuple[Any, Any]]:
-    return list(itertools.pairwise(edges))
 
 
 _DILUTION_NOTE = (

@@ -30,17 +30,8 @@ class PrintFigure:
     height_mm: float
 
 
-@dataclass(frozen=True)
-class DrawnFigure:
-    """The content of a figure's file, and the size that it has in print."""
-
-    data: bytes
-    width_mm: float
-    height_mm: float
-
-
-def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
-    """Draw a figure in one of FORMATS at one of WIDTHS_MM.
+def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> tuple[bytes, float]:
+    """Draw a figure in one of FORMATS at one of WIDTHS_MM; the content of its file, and its height in print [mm].
 
     UnknownName for another format, BadInput for another width and for a figure that is higher than a page.
     """
@@ -59,17 +50,9 @@ def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
         if height_mm > _MOST_HIGH_MM:
             advice = f"A page has {_MOST_HIGH_MM:.0f} mm. Show fewer methods (--methods) or conditions (--condition)."
             raise BadInput(f"The figure would be {height_mm:.0f} mm high.", advice)
-        return DrawnFigure(_to_bytes(drawn, figure.name, fmt), float(width_mm), height_mm)
-
-
-def _to_bytes(drawn: Figure, name: str, fmt: str) -> bytes:
-    match fmt:
-        case "pdf":
-            return to_pdf(drawn)
-        case "svg":
-            return to_svg(drawn, name, PRINT_SETTINGS).encode()
-        case _:
-            return to_png(drawn, _PNG_DPI)
+        if fmt == "svg":
+            return to_svg(drawn, figure.name, PRINT_SETTINGS).encode(), height_mm
+        return to_pdf(drawn) if fmt == "pdf" else to_png(drawn, _PNG_DPI), height_mm
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from harness.core.fault_report import is_system_fault
 from harness.core.files import write_bytes
@@ -17,54 +16,33 @@ from harness.report.figures.table_formats import format_table
 from harness.report.placement.pareto import placement_figure
 from harness.results.folder_kind import require_kind
 
-_FROM_RUN: dict[str, Callable[[ConditionSet, FigureSelection], PrintFigure]] = {
-    "ranking": ranking_figure,
-    "time": over_time_figure,
-    "joints": joints_figure,
-    "cdf": distribution_figure,
-}
-
 
 @dataclass(frozen=True)
 class FigureKind:
     """One kind of figure."""
 
     text: str
-    source: Literal["run", "placement"]
     width_mm: int
     """Default width."""
-    choices: frozenset[str]
+    choices: tuple[str, ...] = ()
     """Fields of `FigureSelection` that it uses."""
+    of_run: Callable[[ConditionSet, FigureSelection], PrintFigure] | None = None
+    """Plans the figure of a run; None for that of a placement study."""
 
 
+_RANKING = "mean error of each method with its interval, and the difference to the lowest"
+_TIME = "error over time on one clip: the leader and a control in colour, the others grey"
+_CHOICES = ("methods", "condition")
 KINDS = {
-    "ranking": FigureKind(
-        "mean error of each method with its interval, and the difference to the lowest",
-        "run",
-        85,
-        frozenset({"metric", "methods", "condition"}),
-    ),
-    "time": FigureKind(
-        "error over time on one clip: the leader and a control in colour, the others grey",
-        "run",
-        170,
-        frozenset({"metric", "methods", "condition", "clip", "control"}),
-    ),
+    "ranking": FigureKind(_RANKING, 85, (*_CHOICES, "metric"), ranking_figure),
+    "time": FigureKind(_TIME, 170, (*_CHOICES, "metric", "clip", "control"), over_time_figure),
     "joints": FigureKind(
-        "error at each bone of the leader and of a control",
-        "run",
-        85,
-        frozenset({"methods", "condition", "clip", "control"}),
+        "error at each bone of the leader and of a control", 85, (*_CHOICES, "clip", "control"), joints_figure
     ),
     "cdf": FigureKind(
-        "distribution of the errors of single frames",
-        "run",
-        85,
-        frozenset({"metric", "methods", "condition", "clip"}),
+        "distribution of the errors of single frames", 85, (*_CHOICES, "metric", "clip"), distribution_figure
     ),
-    "placement": FigureKind(
-        "error against the number of stations, of a placement study", "placement", 170, frozenset()
-    ),
+    "placement": FigureKind("error against the number of stations, of a placement study", 170),
 }
 """Kind -> what it shows."""
 
@@ -78,21 +56,18 @@ def plan_figure(folder: Path, kind: str, selection: FigureSelection) -> tuple[st
     if kind and kind not in KINDS:
         raise UnknownName("kind of figure", kind, KINDS)
     source = require_kind(folder, "run", "placement")
-    kind = kind or next(name for name, each in KINDS.items() if each.source == source)
-    if KINDS[kind].source != source:
-        fitting = ", ".join(name for name, each in KINDS.items() if each.source == source)
-        names = {"run": "a run", "placement": "a placement study"}
-        raise BadInput(
-            f"--kind {kind} with {folder}, {names[source]}.",
-            f"It is for {names[KINDS[kind].source]}. Choose {fitting}.",
-        )
+    fitting = [name for name, each in KINDS.items() if (each.of_run is not None) == (source == "run")]
+    kind = kind or fitting[0]
+    if kind not in fitting:
+        this, other = ("a run", "a placement study") if source == "run" else ("a placement study", "a run")
+        raise BadInput(f"--kind {kind} with {folder}, {this}.", f"It is for {other}. Choose {', '.join(fitting)}.")
     unused = [name for name, value in vars(selection).items() if value != getattr(FigureSelection(), name)]
     if unused := [name for name in unused if name not in KINDS[kind].choices]:
         raise BadInput(f"--{unused[0]} with --kind {kind}.", "It does not use that: leave it out.")
-    if kind not in _FROM_RUN:
+    plan = KINDS[kind].of_run
+    if plan is None:
         return kind, placement_figure(folder)
-    run = read_conditions(folder).select(selection.condition, selection.methods)
-    return kind, _FROM_RUN[kind](run, selection)
+    return kind, plan(read_conditions(folder).select(selection.condition, selection.methods), selection)
 
 
 FOLDER = "figures"
@@ -133,9 +108,10 @@ def write_figure(
     kind, figure = plan_figure(folder, kind, selection or FigureSelection())
     path = out or folder / FOLDER / f"{figure.name}.{fmt}"
     _check_output(path, force)
-    drawn = draw_figure(figure, fmt, width_mm or KINDS[kind].width_mm)
-    _write_output(path, drawn.data)
-    return WrittenFigure(path, kind, drawn.width_mm, drawn.height_mm, figure.caption)
+    width_mm = width_mm or KINDS[kind].width_mm
+    data, height_mm = draw_figure(figure, fmt, width_mm)
+    _write_output(path, data)
+    return WrittenFigure(path, kind, float(width_mm), height_mm, figure.caption)
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ def write_placement_page(folder: Path) -> Path:
     findings = read_placement(folder / FINDINGS)
     plots = clear_plots(folder)
     maps = [
-        draw_body_map(findings.candidates, shown, unit=findings.unit, number=number)
+        draw_body_map(findings.candidates, *shown, unit=findings.unit, number=number)
         for number, shown in enumerate(select_body_maps(findings.worth), start=1)
     ]
     missing = dict.fromkeys(f"The body map: {reason}" for chart, reason in maps if chart is None)

@@ -12,7 +12,7 @@ from harness.cli import main
 from harness.report.kit.render_process import start_renderer
 from harness.report.placement import body_map as body
 from harness.report.placement import page as placement_page
-from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
+from harness.report.placement.body_map import draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
 from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
@@ -162,11 +162,10 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
     among, more = select_body_maps(findings.worth)
-    assert len(among.values) == len(PLACES)
-    assert among.description == "error without it minus error with all 11 stations"
-    assert among.base == ()
-    assert more.base == ("pelvis", "left_ankle", "right_ankle")
-    assert set(more.values) == {place.name for place in PLACES} - set(more.base)
+    assert len(among[0]) == len(PLACES)
+    assert among[1:] == ("error without it minus error with all 11 stations", ())
+    assert more[2] == ("pelvis", "left_ankle", "right_ankle")
+    assert set(more[0]) == {place.name for place in PLACES} - set(more[2])
     assert select_body_maps(()) == []
 
 
@@ -192,7 +191,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
     }
     monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", ("right_ankle",)), unit="deg")
+    chart, missing = draw_body_map(PLACES, values, "worth", ("right_ankle",), unit="deg")
     assert chart is not None
     assert missing == ""
     assert "right ankle (worn)" in chart.svg
@@ -208,18 +207,18 @@ def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
     )
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_body_map(PLACES, BodyMapValues({"head": None}, "worth"), unit="deg") == (
+    assert draw_body_map(PLACES, {"head": None}, "worth", unit="deg") == (
         None,
         "no candidate has a value",
     )
     monkeypatch.setattr(body, "find_spec", lambda name: None)
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -230,13 +229,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, values: object, description: str, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
     values = {"head": 0.0, "left_ankle": 0.5}
     worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert draw_body_map(PLACES, BodyMapValues(values, "worth", worn), unit="deg")[1] == ""
+    assert draw_body_map(PLACES, values, "worth", worn, unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 

@@ -19,7 +19,6 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html, page_table
 from harness.report.sweep.charts import (
     MAX_SERIES,
-    Curve,
     _dot_chart_height_in,
     _draw,
     curves,
@@ -121,14 +120,14 @@ def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None
 
 
 def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folder: Path) -> None:
-    (fault,) = group_failures(read_sweep(folder))
-    assert (len(fault.cells), fault.message) == (84, "ValueError: <b>no</b> pose & no plan")
+    ((message, failed),) = group_failures(read_sweep(folder)).items()
+    assert (len(failed), message) == (84, "ValueError: <b>no</b> pose & no plan")
     said = text_of(folder / "report.html")
     assert "84 cells: ValueError: <b>no</b> pose & no plan" in said
     assert "and 64 more" in said
     assert said.count("Traceback (most recent call last)") == 1
     assert said.count(COMMAND) == 3
-    assert f"{COMMAND} --cell {shlex.quote(fault.cells[0])}" in said
+    assert f"{COMMAND} --cell {shlex.quote(failed[0])}" in said
     assert "FAILED 84, such as walking seed 1: local_pca on walking_p1_01" in sweep_text(read_sweep(folder))
 
 
@@ -219,7 +218,7 @@ def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Pat
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=5, vary={NOISE: ("clean", "default")})))
-    points = [point for curve in curves(sweep, sweep.keys[0], 0) for point in curve.points]
+    points = [point for curve in curves(sweep, sweep.keys[0], 0).values() for point in curve]
     assert len(points) == 6
     assert all(point.mean is not None and point.low is None for point in points)
 
@@ -264,10 +263,10 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 
 def test_names_and_values_on_a_chart_do_not_meet() -> None:
     names = [f"method_{n}[neighbours={n}]" for n in range(12)]
-    found = [
-        Curve(name, n, (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7)))
-        for n, name in enumerate(names)
-    ]
+    found = {
+        n: (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7))
+        for n in range(len(names))
+    }
     shown = select_curves(found)
     assert len(shown) == MAX_SERIES
     words = VariedKey("worn", ("head+torso+left_hand+right_hand+left_ankle+right_ankle+sternum", "a", "b"))
@@ -275,7 +274,7 @@ def test_names_and_values_on_a_chart_do_not_meet() -> None:
         made: list[Figure] = []
 
         def draw(figure: Figure, key: VariedKey = key, made: list[Figure] = made) -> None:
-            _draw(figure, key, shown)
+            _draw(figure, key, shown, names)
             made.append(figure)
 
         draw_chart(
