@@ -26,7 +26,7 @@ from harness.report.comparison.wording import (
     percent_of_a,
     rise_is_worse,
 )
-from harness.report.kit.axes import label_rows
+from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Axes, Chart, Figure
 
@@ -187,12 +187,11 @@ def _draw_intervals(figure: Figure, lines: Sequence[Difference], names: Sequence
         margin = percent_of_a(line, line.margin)
         axes.barh(row, 2.0 * margin, left=-margin, height=0.8, color=GRID, alpha=0.75)
         style = {"marker": ">" if line.difference > 0.0 else "<", **_MARKER_STYLES[line.verdict]}
-        if line.low is not None and line.high is not None:
-            ends = [percent_of_a(line, line.low), percent_of_a(line, line.high)]
-            axes.plot(ends, [row, row], color=style["color"], linewidth=2.2, solid_capstyle="butt")
-        axes.plot(percent_of_a(line, line.difference), row, markersize=6.5, linestyle="none", **style)
-        label = f"{format_change_percent(percent_of_a(line, line.difference))} {line.verdict}"
-        axes.annotate(label, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
+        low, middle, high = (percent_of_a(line, value) for value in (line.low, line.difference, line.high))
+        ends = (None, None) if line.low is None else (low, high)
+        draw_interval(
+            axes, row, ends, middle, f"{format_change_percent(middle)} {line.verdict}", markersize=6.5, **style
+        )
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
     label_rows(axes, names)
     axes.set_xlabel("B − A [% of A's mean]")

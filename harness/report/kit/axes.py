@@ -1,7 +1,7 @@
 """Axes: a vertical axis of named rows, and logarithmic and square-root scales with plain numbers."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,6 +14,18 @@ def label_rows(axes: Axes, names: Sequence[str]) -> None:
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0)
+
+
+def draw_interval(
+    axes: Axes, row: float, ends: tuple[float | None, float | None], value: float, note: str = "", **style: Any
+) -> None:
+    """Draw an estimate as a marker in a row, with a line between its ends, and a note to the right of the axes."""
+    low, high = ends
+    if low is not None and high is not None:
+        axes.plot([low, high], [row, row], color=style["color"], linewidth=2.2, solid_capstyle="butt")
+    axes.plot(value, row, **{"linestyle": "none", "markersize": 6, **style})
+    if note:
+        axes.annotate(note, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
 
 
 def set_log_scale(axes: Axes, side: Literal["x", "y"]) -> None:

@@ -1,9 +1,11 @@
 """A page as data: what it says is written once, `page_html` and `page_text` render it for a browser and a terminal."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.core.files import to_json_types
 from harness.errors import Outcome
 from harness.report.kit.markup import Markup
 from harness.report.kit.style import Chart
@@ -66,6 +68,11 @@ class Code:
 
     text: str
     title: str = ""
+
+
+def json_listing(content: Any, title: str) -> Code:
+    """A folded listing of a record as JSON."""
+    return Code(json.dumps(to_json_types(content), indent=2, ensure_ascii=False), title)
 
 
 @dataclass(frozen=True)

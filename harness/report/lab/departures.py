@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core.number_format import count_noun, format_fixed, format_p_value
 from harness.measure.departures import Departure
-from harness.report.kit.axes import label_rows
+from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page import DataTable
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Chart, Figure
@@ -136,12 +136,9 @@ def _draw_checks(figure: Figure, checks: Sequence[Departure], names: Sequence[st
         ratio, low, high = number.value, number.low, number.high
         colour = COLOURS[0] if check.is_named else FAINT
         low, high = max(low, _LEAST_RATIO), min(high, _MOST_RATIO)
-        axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt")
         marker = (">" if ratio > 1.0 else "<") if check.is_named else "o"
-        face = colour if check.is_named else PAPER
-        axes.plot(
-            np.clip(ratio, _LEAST_RATIO, _MOST_RATIO), row, marker, color=colour, markerfacecolor=face, markersize=6
-        )
+        face, value = colour if check.is_named else PAPER, float(np.clip(ratio, _LEAST_RATIO, _MOST_RATIO))
+        draw_interval(axes, row, (low, high), value, color=colour, marker=marker, markerfacecolor=face)
         ends += [low, high]
     axes.axvline(1.0, color=INK, linewidth=0.9, zorder=1)
     label_rows(axes, names)

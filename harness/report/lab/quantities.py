@@ -2,10 +2,11 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from harness.core.interval import Interval
+from harness.core.number_format import format_fixed
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,12 @@ _SUFFIXES: tuple[tuple[str, str, float], ...] = (
     ("_m", *_MM),
 )
 """Ends of keys that have no name here, with their unit."""
+
+
+def format_range(values: Iterable[float], decimals: int = 2) -> str:
+    """The smallest and the largest of several values, "2.1 to 3.0"; one number where they are written alike."""
+    found = list(values)
+    return " to ".join(dict.fromkeys(format_fixed(end, decimals) for end in (min(found), max(found))))
 
 
 def find_quantity(key: str) -> Quantity:

@@ -6,9 +6,9 @@ from typing import Any
 
 from harness.core.interval import Interval
 from harness.core.number_format import format_fixed
-from harness.report.kit.axes import label_rows
+from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Axes, Chart, Figure, series_colour
+from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, Figure, series_colour
 from harness.report.kit.text import metric_label, metric_name
 from harness.results.trust_findings import (
     Equivalence,
@@ -95,7 +95,9 @@ def _draw_pairs(figure: Figure, pairs: Sequence[PairAgreement], metric: str) -> 
             (pair.device, _DEVICE, "device", -0.14),
             (pair.simulated, _SIMULATION, "simulation", 0.14),
         ):
-            _draw_side(axes, side, row + shift, style, label if row == 0 else None)
+            if side.mean is not None:
+                name = None if row else label
+                draw_interval(axes, row + shift, (side.low, side.high), side.mean, label=name, **style)
         axes.annotate(
             pair.verdict,
             (1.02, row),
@@ -108,14 +110,6 @@ def _draw_pairs(figure: Figure, pairs: Sequence[PairAgreement], metric: str) -> 
     label_rows(axes, [f"{pair.a}\n− {pair.b}" for pair in pairs])
     axes.set_xlabel(f"difference in {metric_title(metric)}")
     add_legend(figure, axes)
-
-
-def _draw_side(axes: Axes, side: SideDifference, y: float, style: Mapping[str, Any], label: str | None) -> None:
-    if side.mean is None:
-        return
-    if side.low is not None and side.high is not None:
-        axes.plot([side.low, side.high], [y, y], color=style["color"], linewidth=2.2, solid_capstyle="butt")
-    axes.plot(side.mean, y, linestyle="none", markersize=6, label=label, **style)
 
 
 def _ranked(findings: TrustFindings) -> list[tuple[str, float, float]]:
@@ -197,10 +191,8 @@ def _draw_equivalence(figure: Figure, rows: Sequence[Equivalence]) -> None:
             min(max(_in_margins(value, row), -_MOST_MARGINS), _MOST_MARGINS)
             for value in (row.low, row.difference, row.high)
         )
-        axes.plot([low, high], [n, n], color=style["color"], linewidth=2.2, solid_capstyle="butt")
-        axes.plot(middle, n, linestyle="none", markersize=6, **style)
         text = f"{format_fixed(_in_margins(row.difference, row), 2, signed=True)} {row.verdict}"
-        axes.annotate(text, (1.02, n), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
+        draw_interval(axes, n, (low, high), middle, text, **style)
         reach = max(reach, 1.08 * abs(low), 1.08 * abs(high))
     axes.set_xlim(-reach, reach)
     label_rows(axes, [f"{row.arm}, {metric_name(row.metric)}" for row in rows])

@@ -36,7 +36,6 @@ from harness.results.trust_findings import (
     ErrorDistance,
     PairAgreement,
     PairVerdict,
-    RankCorrelation,
     StreamHealth,
     TrustFindings,
 )
@@ -154,14 +153,12 @@ def count_pairs(pairs: Sequence[PairAgreement]) -> dict[PairVerdict, int]:
 
 def correlations(findings: TrustFindings) -> list[str]:
     """Each correlation of ranks with its interval, or why there is none."""
-    return [_correlation(one) for one in findings.rank_correlations]
-
-
-def _correlation(one: RankCorrelation) -> str:
-    name = f"{one.name[0].upper()}{one.name[1:]}"
-    if one.value is None:
-        return f"{name}: not measured ({one.reason})."
-    return f"{name} {Interval.of(one.value, one.low, one.high)}."
+    return [
+        f"{one.name[0].upper()}{one.name[1:]}: not measured ({one.reason})."
+        if one.value is None
+        else f"{one.name[0].upper()}{one.name[1:]} {Interval.of(one.value, one.low, one.high)}."
+        for one in findings.rank_correlations
+    ]
 
 
 def _pairs_table(found: TrustFindings) -> DataTable:

@@ -22,7 +22,7 @@ from harness.measure.unit_report import (
 )
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section
 from harness.report.lab.departures import check_chart, departure_texts, departures_sentence, departures_table
-from harness.report.lab.quantities import find_quantity
+from harness.report.lab.quantities import find_quantity, format_range
 from harness.report.lab.unit_charts import (
     allan_chart,
     episodes_chart,
@@ -130,19 +130,12 @@ def _spread_sentence(report: UnitReport) -> str:
         for name in ("spread_m", "spread_rad")
     }
     parts = [
-        f"{noun} scatters by {_range(numbers, f'station.{name}')}"
+        f"{noun} scatters by {format_range(shown.factor * one.value for one in numbers)} {shown.unit}"
         for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
+        for shown in [find_quantity(f"station.{name}")]
         if numbers
     ]
     return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
-
-
-def _range(numbers: Sequence[Interval], key: str) -> str:
-    shown = find_quantity(key)
-    ends = [
-        format_fixed(shown.factor * end, 2) for end in (min(n.value for n in numbers), max(n.value for n in numbers))
-    ]
-    return f"{' to '.join(dict.fromkeys(ends))} {shown.unit}"
 
 
 def _noise_sentence(values: Mapping[str, Interval]) -> str:

@@ -1,22 +1,21 @@
 """The page of a validated capture: how far it is from its reference, then the registration, then each station."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
 from harness.core.number_format import format_fixed, format_number, format_share
 from harness.measure.validation_report import ResidualSeries, ValidationReport
-from harness.report.kit.axes import label_rows
+from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
 from harness.report.kit.style import COLOURS, FAINT, Axes, Chart, Figure
 from harness.report.kit.text import metric_label
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
-from harness.report.lab.quantities import find_quantity
+from harness.report.lab.quantities import find_quantity, format_range
 from harness.report.lab.unit_page import capture_text, stretches_table
 from harness.score.metrics import DEFINITIONS
 
@@ -37,8 +36,7 @@ def offsets_chart(report: ValidationReport) -> Chart | None:
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for row, (number, colour) in enumerate(zip(shown, (COLOURS[1], COLOURS[0]), strict=True)):
-            axes.plot([number.low, number.high], [row, row], color=colour, linewidth=2.2)
-            axes.plot(number.value, row, "o", color=colour, markersize=6)
+            draw_interval(axes, row, (number.low, number.high), number.value, color=colour, marker="o")
         label_rows(axes, names)
         axes.set_xlabel("time offset [ms]")
 
@@ -113,6 +111,7 @@ _DEGREES = math.degrees(1.0)
 
 def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, float | None]], command: str) -> Page:
     """The page of a capture that `command` validated; `scores` are errors of methods on it, by method and metric."""
+    reasons = [f"{find_quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
     return Page(
         verb="validate",
         name=report.name,
@@ -136,7 +135,7 @@ def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, 
                     *([BrowserOnly([Prose(_REGISTRATION)])] if report.numbers else []),
                     Drawing(partial(offsets_chart, report)),
                     _numbers_table(report),
-                    Bullets(_number_reasons(report), prefix="not measured: "),
+                    Bullets(reasons, prefix="not measured: "),
                 ],
             ),
             Section("Room and mounts", "poses", [_poses_table(report)]),
@@ -173,15 +172,11 @@ def _median_text(report: ValidationReport) -> str:
     places = [row.position.median.scaled(1e3).value for row in report.accuracy.values()]
     turns = [row.orientation.median.scaled(_DEGREES).value for row in report.accuracy.values()]
     parts = [
-        f"{_range([value for value in values if math.isfinite(value)], decimals)} {unit}"
+        f"{format_range(filter(math.isfinite, values), decimals)} {unit}"
         for values, decimals, unit in ((places, 1, "mm"), (turns, 2, "deg"))
         if any(map(math.isfinite, values))
     ]
     return f"{' and '.join(parts)} (median of each station)" if parts else ""
-
-
-def _range(values: Sequence[float], decimals: int) -> str:
-    return " to ".join(dict.fromkeys(format_fixed(end, decimals) for end in (min(values), max(values))))
 
 
 def registration_sentences(report: ValidationReport) -> list[str]:
@@ -205,10 +200,6 @@ def _numbers_table(report: ValidationReport) -> DataTable:
     return DataTable(["number", "estimate"], rows, caption=caption, label="registration")
 
 
-def _number_reasons(report: ValidationReport) -> list[str]:
-    return [f"{find_quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
-
-
 def _poses_table(report: ValidationReport) -> DataTable:
     """Position and orientation of the room and of each mount."""
     rows = [
@@ -229,8 +220,11 @@ def _accuracy_table(report: ValidationReport) -> DataTable:
     rows = [
         [
             station,
-            *_quantiles(row.position.median, row.position.rms, row.position.quantile95, factor=1e3),
-            *_quantiles(row.orientation.median, row.orientation.rms, row.orientation.quantile95, factor=_DEGREES),
+            *(
+                number.scaled(factor)
+                for of, factor in ((row.position, 1e3), (row.orientation, _DEGREES))
+                for number in (of.median, of.rms, of.quantile95)
+            ),
             f"{row.readings:,}",
             format_share(row.lost_share, 2),
         ]
@@ -239,10 +233,6 @@ def _accuracy_table(report: ValidationReport) -> DataTable:
     figures = [f"{name} [{unit}]" for unit in ("mm", "deg") for name in ("median", "RMS", "95 %")]
     caption = "Errors of each station after the registration. Below the numbers: 95 % intervals."
     return DataTable(["station", *figures, "readings", "lost"], rows, caption=caption, intervals_printed=False)
-
-
-def _quantiles(*numbers: Interval, factor: float) -> list[Interval]:
-    return [number.scaled(factor) for number in numbers]
 
 
 def _accuracy_reasons(report: ValidationReport) -> list[str]:

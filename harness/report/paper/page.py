@@ -1,6 +1,5 @@
 """The page of a reproduced paper: count of verdicts, every claim, then each experiment; and its tables in a README."""
 
-import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,7 +7,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import quote
 
-from harness.core.files import to_json_types
 from harness.core.number_format import count_noun
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.marked_block import describe_code, replace_block
@@ -27,6 +25,7 @@ from harness.report.kit.page import (
     Stack,
     Tally,
     TerminalOnly,
+    json_listing,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text, table_lines
@@ -279,11 +278,10 @@ def _circumstances(findings: PaperFindings) -> list[Block]:
     """The command that repeats the study, and the versions with which the page was made."""
     circumstances = findings.circumstances
     facts = {"seed": findings.seed, **{_FACTS[name]: circumstances[name] for name in _FACTS if name in circumstances}}
-    text = json.dumps(to_json_types(circumstances), indent=2, ensure_ascii=False)
     return [
         Code(findings.command),
         Bullets([f"{name}: {_format_fact(value)}" for name, value in facts.items()]),
-        *([Code(text, "All versions and circumstances")] if circumstances else []),
+        *([json_listing(circumstances, "All versions and circumstances")] if circumstances else []),
     ]
 
 

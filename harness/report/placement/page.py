@@ -1,11 +1,9 @@
 """The page of a placement study: recommended set, body map, error by number of stations, then every ranking."""
 
-import json
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.core.files import to_json_types
 from harness.core.interval import Interval
 from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed
 from harness.report.kit.chart import clear_plots
@@ -21,6 +19,7 @@ from harness.report.kit.page import (
     Section,
     Stack,
     TerminalOnly,
+    json_listing,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
@@ -324,8 +323,6 @@ def _failures(findings: PlacementFindings) -> list[Block]:
 
 
 def _circumstances(findings: PlacementFindings) -> list[Block]:
-    text = json.dumps(to_json_types(findings.circumstances), indent=2, ensure_ascii=False)
-    return [
-        Code(findings.command),
-        *([Code(text, "All versions and circumstances")] if findings.circumstances else []),
-    ]
+    versions = findings.circumstances
+    more = [json_listing(versions, "All versions and circumstances")] if versions else []
+    return [Code(findings.command), *more]

@@ -1,6 +1,5 @@
 """The page of a run: verdict, ranking and a picture first, then tables, charts and pictures of the worst seconds."""
 
-import json
 import shlex
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -11,14 +10,25 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Ints
-from harness.core.files import to_json_types
 from harness.core.number_format import NOT_MEASURED, format_number
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.document import chart_figure, data_uri, facts_list
 from harness.report.kit.error_lines import choose_highlights
 from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.motion_player import motion_player
-from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Drawing, Page, Prose, Section, Stack
+from harness.report.kit.page import (
+    Block,
+    BrowserOnly,
+    Bullets,
+    Code,
+    DataTable,
+    Drawing,
+    Page,
+    Prose,
+    Section,
+    Stack,
+    json_listing,
+)
 from harness.report.kit.page_html import write_page
 from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.report.kit.style import Chart
@@ -262,11 +272,10 @@ def _player(run: RunData, windows: Mapping[tuple[str, str], WorstWindow], reader
 
 def _conditions(run: RunData) -> list[Block]:
     """Facts, the manifest, and notes on the motion."""
-    text = json.dumps(to_json_types(run.manifest.as_dict()), indent=2, ensure_ascii=False)
     notes = list(dict.fromkeys(f"{trace.clip}: {note}" for trace in run.traces for note in trace.notes))
     return [
         BrowserOnly([facts_list(run_facts(run))]),
-        Code(text, "Inputs, metric versions, circumstances"),
+        json_listing(run.manifest.as_dict(), "Inputs, metric versions, circumstances"),
         BrowserOnly([Bullets(notes)], "Notes on the motion"),
     ]
 
