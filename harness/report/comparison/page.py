@@ -162,11 +162,14 @@ def _tables(comparison: Comparison, lines: Sequence[Difference], rest: Sequence[
     if not (lines or rest):
         return [BrowserOnly([Prose("Nothing was compared.")])]
     parts = [part for line in lines for part in parts_of(comparison, line)]
+    by_metric: dict[str, list[Difference]] = {}
+    for line in lines or rest:
+        by_metric.setdefault(line.metric, []).append(line)
     return [
         BrowserOnly([lines_table(comparison, lines, "gated lines")]),
         BrowserOnly([lines_table(comparison, parts, "parts of gated lines")], "By behaviour and performers"),
         BrowserOnly([lines_table(comparison, rest, "lines that are not gated")], "Lines that are not gated"),
-        BrowserOnly(_clip_tables(lines or rest), "Clip by clip"),
+        BrowserOnly([_clip_table(metric, of) for metric, of in by_metric.items()], "Clip by clip"),
         TerminalOnly(
             [
                 lines_table(comparison, lines, "gated lines", with_why=False),
@@ -213,15 +216,8 @@ def _reasons(lines: Sequence[Difference]) -> list[str]:
     return [f"cannot tell, {why}: {list_first(names)}" for why, names in found.items()]
 
 
-def _clip_tables(lines: Sequence[Difference]) -> list[DataTable]:
-    """For each metric a table with a row for each clip and a column for each line: A, B and their difference."""
-    return [
-        _clip_table(metric, [line for line in lines if line.metric == metric])
-        for metric in dict.fromkeys(line.metric for line in lines)
-    ]
-
-
 def _clip_table(metric: str, lines: Sequence[Difference]) -> DataTable:
+    """A row for each clip and a column for each line: A, B and their difference."""
     clips = clips_of(lines)
     varied = len({line.group for line in lines}) > 1
     head = ["clip", *(f"{line.method}, {line.group}" if varied else line.method for line in lines)]

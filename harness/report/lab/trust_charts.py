@@ -112,18 +112,13 @@ def _draw_pairs(figure: Figure, pairs: Sequence[PairAgreement], metric: str) -> 
     add_legend(figure, axes)
 
 
-def _ranked(findings: TrustFindings) -> list[tuple[str, float, float]]:
-    """Arm, device's mean and simulation's mean of the metric that arms are ranked by."""
-    return [
+def ranks_chart(findings: TrustFindings) -> Chart | None:
+    """Mean error of each method on both sides; None with fewer than two."""
+    arms = [
         (one.arm, one.device, one.simulated)
         for one in findings.equivalences
         if one.metric == findings.ranked_metric and one.device is not None and one.simulated is not None
     ]
-
-
-def ranks_chart(findings: TrustFindings) -> Chart | None:
-    """Mean error of each method on both sides; None with fewer than two."""
-    arms = _ranked(findings)
     if len(arms) < 2:
         return None
     margin = next(one.margin for one in findings.equivalences if one.metric == findings.ranked_metric)

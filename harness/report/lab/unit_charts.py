@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Floats
 from harness.measure.profile import QualityClass
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.unit_report import (
     EPISODE_KINDS,
     CaptureSummary,
-    DensityCurve,
     DeviationCurve,
     EpisodeMark,
     UnitReport,
@@ -104,7 +102,7 @@ def spectrum_chart(report: UnitReport) -> Chart | None:
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for n, curve in enumerate(report.spectra):
-            axes.plot(*_density(curve), label=curve.station, **_line(n))
+            axes.plot(*decimate(curve.frequency_hz, 1e6 * curve.density_m2_hz), label=curve.station, **_line(n))
         set_log_scale(axes, "x")
         set_log_scale(axes, "y")
         axes.set_xlabel("frequency [Hz]")
@@ -122,10 +120,6 @@ def spectrum_chart(report: UnitReport) -> Chart | None:
         _HEIGHT_IN,
         hover=True,
     )
-
-
-def _density(curve: DensityCurve) -> tuple[Floats, Floats]:
-    return decimate(curve.frequency_hz, 1e6 * curve.density_m2_hz)
 
 
 def episodes_chart(report: UnitReport) -> Chart | None:

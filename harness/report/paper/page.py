@@ -33,7 +33,7 @@ from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, sta
 from harness.report.kit.text import describe_motion_source, to_file_name
 from harness.report.paper.charts import figure_charts, figure_table, is_measured
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, Verdict
-from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings, read_findings
+from harness.results.findings import FindingsTable, PaperExperiment, PaperFindings, read_findings
 from harness.results.folder_kind import FINDINGS
 
 READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
@@ -201,7 +201,7 @@ def _experiment(findings: PaperFindings, experiment: PaperExperiment, folder: Pa
     figures: list[Block] = [
         Drawing(draw, figure_table(figure), "Numbers of this figure")
         if is_measured(figure)
-        else Prose(f"{_figure_title(figure)}: nothing was measured.")
+        else Prose(f"{figure_table(figure).title}: nothing was measured.")
         for draw, figure in zip(charts, experiment.figures, strict=True)
     ]
     none = Prose("no published statement to compare with")
@@ -225,10 +225,6 @@ def _experiment(findings: PaperFindings, experiment: PaperExperiment, folder: Pa
         ),
     ]
     return Section(experiment.title, anchor(experiment), blocks, f"{experiment.name}: {experiment.title}")
-
-
-def _figure_title(figure: BarChart | LineChart) -> str:
-    return f"{figure.title} [{figure.unit}]" if isinstance(figure, BarChart) else f"{figure.title}: {figure.y_label}"
 
 
 def _table(content: FindingsTable) -> Block:

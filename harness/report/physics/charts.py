@@ -60,7 +60,8 @@ def excursions_chart(comparison: ErrorModelComparison) -> Chart:
     )
     least_s = comparison.duration_range_s
     lasting = f"; dashed: only those of {least_s[0]:g} s or more" if least_s else ""
-    band = " Grey: the durations and sizes that excursions are held to." if _has_band(comparison) else ""
+    has_band = comparison.duration_range_s is not None or comparison.peak_range_m is not None
+    band = " Grey: the durations and sizes that excursions are held to." if has_band else ""
     return draw_chart(
         "excursions",
         "Duration and size of excursions",
@@ -206,10 +207,6 @@ def _draw_shares(axes: Axes, models: Sequence[TrackerErrorStatistics]) -> None:
 
 def _names(models: Sequence[TrackerErrorStatistics]) -> str:
     return " and ".join(model.label for model in models)
-
-
-def _has_band(comparison: ErrorModelComparison) -> bool:
-    return comparison.duration_range_s is not None or comparison.peak_range_m is not None
 
 
 def _truncated_note(comparison: ErrorModelComparison) -> str:

@@ -24,7 +24,6 @@ from harness.results.placement_findings import (
     MarginalContribution,
     PlacementFindings,
     PlacementSearch,
-    RankAgreement,
     Ranking,
 )
 
@@ -115,7 +114,8 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
         axes.margins(x=0.06)
         axes.set_xlabel(f"error without it minus error with it [{findings.unit}]")
 
-    values = ", ".join(f"{plain_name(row.candidate)} {_signed(row.difference)}" for row in rows)
+    gains = [Interval.of(row.difference, None, None, signed=True).number for row in rows]
+    values = ", ".join(f"{plain_name(row.candidate)} {gain}" for row, gain in zip(rows, gains, strict=True))
     return draw_chart(
         f"worth_{number}_{to_file_name(contributions[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
@@ -168,7 +168,7 @@ def _step_label(changed: str, ties: Sequence[str]) -> str:
 def stability_chart(findings: PlacementFindings) -> Chart:
     """Agreement of the rankings under each pair of conditions, as a matrix."""
     names = [condition.name for condition in findings.conditions]
-    agreements = {frozenset((pair.a, pair.b)): pair for pair in findings.agreements}
+    taus = {frozenset((pair.a, pair.b)): pair.tau for pair in findings.agreements}
 
     def draw(figure: Figure) -> None:
         from matplotlib import colormaps
@@ -178,7 +178,7 @@ def stability_chart(findings: PlacementFindings) -> Chart:
         for (row, a), (column, b) in itertools.product(enumerate(names), repeat=2):
             if column > row:
                 continue
-            tau = 1.0 if a == b else _tau(agreements.get(frozenset((a, b))))
+            tau = 1.0 if a == b else taus.get(frozenset((a, b)))
             if tau is None:
                 axes.text(column, row, "–", ha="center", va="center", color=FAINT)
                 continue
@@ -203,11 +203,3 @@ def stability_chart(findings: PlacementFindings) -> Chart:
         draw,
         1.1 + 0.36 * len(names),
     )
-
-
-def _signed(value: float | None) -> str:
-    return Interval.of(value, None, None, signed=True).number
-
-
-def _tau(pair: RankAgreement | None) -> float | None:
-    return pair.tau if pair else None

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed
+from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.page import (
     Block,
@@ -33,7 +33,6 @@ from harness.report.placement.wording import (
     TIE_NOTE,
     changes_sentence,
     format_rank_range,
-    format_stays,
     held_out_error,
     list_sets,
     original_candidates,
@@ -144,7 +143,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
                 *([held_out_error(findings, best)] if held_out else []),
                 *([Interval.of(best.crossed, None, None, findings.unit)] if crossed else []),
                 f"{tried.rate_hz:g} Hz" if tried else "",
-                Stack(best.of or "", f"stays best in {format_stays(best.stays)}" if best.stays else ""),
+                Stack(best.of or "", f"stays best in {format_share(best.stays)}" if best.stays else ""),
                 list_sets(best.ties) if best.ties else "none",
             ]
         )
@@ -296,7 +295,7 @@ def _ranks_table(findings: PlacementFindings) -> DataTable:
 def _stability_note(condition: PlacementCondition) -> str:
     if condition.stays is None:
         return ""
-    return f"; the best set stays best in {format_stays(condition.stays)} of resamples"
+    return f"; the best set stays best in {format_share(condition.stays)} of resamples"
 
 
 def _candidates_table(findings: PlacementFindings) -> DataTable:
