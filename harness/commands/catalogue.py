@@ -14,7 +14,7 @@ from harness.experiment.scenario import Scenario, load_scenario, shipped_scenari
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic
 from harness.reconstruct import registry
-from harness.report.figures.kinds import KINDS
+from harness.report.figures.writer import KINDS
 from harness.score.metrics import DEFINITIONS
 from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS

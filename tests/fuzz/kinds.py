@@ -34,10 +34,10 @@ from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
+from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
+from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.report.sweep.reader import read_sweep
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run

@@ -31,7 +31,7 @@ OUTCOME_TITLES: Mapping[Outcome, str] = {
 }
 
 
-def sentence(comparison: Comparison) -> str:
+def comparison_sentence(comparison: Comparison) -> str:
     """The outcome in one sentence."""
     gated = [line for line in comparison.differences if line.gated]
     counts = count_verdicts(gated)

@@ -1,10 +1,15 @@
-"""Which series of a chart with many lines are in colour: the leader and one control; the others are grey."""
+"""Lines of errors, over time and as distributions: the leader and one control in colour, the other methods grey."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from harness.report.kit.style import COLOURS, DASHES, muted_line_style
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.report.kit.axes import set_log_scale
+from harness.report.kit.chart import decimate, insert_gaps
+from harness.report.kit.style import COLOURS, DASHES, Axes, mark_scale, muted_line_style
 
 CONTROL = "ik"
 """The control unless another one is chosen: inverse kinematics without a model of the motion."""
@@ -62,3 +67,48 @@ def choose_highlights(ranked: Sequence[str], wanted: str = CONTROL) -> Highlight
 def find_series(series: Iterable[str], method: str) -> list[str]:
     """The series of a method: those of its name, with or without qualifiers in brackets."""
     return [name for name in series if name == method or name.startswith(f"{method} (")]
+
+
+_MARKERS_PER_LINE = 8
+
+
+def draw_over_time(axes: Axes, lines: Mapping[str, tuple[Floats, Floats]], highlights: Highlights, label: str) -> None:
+    """Draw times (F,) [s] and values (F,) of each series on a logarithmic axis; NaN and missing frames leave gaps."""
+    for name, style in highlights.styles(lines).items():
+        time_s, values = decimate(*insert_gaps(*lines[name]))
+        every, size = max(1, len(time_s) // _MARKERS_PER_LINE), 3.0 * mark_scale()
+        axes.plot(time_s, values, label=name + highlights.role(name), markevery=every, markersize=size, **style)
+    set_log_scale(axes, "y")
+    axes.set_ylabel(label)
+
+
+_SHARES = np.concatenate([np.linspace(0.0, 0.98, 150), np.linspace(0.981, 1.0, 60)])
+"""Shares at which curves have points, closer to each other where large errors are."""
+_MARKED = tuple(int(np.argmin(np.abs(_SHARES - share))) for share in (0.1, 0.3, 0.5, 0.7, 0.9))
+"""Points with a marker, in styles that have one."""
+
+
+def draw_distribution(
+    axes: Axes,
+    series: Mapping[str, Floats],
+    label: str,
+    styles: Mapping[str, Mapping[str, Any]],
+    role: Callable[[str], str] = lambda name: "",
+) -> None:
+    """Draw the distribution of the finite values (N,) of each series in its style; one without any has no curve.
+
+    `role` is what the legend adds to a name.
+    """
+    for name, values in series.items():
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            options = {
+                "label": name + role(name),
+                "markevery": list(_MARKED),
+                "markersize": 4.2 * mark_scale(),
+                **styles[name],
+            }
+            axes.plot(np.quantile(finite, _SHARES), 100.0 * _SHARES, **options)
+    set_log_scale(axes, "x")
+    axes.set_xlabel(label)
+    axes.set_ylim(0.0, 100.0)

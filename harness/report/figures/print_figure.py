@@ -1,15 +1,12 @@
-"""Figures for papers: PDF, SVG or PNG, as wide as a column or a page. The same data give the same bytes."""
+"""Figures for papers: what is chosen of a run, and files as wide as a column or a page, with the same bytes always."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from harness.core.working_folder import plain_import
 from harness.errors import BadInput, UnknownName
-from harness.report.kit.style import PRINT_SETTINGS, to_pdf, to_png, to_svg
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from harness.report.kit.style import PRINT_SETTINGS, Figure, to_pdf, to_png, to_svg
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 FORMATS = ("pdf", "svg", "png")
 WIDTHS_MM = (85, 170)
@@ -28,22 +25,13 @@ class PrintFigure:
     """File name without its suffix."""
     caption: str
     """Sentences for the caption: what is shown, on how many clips, and what the marks mean."""
-    draw: Callable[["Figure"], None]
+    draw: Callable[[Figure], None]
     """Draws on an empty figure; its width is that of the paper, and its height may be changed."""
     height_mm: float
 
 
-@dataclass(frozen=True)
-class DrawnFigure:
-    """The content of a figure's file, and the size that it has in print."""
-
-    data: bytes
-    width_mm: float
-    height_mm: float
-
-
-def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
-    """Draw a figure in one of FORMATS at one of WIDTHS_MM.
+def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> tuple[bytes, float]:
+    """Draw a figure in one of FORMATS at one of WIDTHS_MM; the content of its file, and its height in print [mm].
 
     UnknownName for another format, BadInput for another width and for a figure that is higher than a page.
     """
@@ -62,14 +50,20 @@ def draw_figure(figure: PrintFigure, fmt: str, width_mm: int) -> DrawnFigure:
         if height_mm > _MOST_HIGH_MM:
             advice = f"A page has {_MOST_HIGH_MM:.0f} mm. Show fewer methods (--methods) or conditions (--condition)."
             raise BadInput(f"The figure would be {height_mm:.0f} mm high.", advice)
-        return DrawnFigure(_to_bytes(drawn, figure.name, fmt), float(width_mm), height_mm)
+        if fmt == "svg":
+            return to_svg(drawn, figure.name, PRINT_SETTINGS).encode(), height_mm
+        return to_pdf(drawn) if fmt == "pdf" else to_png(drawn, _PNG_DPI), height_mm
 
 
-def _to_bytes(drawn: "Figure", name: str, fmt: str) -> bytes:
-    match fmt:
-        case "pdf":
-            return to_pdf(drawn)
-        case "svg":
-            return to_svg(drawn, name, PRINT_SETTINGS).encode()
-        case _:
-            return to_png(drawn, _PNG_DPI)
+@dataclass(frozen=True)
+class FigureSelection:
+    """What the user chose; the defaults leave the choice to the figure."""
+
+    metric: str = PRIMARY_METRIC
+    methods: tuple[str, ...] = ()
+    """Methods to show, in this order where order matters; empty: all."""
+    condition: str = ""
+    """Name of a condition or some of its parts (see `RunCondition.name`); empty: all, or the last varied values."""
+    clip: str = ""
+    control: str = ""
+    """The method that is highlighted next to the one with the lowest error."""

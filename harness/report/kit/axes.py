@@ -1,14 +1,34 @@
-"""Scales of axes with plain numbers: logarithmic, and the square root."""
+"""Axes: a vertical axis of named rows, and logarithmic and square-root scales with plain numbers."""
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from harness.report.kit.style import Axes
 
 
-def set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
+def label_rows(axes: Axes, names: Sequence[str]) -> None:
+    """Name the rows 0, 1, ... of the axes from the top, without ticks and grid lines between them."""
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0)
+
+
+def draw_interval(
+    axes: Axes, row: float, ends: tuple[float | None, float | None], value: float, note: str = "", **style: Any
+) -> None:
+    """Draw an estimate as a marker in a row, with a line between its ends, and a note to the right of the axes."""
+    low, high = ends
+    if low is not None and high is not None:
+        axes.plot([low, high], [row, row], color=style["color"], linewidth=2.2, solid_capstyle="butt")
+    axes.plot(value, row, **{"linestyle": "none", "markersize": 6, **style})
+    if note:
+        axes.annotate(note, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
+
+
+def set_log_scale(axes: Axes, side: Literal["x", "y"]) -> None:
     """Make an axis logarithmic, with plain numbers, unless no value on it is above zero (a perfect method)."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -23,7 +43,7 @@ def set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
         axis.set_major_formatter(lambda value, _: f"{value:g}")
 
 
-def set_root_scale(axes: "Axes") -> None:
+def set_root_scale(axes: Axes) -> None:
     """Give the x axis a square-root scale from 0, with plain numbers."""
     axes.set_xscale("function", functions=(np.sqrt, np.square))
     axes.set_xlim(left=0.0)
