@@ -9,7 +9,6 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
-from harness.core.plain_import import
 from harness.core.working_folder import plain_import
 from harness.report.coverage.content import CoverageContent, CoverageRow, PlanView, StationRow, format_dilution
 from harness.report.kit.axes import label_rows
