@@ -68,11 +68,7 @@ def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, 
 
 
 @cache
-def _synthetic_names() -> frozenset[str]:
-    return frozenset(_list_synthetic_names())
-
-
-def _list_synthetic_names() -> tuple[str, ...]:
+def _synthetic_names() -> tuple[str, ...]:
     """All takes; the behaviours alternate, so that the first names, which a message suggests, are of each."""
     takes = zip(*map(synthetic.take_names, synthetic.BEHAVIOURS), strict=True)
     return (*chain.from_iterable(takes), *RIG_TAKES)
@@ -88,7 +84,7 @@ class SyntheticSource:
         self._clips: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
-        return _list_synthetic_names()
+        return _synthetic_names()
 
     def check(self, name: str) -> None:
         if name not in _synthetic_names():
@@ -104,10 +100,9 @@ class SyntheticSource:
 
     def load(self, name: str) -> Clip:
         if name not in self._clips:
-            behaviour, performer, take = _parse_take_name(name)
             is_rig = name in RIG_TAKES
             self._clips[name] = (
-                generate_rig(name) if is_rig else synthetic.generate(behaviour, performer, take, seed=self._seed)
+                generate_rig(name) if is_rig else synthetic.generate(*_parse_take_name(name), seed=self._seed)
             )
         return self._clips[name]
 
@@ -196,7 +191,7 @@ def read_skeletons(folders: LibraryFolders) -> dict[str, Skeleton]:
     """
     paths = as_folders(folders)
     skeletons: dict[str, Skeleton] = {}
-    for path in (file for folder in paths for file in scan_folder(folder, (".asf",)).files):
+    for path in (file for folder in paths for file in scan_folder(folder, (".asf",))[0]):
         subject, skeleton = path.stem.split("_", 1)[0], _read_skeleton(path)
         if not np.array_equal(skeletons.setdefault(subject, skeleton).bone_m, skeleton.bone_m):
             raise BadFile(path, f"another skeleton of subject {subject}", "the same as its copy", "Remove one of them.")
