@@ -4,7 +4,6 @@ import os
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -21,50 +20,6 @@ from harness.mocap.synthetic.takes import RIG_TAKES, generate_rig
 MOCAP_VARIABLE = "HARNESS_MOCAP"
 POPULATION_SIZE = 100
 """Number of synthetic skeletons besides the performers': modes and spreads are then known to a tenth [choice]."""
-
-
-class MotionSource(Protocol):
-    """Clips by name."""
-
-    @property
-    def title(self) -> str:
-        """Name of the source in tables and on pages."""
-        ...
-
-    def names(self) -> tuple[str, ...]: ...
-    def check(self, name: str) -> None:
-        """Raise UnknownName unless there is such a clip."""
-        ...
-
-    def subject(self, name: str) -> str: ...
-    def performer(self, name: str) -> str:
-        """The performer of the clip where an index, CMU's name or the motion generator tells it, else ""."""
-        ...
-
-    def behaviour(self, name: str) -> str:
-        """What the performer does in the clip; "" where it is unknown."""
-        ...
-
-    def load(self, name: str) -> Clip:
-        """The clip; the same object each time."""
-        ...
-
-    def other_skeletons(self, without: str) -> dict[str, Skeleton]:
-        """Skeletons by subject of everybody but the subject `without`, to learn how people's bones vary."""
-        ...
-
-
-def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, rate_hz: float | None) -> MotionSource:
-    """The source `builtin` (the motion generator), or `cmu`: a library in one or several folders.
-
-    Without `folders`, HARNESS_MOCAP names the library. `rate_hz` is the rate of AMC files whose rate no index names.
-    Raises UnknownName for another kind, and BadInput when no folder is named or the library cannot be used.
-    """
-    if kind == "builtin":
-        return SyntheticSource(seed)
-    if kind != "cmu":
-        raise UnknownName("motion source", kind, ("builtin", "cmu"))
-    return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
 
 
 @cache
@@ -87,6 +42,7 @@ class SyntheticSource:
         return _synthetic_names()
 
     def check(self, name: str) -> None:
+        """Raise UnknownName unless there is such a take."""
         if name not in _synthetic_names():
             raise UnknownName("synthetic take", name, self.names())
 
@@ -99,6 +55,7 @@ class SyntheticSource:
         return _parse_take_name(name)[0]
 
     def load(self, name: str) -> Clip:
+        """The clip; the same object each time."""
         if name not in self._clips:
             is_rig = name in RIG_TAKES
             self._clips[name] = (
@@ -139,6 +96,7 @@ class LibrarySource:
         return self._library.names()
 
     def check(self, name: str) -> None:
+        """Raise UnknownName unless there is such a clip."""
         self._library.entry(name)
 
     def subject(self, name: str) -> str:
@@ -152,6 +110,7 @@ class LibrarySource:
         return self._library.entry(name).behaviour
 
     def load(self, name: str) -> Clip:
+        """The clip; the same object each time."""
         if name not in self._clips:
             self._clips[name] = self._library.load(name)
         return self._clips[name]
@@ -161,6 +120,23 @@ class LibrarySource:
         if self._skeletons is None:
             self._skeletons = read_skeletons(self._library.folders)
         return {subject: skeleton for subject, skeleton in self._skeletons.items() if subject != without}
+
+
+MotionSource = SyntheticSource | LibrarySource
+"""Clips by name. Either class says of a clip what an index, CMU's name or the motion generator tells; "" is unknown."""
+
+
+def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, rate_hz: float | None) -> MotionSource:
+    """The source `builtin` (the motion generator), or `cmu`: a library in one or several folders.
+
+    Without `folders`, HARNESS_MOCAP names the library. `rate_hz` is the rate of AMC files whose rate no index names.
+    Raises UnknownName for another kind, and BadInput when no folder is named or the library cannot be used.
+    """
+    if kind == "builtin":
+        return SyntheticSource(seed)
+    if kind != "cmu":
+        raise UnknownName("motion source", kind, ("builtin", "cmu"))
+    return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
 
 
 def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
