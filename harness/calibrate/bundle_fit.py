@@ -38,7 +38,6 @@ class BundleFit:
     """(P,) error of the hinges in each pose, standard deviation [rad]."""
     heading_sd_rad: float
     """Standard deviation of the performer's heading in the first pose [rad]."""
-    rounds: int
 
 
 def fit_bundle(bundle: BundleAdjustment, position_sd_m: float, orientation_sd_rad: float) -> BundleFit:
@@ -63,11 +62,10 @@ def fit_bundle(bundle: BundleAdjustment, position_sd_m: float, orientation_sd_ra
             break
     normal = bundle.normal_equations(at, scales, weight)
     covariance, pose_variance = normal.variances()
-    pose_error_rad, heading_sd_rad = (
-        _pose_error_rad(bundle, at, scales, pose_variance),
-        float(np.sqrt(pose_variance[0, 5])),
-    )
-    return BundleFit(at, scales, weight, normal, covariance, pose_error_rad, heading_sd_rad, rounds)
+    squared_error = np.sum(bundle.pose_errors(at)[:, 2:] ** 2, axis=1)
+    pose_error_rad: Floats = np.sqrt(squared_error / _effective_hinges(scales, pose_variance))
+    heading_sd_rad = float(np.sqrt(pose_variance[0, 5]))
+    return BundleFit(at, scales, weight, normal, covariance, pose_error_rad, heading_sd_rad)
 
 
 def levenberg_marquardt_step(
@@ -102,13 +100,6 @@ def _likeliest_scales(
         pose_error_rad=float(np.clip(pose_error_rad, LEAST_POSE_ERROR_RAD, MOST_POSE_ERROR_RAD)),
         mount_spread=float(np.clip(mount_spread, LEAST_MOUNT_SPREAD, MOST_MOUNT_SPREAD)),
     )
-
-
-def _pose_error_rad(
-    bundle: BundleAdjustment, at: CalibrationSolution, scales: ResidualScales, pose_variance: Floats
-) -> Floats:
-    squared_error = bundle.pose_errors(at)[:, 2:] ** 2
-    return np.asarray(np.sqrt(np.sum(squared_error, axis=1) / _effective_hinges(scales, pose_variance)))
 
 
 def _effective_hinges(scales: ResidualScales, pose_variance: Floats) -> Floats:
