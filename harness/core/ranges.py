@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from harness.errors import BadInput, shorten
 
@@ -74,12 +74,6 @@ def check_words(words: object) -> None:
             check_words(word)
 
 
-class Constraint(Protocol):
-    """A rule for the values of a field; `str` puts it into words."""
-
-    def accepts(self, value: Any) -> bool: ...
-
-
 @dataclass(frozen=True)
 class Range:
     """The numbers that a field may have, both ends included; for a tuple, the numbers that each entry may have."""
@@ -104,10 +98,14 @@ class Range:
         return f"{kind} from {self.low:g}" + (f" to {self.high:g}" if math.isfinite(self.high) else "")
 
 
+Constraint = Range | Label
+"""A rule for the values of a field; `str` puts it into words."""
+
+
 def constraints_of(hint: Any) -> tuple[Constraint, ...]:
     """The rules that an annotation declares for the value itself."""
     extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-    return tuple(extra for extra in extras if isinstance(extra, Range | Label))
+    return tuple(extra for extra in extras if isinstance(extra, Constraint))
 
 
 def check_fields(record: object, **more: Range) -> None:

@@ -9,7 +9,6 @@ import csv
 import io
 import unicodedata
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from harness.core.csv_text import unescape_formula
@@ -19,22 +18,14 @@ from harness.errors import BadFile, BadInput
 from harness.mocap.read.file_checks import check_size
 
 FETCHED = ".fetch-"
-"""Prefix of the names of folders of `harness mocap fetch`, which hold files before they are checked."""
+"""Prefix of the name of the lock of `harness mocap fetch`, and of folders that earlier versions left."""
 
 
-@dataclass(frozen=True)
-class FolderScan:
-    """What a folder holds, at any depth."""
+def scan_folder(folder: Path, suffixes: Collection[str]) -> tuple[list[Path], list[Path]]:
+    """Files of a folder, at any depth, with lower-case `suffixes` such as ".amc", and ignored paths, both sorted.
 
-    files: tuple[Path, ...]
-    """Files with one of the suffixes, sorted; links to files inside the folder are among them."""
-    ignored_paths: tuple[Path, ...]
-    """Links that lead outside the folder or to nothing, and folders that cannot be read, sorted."""
-
-
-def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
-    """Search a folder for files with lower-case `suffixes` such as ".amc".
-
+    Links to files inside the folder are among the files. Ignored are links that lead outside the folder or to nothing,
+    and folders that cannot be read.
     A link to a folder inside is not walked again: its files are found where they lie, so loops of links are harmless.
     """
     top = folder.resolve()
@@ -56,7 +47,7 @@ def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
                 waiting += [] if link else [path]
             elif path.suffix.lower() in suffixes and path.is_file():
                 files.append(path)
-    return FolderScan(tuple(sorted(files)), tuple(sorted(ignored)))
+    return sorted(files), sorted(ignored)
 
 
 INDEX_NAME = "manifest.csv"

@@ -150,23 +150,23 @@ MAX_LISTED = 8
 """Number of spikes, and of turns, that are listed; the others are counted."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Inspection:
     """Facts about a motion with their evidence, and findings to check before the motion is used."""
 
     name: str
-    format: str
+    format: str = "clip"
     """`amc`, `bvh`, `mvnx`, `npz`, `c3d` or `clip` (in memory)."""
     frames: int
     rate_hz: float
-    rate_evidence: str
-    height_m: float | None
+    rate_evidence: str = "of the clip"
+    height_m: float | None = None
     """Height of the skeleton from sole to top joint [m]; None where the file holds no bones."""
     up: str
     """The file's axis that points up, with the evidence."""
-    unit_m: float
+    unit_m: float = 1.0
     """Length of 1 in the file [m]."""
-    unit_evidence: str
+    unit_evidence: str = "metres"
     floor_m: float
     """Height of the floor above z = 0 [m]."""
     contact_share: float
@@ -176,21 +176,21 @@ class Inspection:
     fastest_joint: str
     fastest_frame: int
     spikes: tuple[Spike, ...]
-    turns: tuple[SuddenTurn, ...]
+    turns: tuple[SuddenTurn, ...] = ()
     """Turns of a hand or foot by 30 deg and more in a single frame; empty where there are no bones."""
     frozen: tuple[tuple[int, int], ...]
     """First and last frame of each run of equal frames, counted from 1."""
-    missing_share: float
+    missing_share: float = 0.0
     """Share of marker positions that are missing; 0 for skeletons."""
-    missing_markers: tuple[str, ...]
+    missing_markers: tuple[str, ...] = ()
     """Markers with missing positions."""
-    limits_share: float | None
+    limits_share: float | None = None
     """Share of frames with a hinge outside the model's limits; None where there are no hinges."""
-    limits_worst: str
+    limits_worst: str = ""
     """The hinge that exceeds its limits most, and by how much."""
     doubts: tuple[str, ...]
     """Evidence against the unit or the axes."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def duration_s(self) -> float:

@@ -83,24 +83,25 @@ def test_a_bad_name_of_a_baseline_is_refused(tmp_path: Path, name: str) -> None:
     assert one_line(str(caught.value))
 
 
-@pytest.mark.parametrize("word", ["", "x" * 300, "a\0b", "a\nb", "x" * 300 + "/run"])
+WORDS = ("", "x" * 300, "a\0b", "a\nb", "x" * 300 + "/run")
+COMMANDS = (
+    ["run", "demo", "--out", "WORD"],
+    ["run", "WORD"],
+    ["run", "demo", "--methods", "WORD", "--out", "out"],
+    ["sweep", "WORD"],
+    ["placement", "WORD"],
+    ["baseline", "save", "WORD", "run"],
+    ["baseline", "save", "main", "WORD"],
+    ["compare", "WORD", "run"],
+    ["report", "WORD"],
+    ["status", "WORD"],
+    ["check", "WORD"],
+    ["inspect", "WORD"],
+)
+
+
 @pytest.mark.parametrize(
-    "command",
-    [
-        ["run", "demo", "--out", "WORD"],
-        ["run", "WORD"],
-        ["run", "demo", "--methods", "WORD", "--out", "out"],
-        ["sweep", "WORD"],
-        ["placement", "WORD"],
-        ["baseline", "save", "WORD", "run"],
-        ["baseline", "save", "main", "WORD"],
-        ["compare", "WORD", "run"],
-        ["report", "WORD"],
-        ["status", "WORD"],
-        ["check", "WORD"],
-        ["inspect", "WORD"],
-    ],
-    ids=" ".join,
+    ("command", "word"), [*((COMMANDS[0], word) for word in WORDS), *((command, WORDS[3]) for command in COMMANDS[1:])]
 )
 def test_a_bad_word_of_the_command_line_is_refused(
     command: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

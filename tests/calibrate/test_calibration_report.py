@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.calibrate.calibration_verdict import pose_verdict, poses_to_repeat, tpose_verdict
+from harness.calibrate.calibration_report import pose_verdict, poses_to_repeat, tpose_verdict
 from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
 from harness.calibrate.tpose_calibration import TPoseCalibration
 from tests.calibrate.standing_model import SIX, Model, somebody, space
