@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import build_parser, main
-from harness.commands.common import repeat_flags
+from harness.commands.flags import repeat_flags
 from harness.commands.run import _named_methods
 from harness.reconstruct import registry
 from tests.short_demo import short_demo

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.commands import ending
+from harness.commands import output
 from harness.errors import Outcome
 from tests.interrupts import heeding_interrupts
 from tests.report.fabricate import Plan, fabricate
@@ -276,7 +276,7 @@ def test_a_folder_that_is_read_only_can_be_looked_at(tmp_path: Path) -> None:
 
 
 def test_data_are_printed_whole(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ending.print_data("a\n")
+    assert output.print_data("a\n")
     assert capsys.readouterr().out == "a\n"
 
 

@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import (
+from harness.commands.flags import (
     DEFAULT_STATION_COUNT,
     Verbs,
     add_verb,
@@ -15,10 +15,9 @@ from harness.commands.common import (
     parse_stations,
     positive_float,
     positive_int,
-    print_result,
-    print_status,
     repeat_flags,
 )
+from harness.commands.output import print_result, print_status
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 

@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, repeat_flags
-from harness.errors import BadInput, Outcome
+from harness.commands.flags import Verbs, add_verb, refuse_flags, repeat_flags
+from harness.commands.output import print_result
+from harness.errors import Outcome
 
 CONSTELLATION_SUFFIX = ".mcf"
 _OF_CONSTELLATIONS = ("clip", "stations", "out", "force")
@@ -38,9 +39,7 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
         from harness.commands.inspect_constellation import inspect_constellation
 
         return inspect_constellation(args)
-    for name in _OF_CONSTELLATIONS:
-        if getattr(args, name) is not None:
-            raise BadInput(f"--{name} with {args.file.name}.", "It is for an MCF file of emitters.")
+    refuse_flags(args, _OF_CONSTELLATIONS, f"with {args.file.name}", "It is for an MCF file of emitters.")
     from harness.mocap.file_inspection import inspect_file as inspect
     from harness.mocap.sources import folders_of_environment
 

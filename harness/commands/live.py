@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import (
+from harness.commands.flags import (
     DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
@@ -18,12 +18,9 @@ from harness.commands.common import (
     line_options,
     parse_stations,
     positive_float,
-    print_caveat,
-    print_result,
-    print_status,
     repeat_flags,
-    show_progress,
 )
+from harness.commands.output import print_caveat, print_result, print_status, show_progress
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
@@ -45,7 +42,7 @@ _RATE_TOLERANCE = 0.02
 
 def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time, to a viewer, VMC, LSL or BVH, until Ctrl-C"
-    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap")
+    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap", "force")
     verb.add_argument(
         "--port",
         required=True,
@@ -59,8 +56,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--clip", help=text)
     verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=DEVICE_STATIONS_HELP)
     text = "frames per second of the tracker and of the examples (default: the scenario's)"
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
-    add_line_flags(verb)
+    add_line_flags(verb, text)
     text = (
         "exact: the scenario's mounts and body; tpose: mounts from a T-pose in the first seconds; poses: mounts and "
         "bone lengths from eight poses, held first; FILE: written by `harness calibrate` (default exact)"
@@ -78,7 +74,6 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--anywhere", action="store_true", help="announce the streams of --lsl to other computers too")
     verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion to a BVH file")
     verb.add_argument("--poses", type=Path, metavar="FILE", help="write a CSV table of poses and frame times")
-    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
     verb.add_argument("--seconds", type=positive_float, metavar="S", help="stop after S seconds")
     text = "allowed latency from the last byte of a frame to its pose (default: one period of the tracker)"
     verb.add_argument("--deadline", type=positive_float, metavar="MS", help=text)

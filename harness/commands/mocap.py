@@ -4,7 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, repeat_flags
+from harness.commands.flags import Verbs, add_verb, repeat_flags
+from harness.commands.output import print_result
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 

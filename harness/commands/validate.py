@@ -3,8 +3,10 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_caveat, print_result, this_command
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.characterize import add_unit_flags, departure_content, read_expected, write_unit
+from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.output import print_result, this_command
+from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
 
@@ -23,28 +25,18 @@ def add_validate(verbs: Verbs) -> None:
     verb.add_argument(
         "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
     )
-    text = "earlier unit file to compare with (default: the noise preset `default`)"
-    verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
-    verb.add_argument("--out", type=Path, metavar="FILE", help=text)
-    verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
+    add_unit_flags(verb, text)
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
-    from harness.core.options import split_outside_brackets
-    from harness.core.output_file import require_writable
-    from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
-    from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
     from harness.report.lab.validation_page import validation_page
     from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
 
-    if args.out is not None:
-        require_writable(args.out, UNIT_FILE, force=args.force)
-    expected = None if args.expect is None else read_unit_file(args.expect)
-    print_caveat(args.expect, expected.caveat if expected else "")
+    expected = read_expected(args)
     truth = load_truth(args.capture, args.truth, scenario=args.scenario, folder=args.mocap)
-    methods = split_outside_brackets(args.methods, ",") if args.methods else []
+    methods = split_list(args.methods)
     if methods and truth.playback is None:
         raise BadInput(
             f"--methods with {truth.title}.", "Only a clip has a performer's body to score on: leave it out."
@@ -55,36 +47,24 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     report = found.report(args.capture)
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
     page = validation_page(report, errors, this_command())
+    lines, written = write_unit(args, lambda: session_unit(found, expected, args.out.stem), page)
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
         "numbers": {key: number.as_dict() for key, number in found.numbers.items()},
         "exchanged": dict(found.exchanged),
-        "departures": [
-            {
-                "key": check.key,
-                "station": check.station,
-                "measured": check.measured.as_dict(),
-                "expected": check.expected.as_dict(),
-                "p_holm": check.p_holm,
-            }
-            for check in found.named
-        ],
+        "departures": departure_content(found.named, "p_holm"),
         "scores": [
             {"method": method, "metric": metric, "value": value}
             for method, values in errors.items()
             for metric, value in values.items()
         ],
         "damage": list(found.reader.damage),
+        **written,
     }
-    lines = [page_text(page)]
-    if args.out is not None:
-        write_unit_file(args.out, session_unit(found, expected, args.out.stem), force=args.force)
-        with show_steps("parts of the report"):
-            file = write_page(page, args.out.with_suffix(".html"))
-        lines += [f"unit file: {args.out}", f"report: {file}"]
-        content |= {"unit_file": str(args.out), "page": str(file)}
     failures = {one.method: one.failure for one in scores if one.failure}
     lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
     content |= {"failures": failures} if failures else {}
-    return print_result(args, content, *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS)
+    return print_result(
+        args, content, page_text(page), *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS
+    )

@@ -7,9 +7,8 @@ from typing import Any
 from harness.core.fault_report import find_system_fault
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
-from harness.testing.contract_case import ContractCase, make_case
+from harness.testing.contract_case import ContractCase, RuleViolation, make_case
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import RuleViolation
 
 
 class MethodContractError(HarnessError):

@@ -108,7 +108,7 @@ def test_a_missed_row_of_a_truth_table_ends_with_1(
 ) -> None:
     rows = [state_verdict("rest", "1 to 2 mm", "1.5 mm", True, "1.5 mm (Gilson et al. 2006)"), MISSED]
     monkeypatch.setattr("harness.bench.physics.truth.truth_rows", lambda *_: rows)
-    monkeypatch.setattr("harness.bench.physics.comparison.compare_error_models", lambda *_: made_up().models)
+    monkeypatch.setattr("harness.bench.physics.error_statistics.compare_error_models", lambda *_: made_up().models)
     monkeypatch.setattr("harness.bench.lab.truth.lab_truth_rows", lambda *_: rows)
     assert main(["bench", what, "--truth", "--seeds", "1", "--out", str(tmp_path)]) == Outcome.REGRESSED.exit_code
     lines = capsys.readouterr().out.splitlines()

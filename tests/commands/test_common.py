@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from harness.commands.common import MOST_PROCESSES, process_count
+from harness.commands.flags import MOST_PROCESSES, process_count
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.cli import main
-from harness.commands.common import progress_note, recording_note
+from harness.commands.output import progress_note, recording_note
 from harness.experiment import playback
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording import command_recording, line_server, recorder, recording

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import build_parser, main
-from harness.commands.common import LINE_FLAGS, repeat_flags
+from harness.commands.flags import LINE_FLAGS, repeat_flags
 from harness.experiment.playback import prepare_playback
 from harness.stream.recording.recording import record_capture
 from tests.report.fabricate import Plan, fabricate

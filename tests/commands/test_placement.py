@@ -15,7 +15,7 @@ ONE_STATION = "tests.study.placement.one_station:OneStation"
     ("words", "said"),
     [
         ("", "Neither a study nor a question. Type: harness placement --stations 3 --behaviour table_tennis"),
-        ("walking --stations 3", "The study walking with --stations. A study has its own"),
+        ("walking --stations 3", "--stations with the study walking. A study has its own"),
         ("--stations 3 --places hand_r,head", "no place called 'hand_r'. Did you mean 'hand'?"),
         ("--stations 3 --places head,,hand", "--places 'head,,hand' has an empty name."),
         ("--behaviour table_tenis", "no behaviour called 'table_tenis'. Did you mean 'table_tennis'?"),

@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 from harness.cli import build_parser, main
-from harness.commands.removed_flags import REMOVED_FLAGS
+from harness.commands.flags import REMOVED_FLAGS
 
 
 @pytest.mark.parametrize(("verb", "flag"), [(verb, flag) for verb, flags in REMOVED_FLAGS.items() for flag in flags])

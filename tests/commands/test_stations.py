@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.commands.common import parse_station_map
+from harness.commands.flags import parse_station_map
 from harness.errors import HarnessError
 from harness.stream.emulator import serve_emulator
 from harness.stream.recording.replay import RecordingStream

@@ -6,8 +6,8 @@ from typing import Any
 
 from harness.results import storage
 from harness.results.digests import write_result_json
+from harness.results.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
-from harness.results.lock import LOCK_FILE
 from harness.results.manifest import Manifest
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.results import storage
-from harness.results.selection import select_cells
+from harness.results.reader import select_cells
 from tests.results.finish import finish_run
 
 CELLS = [

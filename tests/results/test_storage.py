@@ -20,9 +20,9 @@ from harness.results import manifest as manifests
 from harness.results import storage
 from harness.results.cell import as_row, read_row
 from harness.results.digests import file_digest
+from harness.results.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
 from harness.results.integrity import check_row
-from harness.results.lock import LOCK_FILE
 from tests.results.finish import finish_run, folder_bytes, make_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 

@@ -22,8 +22,7 @@ from harness.results.cell import read_row
 from harness.results.digests import file_digest
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_cells, check_folder
-from harness.results.loaded_run import load_run
-from harness.results.reader import load_results
+from harness.results.reader import load_results, load_run
 from harness.results.storage import read_cells
 from tests.report.fabricate import Plan, fabricate
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json

@@ -21,7 +21,7 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.results import manifest
 from harness.results.manifest import Manifest
 from harness.results.reader import load_results
-from harness.testing.github_annotations import format_annotations
+from harness.testing.plugin import format_annotations
 from harness.testing.regression_gate import RegressionGate, scenario_from_manifest
 from tests.compare.sides import side, write_run
 from tests.testing import upright

@@ -7,8 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from harness.bench.lab.captures import NO_FAULTS, PLANTED_FAULTS, planted_capture
-from harness.bench.lab.registration_errors import registration_errors
-from harness.bench.lab.validated_captures import validate_planted
+from harness.bench.lab.validated_captures import registration_errors, validate_planted
 from harness.core.fields import build
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, HarnessError

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from harness.bench.lab.planted_errors import METRIC, load_planted_errors
+from harness.bench.stored_errors import METRICS, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
@@ -165,4 +165,4 @@ def declares_equivalence(seed: int, shift: float) -> bool:
     device, simulated = (clip_means(side[method]) for side in draw_world(seed, (method,)))
     margin = MARGIN * float(load_planted_errors()[method].mean())
     shifted = {clip: error + shift * margin for clip, error in simulated.items()}
-    return judge_equivalence(method, METRIC, device, shifted, margin, LEVEL).verdict == "equivalent"
+    return judge_equivalence(method, METRICS[0], device, shifted, margin, LEVEL).verdict == "equivalent"

@@ -16,7 +16,7 @@ from harness.report.kit.style import COLOURS, INK, Chart
 from harness.report.kit.table import html_table
 from harness.report.run.charts import draw_boxes
 from harness.report.run.data import RunData, Trace
-from harness.results.sigma_table import SIGMA_COLUMNS, format_sigma_scores
+from harness.results.reported_metrics import SIGMA_COLUMNS, format_sigma_scores
 from harness.score.uncertainty import SigmaSums, sum_sigma
 
 if TYPE_CHECKING:

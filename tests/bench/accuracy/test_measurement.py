@@ -160,10 +160,10 @@ def test_without_real_motion_it_is_refused_and_nothing_is_written(
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["startup", "--quick"], "--quick is for accuracy"),
-        (["--jobs", "2"], "--jobs is for accuracy"),
+        (["startup", "--quick"], "--quick with speed. It applies to accuracy or ranking"),
+        (["--jobs", "2"], "--jobs with speed"),
         (["accuracy", "startup"], "runs alone"),
-        (["accuracy", "--seed", "2"], "--seeds N"),
+        (["accuracy", "--seed", "2"], "--seed with accuracy"),
         (["accuracy", "--seeds", "6"], "there are 5 seeds"),
         (["accuracy", "--quick", "--save", "x.json"], "--quick has one seed"),
         (["accuracy", "--baseline", "none.json"], "none.json"),
