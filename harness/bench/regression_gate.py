@@ -8,7 +8,6 @@ metric of one side B is also multiplied by 1.03; it is detected if that line is 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
@@ -30,37 +29,24 @@ Resampler = Callable[[Floats, int, np.random.Generator], Floats]
 """Draws errors (M, K, n, 2) of a comparison with n clips from those of a population (M, K, C, 2)."""
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedComparison:
-    """L lines that are tested together."""
+def compared_lines(errors: Floats, margin: float = 1.0) -> tuple[list[Floats], list[float]]:
+    """(n,) differences of each line of errors (M, K, n, 2) with K `METRICS`, and its margin, multiplied by `margin`.
 
-    differences: list[Floats]
-    """(n,) differences of each line; an increase is worse."""
-    margins: list[float]
-    interval: Interval = mean_interval
-
-    @property
-    def worse(self) -> Bools:
-        """(L,) which lines are called worse: as `decide_verdicts`, but without intervals that cannot change this."""
-        p_holm = holm([sign_flip_p(line) for line in self.differences])
-        lines = zip(self.differences, self.margins, p_holm, strict=True)
-        found = [p <= SIGNIFICANCE and d.mean() > m and self._low(d) > 0.0 for d, m, p in lines]
-        return np.array(found)
-
-    def _low(self, difference: Floats) -> float:
-        return self.interval(difference, CONFIDENCE_LEVEL)[0]
-
-    @property
-    def verdicts(self) -> list[str]:
-        """The verdict of each line."""
-        return [result.verdict for result in decide_verdicts(self.differences, self.margins)]
-
-
-def make_comparison(errors: Floats, margin: float = 1.0, interval: Interval = mean_interval) -> SimulatedComparison:
-    """Make the lines of errors (M, K, n, 2) with K `METRICS`; margins are multiplied by `margin`."""
+    An increase is worse.
+    """
     lines = [(errors[m, k], metric) for m in range(len(errors)) for k, metric in enumerate(METRICS)]
     margins = [margin * margin_of(metric).of(float(line[:, 0].mean())) for line, metric in lines]
-    return SimulatedComparison([line[:, 1] - line[:, 0] for line, _ in lines], margins, interval)
+    return [line[:, 1] - line[:, 0] for line, _ in lines], margins
+
+
+def called_worse(errors: Floats, margin: float = 1.0, interval: Interval = mean_interval) -> Bools:
+    """(L,) which lines are called worse: as `decide_verdicts`, but without intervals that cannot change this."""
+    differences, margins = compared_lines(errors, margin)
+    p_holm = holm([sign_flip_p(line) for line in differences])
+    lines = zip(differences, margins, p_holm, strict=True)
+    return np.array(
+        [p <= SIGNIFICANCE and d.mean() > m and interval(d, CONFIDENCE_LEVEL)[0] > 0.0 for d, m, p in lines]
+    )
 
 
 def exchanged(population: Floats, clips: int, rng: np.random.Generator) -> Floats:
@@ -89,7 +75,7 @@ def count_false_alarms(
 ) -> int:
     """Number of simulated comparisons in which any line is called worse, although none is."""
     rngs = (generator(seed, "gate", draw.__name__, clips, n) for n in range(studies))
-    return sum(bool(make_comparison(draw(population, clips, rng), margin).worse.any()) for rng in rngs)
+    return sum(bool(called_worse(draw(population, clips, rng), margin).any()) for rng in rngs)
 
 
 def detect_changes(
@@ -107,15 +93,15 @@ def detect_changes(
         errors = exchanged(population, clips, generator(seed, "gate", "changed", clips, n))
         method, metric = divmod(n % lines, len(METRICS))
         errors[method, metric, :, 1] *= 1.0 + change
-        detected.append(make_comparison(errors, interval=interval).worse[n % lines])
+        detected.append(called_worse(errors, interval=interval)[n % lines])
     return np.array(detected)
 
 
 def share_called_same(population: Floats, clips: int, studies: int, seed: int) -> float:
     """Share of unchanged lines that are called the same; the others are undecided."""
     rngs = (generator(seed, "gate", "exchanged", clips, n) for n in range(studies))
-    verdicts = [make_comparison(exchanged(population, clips, rng)).verdicts for rng in rngs]
-    return float(np.mean(np.array(verdicts) == "same"))
+    results = [decide_verdicts(*compared_lines(exchanged(population, clips, rng))) for rng in rngs]
+    return float(np.mean([result.verdict == "same" for lines in results for result in lines]))
 
 
 def interval_coverage(population: Floats, clips: int, studies: int, seed: int) -> float:
@@ -144,9 +130,7 @@ def bench_regression_gate(seed: int = 1) -> list[BenchmarkStatement]:
     """Rates of false alarms and detections, and the coverage of the intervals."""
     settings, draws = load_null_errors("settings"), load_null_errors("draws")
     rows = [
-        _false_alarm_row("false alarms, 24 clips", settings, 24, seed),
-        _false_alarm_row("false alarms, 12 clips", settings, 12, seed),
-        _false_alarm_row("false alarms, 8 clips", settings, 8, seed),
+        *(_false_alarm_row(f"false alarms, {clips} clips", settings, clips, seed) for clips in (24, 12, 8)),
         _false_alarm_row("false alarms, 24 clips, heavy tails", settings, 24, seed, heavy),
         _false_alarm_row("false alarms, 24 clips, sides not exchanged", settings, 24, seed, centred),
         _false_alarm_row("false alarms, 24 clips, margins of 0", settings, 24, seed, margin=0.0),

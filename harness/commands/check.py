@@ -42,7 +42,7 @@ def run_check(args: argparse.Namespace) -> Outcome:
     for name, findings in found.items():
         lines += [name, *(f"  {'ok  ' if f.ok else 'FAIL'}  {f.rule}: {f.seen}" for f in findings)]
     broken = any(not finding.ok for findings in found.values() for finding in findings)
-    content = {"methods": {name: [finding.as_dict() for finding in findings] for name, findings in found.items()}}
+    content = {"methods": {name: [finding._asdict() for finding in findings] for name, findings in found.items()}}
     own = [name for name in names if ":" in name]
     following = (
         ["run", "demo", "--methods", ",".join(["ik", *own]), "--out", "results/mine"] if own else ["run", "gate"]
@@ -75,5 +75,5 @@ def run_doctor(args: argparse.Namespace) -> Outcome:
     lines = [f"{'ok  ' if check.ok else 'FAIL'}  {check.name}: {check.detail}" for check in checks]
     outcome = Outcome.PASS if all(check.ok for check in checks) else Outcome.REGRESSED
     return print_result(
-        args, {"checks": [check.as_dict() for check in checks]}, *lines, outcome=outcome, following=["demo"]
+        args, {"checks": [check._asdict() for check in checks]}, *lines, outcome=outcome, following=["demo"]
     )

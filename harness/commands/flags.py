@@ -10,6 +10,7 @@ from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.isolation import Isolation
+    from harness.experiment.playback import Playback
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
@@ -227,6 +228,16 @@ def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | l
     if is_whole_number(args.stations):
         return int(args.stations)
     return parse_device_names(args.stations) if device else parse_names(args.stations)
+
+
+def open_playback(
+    args: argparse.Namespace, stations: int | list[str] | None, scenario: str = "", *, posing: bool = False
+) -> "Playback":
+    """The playback of `--clip`, `--rate`, `--noise`, `--seed` and `--mocap`; by default of the verb's scenario."""
+    from harness.experiment.playback import prepare_playback
+
+    options = {"clip": args.clip, "rate_hz": args.rate, "noise": vars(args).get("noise"), "seed": args.seed}
+    return prepare_playback(scenario or args.scenario, stations=stations, folder=args.mocap, posing=posing, **options)
 
 
 def parse_device_names(text: str) -> list[str]:

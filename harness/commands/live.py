@@ -16,6 +16,7 @@ from harness.commands.flags import (
     add_verb,
     is_whole_number,
     line_options,
+    open_playback,
     parse_stations,
     positive_float,
     repeat_flags,
@@ -91,7 +92,6 @@ def run_live(args: argparse.Namespace) -> Outcome:
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
     from harness.experiment.isolation import DEFAULT_ISOLATION
-    from harness.experiment.playback import prepare_playback
     from harness.experiment.remote_method import resolve_method
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
@@ -99,8 +99,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.stream.event_counter import EventCounter
     from harness.stream.recording.recording_switch import RecordingSwitch
 
-    options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
-    playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
+    playback = open_playback(args, parse_stations(args, device=True))
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)

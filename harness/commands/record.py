@@ -13,6 +13,7 @@ from harness.commands.flags import (
     add_verb,
     is_whole_number,
     line_options,
+    open_playback,
     parse_device_names,
     parse_names,
     refuse_flags,
@@ -84,7 +85,6 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
-    from harness.experiment.playback import prepare_playback
     from harness.mocap.synthetic.rig import stretch_marks
     from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
@@ -94,16 +94,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     stations = args.stations
     if stations is not None:
         stations = int(stations) if is_whole_number(stations) else parse_names(stations)
-    playback = prepare_playback(
-        scenario,
-        clip=args.clip,
-        stations=stations,
-        rate_hz=args.rate,
-        noise=args.noise,
-        seed=args.seed,
-        folder=args.mocap,
-        posing=bool(args.poses),
-    )
+    playback = open_playback(args, stations, scenario, posing=bool(args.poses))
     played, simulation = playback.scenario, playback.simulation
     note = {
         "source": "simulation",

@@ -64,7 +64,7 @@ class CheckWorker(MethodWorker):
         return make_case(self.method)
 
     def _check_rule(self, header: Header, arrays: Arrays) -> Message:
-        return check_rule(self._case, header["rule"]).as_dict(), {}
+        return check_rule(self._case, header["rule"])._asdict(), {}
 
 
 def main(*descriptors: str) -> None:

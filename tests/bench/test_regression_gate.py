@@ -6,6 +6,7 @@ import pytest
 from harness.bench import regression_gate
 from harness.bench.stored_errors import KINDS, METRICS, load_null_errors
 from harness.compare.margins import GATED_METRICS
+from harness.compare.significance import decide_verdicts
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
@@ -58,9 +59,9 @@ def test_worse_is_what_a_comparison_calls_worse(settings: Floats) -> None:
     for n in range(4):
         errors = regression_gate.exchanged(settings, 12, generator(1, "both ways", n))[:2]
         errors[n % 2, :, :, 1] *= 1.0 + 0.03 * n
-        study = regression_gate.make_comparison(errors)
-        assert [verdict == "worse" for verdict in study.verdicts] == study.worse.tolist()
-        seen += int(study.worse.sum())
+        verdicts, worse = decide_verdicts(*regression_gate.compared_lines(errors)), regression_gate.called_worse(errors)
+        assert [result.verdict == "worse" for result in verdicts] == worse.tolist()
+        seen += int(worse.sum())
     assert seen >= 4
 
 

@@ -1,16 +1,16 @@
 """Every verb ends with a command that makes sense next, and it parses."""
 
 import argparse
-import json
 import shlex
 from pathlib import Path
 
 import pytest
 
-from harness.cli import build_parser, main
+from harness.cli import build_parser
 from harness.commands.flags import LINE_FLAGS, repeat_flags
 from harness.experiment.playback import prepare_playback
 from harness.stream.recording.recording import record_capture
+from tests.command import Command
 from tests.report.fabricate import Plan, fabricate
 
 
@@ -29,19 +29,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["table", "RUN"], "plot"),
     ],
 )
-def test_the_next_command_parses(
-    words: list[str], following: str, run: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_next_command_parses(words: list[str], following: str, run: Path, command: Command) -> None:
     words = [str(run) if word == "RUN" else word for word in words]
-    assert main(words) == 0
-    captured = capsys.readouterr()
-    (line,) = [line for line in captured.err.splitlines() if line.startswith("next: ")]
-    assert "next: " not in captured.out  # stdout is for data
-    program, *parts = shlex.split(line.removeprefix("next: "))
+    said = command(*words)
+    assert "next: " not in said.out  # stdout is for data
+    program, *parts = shlex.split(said.line("next: "))
     assert (program, parts[0]) == ("harness", following)
     build_parser().parse_args(parts)
-    assert main([*words, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["next"] == line.removeprefix("next: ")
+    assert command(*words, "--json").content["next"] == said.line("next: ")
 
 
 def parsed(*words: str) -> argparse.Namespace:
@@ -108,27 +103,19 @@ def test_flags_are_repeated_as_they_were_given(words: list[str]) -> None:
     ],
 )
 def test_the_next_command_repeats_what_matters(
-    words: list[str],
-    following: list[str],
-    run: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    words: list[str], following: list[str], run: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("harness.stream.emulator.server.play_samples", lambda *_: {})
-    assert main([str(run) if word == "RUN" else word for word in words]) == 0
-    said = capsys.readouterr().err
+    said = command(*[str(run) if word == "RUN" else word for word in words]).err
     (line,) = [line for line in said.splitlines() if line.startswith("next")]
     port = said.partition("an IS-900 at ")[2].partition(",")[0]
     named = {"RUN": str(run), "PORT": port}
     assert shlex.split(line.partition(": ")[2])[1:] == [named.get(word, word) for word in following]
 
 
-def test_a_recording_of_an_unknown_motion_is_shown_and_not_scored(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_of_an_unknown_motion_is_shown_and_not_scored(tmp_path: Path, command: Command) -> None:
     """`replay` of a device's line named `--scenario demo`, which refuses every other motion."""
     path = tmp_path / "a take.rec"
     simulation = prepare_playback("demo", stations=2).simulation
     record_capture(path, simulation.wire_format, simulation.wire, {"source": "port"}, seconds=1.0)
-    assert main(["replay", str(path)]) == 0
-    assert f"next: harness view '{path}'\n" in capsys.readouterr().err
+    assert f"next: harness view '{path}'\n" in command("replay", path).err

@@ -23,6 +23,16 @@ def folder_bytes(out: Path) -> dict[str, bytes]:
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
 
 
+def write_run(
+    out: Path, cells: Sequence[storage.Cell], *, planned: int | None = None, failures: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Write these cells and finish their run; the summary's content. By default nothing else was planned."""
+    for cell in cells:
+        storage.write_cell(out, cell)
+    every = len(cells) + len(failures or {}) if planned is None else planned
+    return finish_run(out, keys=[cell.key for cell in cells], planned=every, failures=failures)
+
+
 def finish_run(
     out: Path, *, keys: Sequence[str], planned: int, failures: Mapping[str, str] | None = None
 ) -> dict[str, Any]:

@@ -5,7 +5,6 @@ In how many captures of a known unit each interval contains the true parameter, 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from math import ceil
 from pathlib import Path
 
 from harness.bench.lab.captures import (
@@ -14,6 +13,7 @@ from harness.bench.lab.captures import (
     NO_FAULTS,
     PLANTED_FAULTS,
     PlantedNumber,
+    needed_captures,
     planted_motion,
     planted_numbers,
 )
@@ -27,8 +27,6 @@ from harness.study.trust.expected_values import preset_values
 
 SEEDS = tuple(range(1, 101))
 """Seeds of the captures. Constants of the estimators were chosen on captures with seeds from 1001 on."""
-WANTED = 0.95
-"""Share of the captures in which a fault has to be named, or nothing where there is none."""
 TOLERANCE = 0.2
 """Relative error of a size that is as good as lying within its interval."""
 LEAST, MOST = 0.90, 0.99
@@ -56,11 +54,6 @@ def lab_truth_rows(
         *coverage_rows(clean),
         *trust_rows(seeds),
     ]
-
-
-def needed_captures(count: int) -> int:
-    """Least number of captures of `count` that is `WANTED` of them or more."""
-    return ceil(WANTED * count - 1e-9)
 
 
 def fault_rows(seeds: Sequence[int], outcomes: Mapping[tuple[str, int], CaptureOutcome]) -> list[BenchmarkStatement]:

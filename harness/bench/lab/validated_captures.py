@@ -4,12 +4,18 @@ Errors of the registration of a capture without a fault are held to what is prom
 """
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from pathlib import Path
 
 import numpy as np
 
-from harness.bench.lab.captures import EARLIER, planted_capture, planted_motion, planted_scenario, station_offset_m
+from harness.bench.lab.captures import (
+    EARLIER,
+    needed_captures,
+    planted_capture,
+    planted_motion,
+    planted_scenario,
+    station_offset_m,
+)
 from harness.body.kinematics import bone_poses
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
@@ -35,8 +41,6 @@ PROMISES: Mapping[str, tuple[str, float, str]] = {
     "clock_ppm": ("clock ratio", 10.0, "ppm"),
 }
 """Key of an error -> its name, its largest value and the unit that it is shown in."""
-WANTED = 0.95
-"""Share of the captures in which an error has to be within what is promised."""
 _PER_UNIT = {"mm": 1e3, "ms": 1e3, "deg": 180.0 / np.pi, "ppm": 1.0}
 
 
@@ -103,7 +107,7 @@ def registration_rows(errors: Sequence[Mapping[str, float]], captures: int) -> l
     rows = []
     for key, (name, most, unit) in PROMISES.items():
         values = np.array([one[key] for one in errors])
-        within, needed, scale = int(np.sum(values <= most)), ceil(WANTED * captures - 1e-9), _PER_UNIT[unit]
+        within, needed, scale = int(np.sum(values <= most)), needed_captures(captures), _PER_UNIT[unit]
         note = f"largest {scale * values.max():.2g} {unit}" if len(values) else ""
         held_to = f"within {scale * most:.2g} {unit} in {needed} of {captures}"
         rows.append(state_verdict(f"validate, 1 min, {name}", held_to, f"in {within}", within >= needed, "", note))

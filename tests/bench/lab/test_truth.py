@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from harness.bench.lab import truth
-from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STATION, planted_numbers
+from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STATION, needed_captures, planted_numbers
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber
-from harness.bench.lab.truth import KINDS, coverage_rows, fault_row, fault_rows, needed_captures
+from harness.bench.lab.truth import KINDS, coverage_rows, fault_row, fault_rows
 from harness.bench.lab.validated_captures import PROMISES, registration_rows
 from harness.study.trust.expected_values import preset_values
 
