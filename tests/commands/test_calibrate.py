@@ -2,9 +2,6 @@
 
 import csv
 import shlex
-import signal
-import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -33,7 +30,7 @@ from harness.stream.emulator.server import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
-from tests.interrupts import heeding_interrupts
+from tests.interrupts import interrupt, start_harness
 
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
@@ -153,18 +150,14 @@ def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, command:
 
 def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
-        words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
-        command = [sys.executable, "-m", "harness.cli", "calibrate", *words]
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
-        ) as program:
+        words = ("--port", device.name, "--scenario", "demo", "--out", tmp_path / "me.toml")
+        with start_harness("calibrate", *words) as program:
             assert program.stderr is not None
             while "pose 1 of 8" not in program.stderr.readline():
                 assert program.poll() is None
-            program.send_signal(signal.SIGINT)
-            said, talk = program.communicate(timeout=120.0)
+            code, said, talk = interrupt(program)
         assert not device.emulator.device.streaming
-    assert program.returncode == 130
+    assert code == 130
     assert said.splitlines()[-1] == "interrupted"
     assert "Traceback" not in talk
     assert not list(tmp_path.iterdir())

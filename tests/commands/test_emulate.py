@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -23,16 +21,13 @@ from harness.stream.emulator import server
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import FaultKind
 from tests.command import Command
-from tests.interrupts import heeding_interrupts
+from tests.interrupts import interrupt, start_harness
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "is900"
-    command = [sys.executable, "-m", "harness.cli", "emulate", "builtin_walking", "--pty", str(link), "--json"]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
-    ) as program:
+    with start_harness("emulate", "builtin_walking", "--pty", link, "--json") as program:
         assert program.stderr is not None
         said = [program.stderr.readline(), program.stderr.readline()]
         client = open_transport(str(link))
@@ -41,13 +36,12 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
         while len(answer) < 55 + 37 and (more := client.read(20.0)):
             answer += more
         client.close()
-        program.send_signal(end)
-        out, talk = program.communicate(timeout=120)
+        code, out, talk = interrupt(program, end)
     assert "stations 1 left_hand, 2 right_hand, 3 left_ankle, 4 right_ankle\n" in said[0]
     assert said[1] == f"an IS-900 at {link}; Ctrl-C ends it\n"
     assert answer[55:] == b"21l1111" + b"0" * 28 + b"\r\n"
     assert "Traceback" not in talk
-    assert program.returncode == 0
+    assert code == 0
     counts = json.loads(out)
     assert (counts["outcome"], counts["commands"]) == ("pass", 3)
     assert counts["replies_sent"] in (1, 2)  # the end may come between the last one's writing and its counting

@@ -5,7 +5,6 @@ import json
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,18 +17,15 @@ from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
 from harness.stream.emulator.server import serve_emulator
 from tests.command import Command
-from tests.interrupts import heeding_interrupts
+from tests.interrupts import interrupt, start_harness
 
 WHAT = ["--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik"]
 
 
 @contextmanager
-def live(*arguments: str) -> Iterator["subprocess.Popen[str]"]:
+def live(*arguments: object) -> Iterator["subprocess.Popen[str]"]:
     """The verb in a process of its own, as from a terminal."""
-    command = [sys.executable, "-m", "harness.cli", "live", *WHAT, *arguments]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
-    ) as program:
+    with start_harness("live", *WHAT, *arguments) as program:
         try:
             yield program
         finally:
@@ -49,13 +45,11 @@ def wait_for_rows(path: Path, count: int, program: "subprocess.Popen[str]") -> N
 @pytest.mark.parametrize("ending", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_ctrl_c_ends_it_well(tmp_path: Path, played: Playback, ending: signal.Signals) -> None:
     poses, bvh = tmp_path / "poses.csv", tmp_path / "live.bvh"
-    outputs = ["--poses", str(poses), "--bvh", str(bvh), "--json"]
     with serve_emulator(played.samples, pty=tmp_path / "tracker") as device:
-        with live("--port", device.name, *outputs) as program:
+        with live("--port", device.name, "--poses", poses, "--bvh", bvh, "--json") as program:
             wait_for_rows(poses, 40, program)
-            program.send_signal(ending)
-            said, talk = program.communicate(timeout=120.0)
-        assert program.returncode == 0, talk
+            code, said, talk = interrupt(program, ending)
+        assert code == 0, talk
         assert "Traceback" not in talk
         content = json.loads(said)
         assert content["outcome"] == "pass"
@@ -75,14 +69,13 @@ def test_ctrl_c_ends_it_well(tmp_path: Path, played: Playback, ending: signal.Si
 def test_ctrl_c_before_the_first_pose_is_an_interrupt(tmp_path: Path, played: Playback) -> None:
     with (
         serve_emulator(played.samples, tcp="127.0.0.1:0") as device,
-        live("--port", device.name, "--poses", str(tmp_path / "poses.csv")) as program,
+        live("--port", device.name, "--poses", tmp_path / "poses.csv") as program,
     ):
         assert program.stderr is not None
         while "learning" not in program.stderr.readline():
             assert program.poll() is None
-        program.send_signal(signal.SIGINT)
-        said, talk = program.communicate(timeout=120.0)
-    assert program.returncode == 130, talk
+        code, said, talk = interrupt(program)
+    assert code == 130, talk
     assert said.splitlines()[-2:] == ["stopped before the first pose", "interrupted"]
     assert "Traceback" not in talk
     assert not (tmp_path / "poses.csv").exists()

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -27,10 +26,9 @@ from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust.plan import plan_digest
 from tests.command import Command
-from tests.interrupts import heeding_interrupts
+from tests.interrupts import interrupt, start_harness
 from tests.stream.wire import frames_equal
 
-HARNESS = [sys.executable, "-m", "harness.cli"]
 CLIP = "boxing_p1_01"
 
 
@@ -205,13 +203,7 @@ def test_a_list_may_be_named(port: str, tmp_path: Path, command: Command) -> Non
 
 def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]:
     """`harness record` in its own process, once it has set the device up and written so many bytes since."""
-    process = subprocess.Popen(
-        [*HARNESS, "record", port, str(path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heeding_interrupts,
-    )
+    process = start_harness("record", port, path)
     until_s = time.monotonic() + 300.0
     while not path.exists() or len(path.read_bytes().partition(CONFIGURED.encode())[2]) < begun:
         assert time.monotonic() < until_s
@@ -224,9 +216,8 @@ def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop: signal.Signals) -> None:
     with recording(port, tmp_path / "a.rec") as process:
-        process.send_signal(stop)
-        out, err = process.communicate(timeout=120.0)
-    assert process.returncode == 0, err
+        code, out, err = interrupt(process, stop)
+    assert code == 0, err
     assert out.splitlines()[-1] == "pass"
     assert "Traceback" not in err
     read = read_recording(tmp_path / "a.rec")
@@ -268,19 +259,12 @@ def test_a_killed_recording_keeps_what_came(port: str, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_ends_a_replay_without_a_word_too_many(simulated: Path) -> None:
-    with subprocess.Popen(
-        [*HARNESS, "replay", str(simulated), "--speed", "0.01", "--frames"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        preexec_fn=heeding_interrupts,
-    ) as process:
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    with start_harness("replay", simulated, "--speed", "0.01", "--frames", env=environment) as process:
         assert process.stdout is not None
         assert process.stdout.readline().startswith("received_s,")
         assert ",left_hand," in process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=120.0)
-    assert process.returncode == 130
+        code, out, err = interrupt(process)
+    assert code == 130
     assert out.splitlines()[-1] == "interrupted"
     assert "Traceback" not in err

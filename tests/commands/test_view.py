@@ -3,9 +3,6 @@
 import http.client
 import json
 import re
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +18,7 @@ from harness.results.storage import read_cells
 from harness.score.pair import compute_poses
 from harness.view.page import ViewedMotion
 from tests.command import Command
+from tests.interrupts import interrupt, start_harness
 from tests.report.conftest import renders as renders
 from tests.report.fabricate import Plan, fabricate
 
@@ -164,8 +162,7 @@ def test_a_movie_is_written(run: Path, tmp_path: Path, command: Command, renders
 
 
 def test_the_server_shows_the_run_until_ctrl_c(run: Path) -> None:
-    command = [sys.executable, "-m", "harness", "view", str(run), "--no-browser"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with start_harness("view", run, "--no-browser") as process:
         assert process.stderr is not None
         line = process.stderr.readline()
         address = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
@@ -175,7 +172,6 @@ def test_the_server_shows_the_run_until_ctrl_c(run: Path) -> None:
         clip = json.load(connection.getresponse())
         connection.close()
         assert [track["name"] for track in clip["tracks"]] == ["truth", "map", "ik", "far"]
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
+        code, out, _ = interrupt(process)
+    assert code == 0
     assert out.endswith("pass\n")

@@ -66,18 +66,15 @@ def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> BenchmarkStateme
     fault, count, needed = PLANTED_FAULTS[kind], len(outcomes), needed_captures(len(outcomes))
     minutes = min(planted_motion(kind, 1).duration_s, fault.seconds) / 60.0
     title, notes = f"{fault.verb}, {fault.title}, {minutes:.3g} min", _notes(kind, outcomes)
+    named, sized = ([judge(outcome) for outcome in outcomes] for judge in (_is_named, _is_sized))
+    what, found, measured = "named", sum(named), ""
     if kind in NO_FAULTS:
-        clean = sum(outcome.names_nothing for outcome in outcomes)
-        return state_verdict(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
-    named = [_is_named(outcome) for outcome in outcomes]
-    sized = [_is_sized(outcome) for outcome in outcomes]
-    both = sum(n and s for n, s in zip(named, sized, strict=True))
-    if not fault.numbers:
-        met = sum(named) >= needed
-        return state_verdict(title, f"named in {needed} of {count}", f"in {sum(named)}", met, "", notes)
-    measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {both}"
-    held_to = f"named with its size in {needed} of {count}"
-    return state_verdict(title, held_to, measured, both >= needed, "", notes)
+        what, found = "none named", sum(outcome.names_nothing for outcome in outcomes)
+    elif fault.numbers:
+        what, found = "named with its size", sum(n and s for n, s in zip(named, sized, strict=True))
+        measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {found}"
+    held_to = f"{what} in {needed} of {count}"
+    return state_verdict(title, held_to, measured or f"in {found}", found >= needed, "", notes)
 
 
 def is_sized(planted: PlantedNumber, check: StoredCheck) -> bool:
