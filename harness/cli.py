@@ -12,15 +12,14 @@ from typing import Any
 
 from harness.commands.bench import add_bench
 from harness.commands.calibrate import add_calibrate
-from harness.commands.characterize import add_characterize
+from harness.commands.characterize import add_characterize, add_validate
 from harness.commands.check import add_check, add_doctor
 from harness.commands.compare import add_baseline, add_compare
 from harness.commands.emulate import add_emulate
 from harness.commands.export import add_export
-from harness.commands.inspect import add_inspect
 from harness.commands.list import add_list
 from harness.commands.live import add_live
-from harness.commands.mocap import add_mocap
+from harness.commands.mocap import add_inspect, add_mocap
 from harness.commands.output import describe_ending, print_last
 from harness.commands.paper import add_paper
 from harness.commands.placement import add_placement
@@ -31,7 +30,6 @@ from harness.commands.report import add_report
 from harness.commands.run import add_demo, add_run
 from harness.commands.sweep import add_status, add_sweep
 from harness.commands.trust import add_trust
-from harness.commands.validate import add_validate
 from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.names import check_command_line, check_words

@@ -8,10 +8,10 @@ import os
 import subprocess
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Thread
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ MAX_LINE_RATIO, MAX_RESULT_SHARE = 6.0, 1.0 / 3.0
 """Most time until the first line, relative to the help, and until the first result, relative to the report."""
 
 
-@dataclass(frozen=True)
-class DemoTimes:
+class DemoTimes(NamedTuple):
     """Times of one demo from its start [s]."""
 
     first_line_s: float
