@@ -26,6 +26,7 @@ from harness.stream.recording.replay import RecordingStream
 from harness.study.papers.paper_study import open_study
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
+from tests.command import Command
 
 ARCHIVE = Path(__file__).parent / "old_files" / "23b301b7.tar.xz"
 PLAN_DIGEST = "269190c444c3be8bc1188b42a66241bbcbd133ec0ded2d66d79586bcfb948b14"
@@ -63,14 +64,12 @@ def test_the_frames_of_a_run(old: Path) -> None:
     assert main(["status", "run"]) == Outcome.PASS.exit_code
 
 
-def test_a_run_is_printed_and_compared_as_it_was(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_is_printed_and_compared_as_it_was(old: Path, command: Command) -> None:
     baselines = old / "results" / "baselines"
     baselines.mkdir(parents=True)
     shutil.copytree("baseline", baselines / "old_run")
-    assert main(["compare", "old_run", "run"]) == Outcome.PASS.exit_code
-    capsys.readouterr()
-    assert main(["table", "run", "--format", "csv"]) == Outcome.PASS.exit_code
-    printed = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    command("compare", "old_run", "run")
+    printed = list(csv.DictReader(command("table", "run", "--format", "csv").lines))
     with open("table.csv", encoding="utf-8", newline="") as file:
         stored = list(csv.DictReader(file))
     assert (

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
-from harness.bench.wire_cases import CASES, CLIP, SCENARIO, WireCase
+from harness.bench.wire_device import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
 from harness.experiment.playback import prepare_playback

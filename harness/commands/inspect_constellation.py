@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.commands.common import print_result, repeat_flags, this_command
+from harness.commands.flags import refuse_flags, repeat_flags
+from harness.commands.output import print_result, this_command
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.report.coverage.content import (
     CoverageContent,
@@ -32,11 +33,9 @@ DEFAULT_STATIONS = "liu2011"
 
 def inspect_constellation(args: argparse.Namespace) -> Outcome:
     """Print the coverage of the emitters in a file, and write its page."""
-    if args.unit is not None:
-        raise BadInput(f"--unit with {args.file.name}.", "An MCF file is in metres.")
-    for name in ("stations", "rate"):
-        if getattr(args, name) is not None and args.clip is None:
-            raise BadInput(f"--{name} without --clip.", "It is for the performer that --clip names.")
+    refuse_flags(args, ["unit"], f"with {args.file.name}", "An MCF file is in metres.")
+    if args.clip is None:
+        refuse_flags(args, ["stations", "rate"], "without --clip", "It is for the performer that --clip names.")
     page = args.out or Path("results") / "coverage" / f"{args.file.stem}.html"
     if args.out is not None and args.out.exists() and not args.force:
         raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")

@@ -4,7 +4,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.output import print_result
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
@@ -36,10 +37,9 @@ def run_report(args: argparse.Namespace) -> Outcome:
     with show_steps("parts of the report"):
         page = write_run_page(args.run)
     if args.readme:
-        from harness.core.options import split_outside_brackets
         from harness.report.figures.performer_table import update_readme
 
-        update_readme(args.readme, args.run, split_outside_brackets(args.methods, ",") if args.methods else ())
+        update_readme(args.readme, args.run, split_list(args.methods))
     return _print_page(args, page, following=["plot", args.run, "--kind", "ranking"])
 
 

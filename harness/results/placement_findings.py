@@ -5,16 +5,13 @@ of statistics (averaged over clips, methods and seeds), so that sets are compare
 can be drawn from the file alone.
 """
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.fields import build
-from harness.core.files import to_json_types
-from harness.errors import BadFile, UnknownName
+from harness.errors import BadFile
 from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import check_study, read_result_json, write_result_json
+from harness.results.digests import check_study, read_record, write_record
 
 SCHEMA = 1
 _RENAMED_KEYS = {"stays": "selection_stability", "crossed": "cross_validated_error", "worth": "contributions"}
@@ -308,7 +305,7 @@ class PlacementFindings:
 
 def write_placement(path: Path, findings: PlacementFindings) -> None:
     """Write findings as JSON with a digest."""
-    write_result_json(path, to_json_types(dataclasses.asdict(findings)))
+    write_record(path, findings)
 
 
 def read_placement(path: Path) -> PlacementFindings:
@@ -318,13 +315,7 @@ def read_placement(path: Path) -> PlacementFindings:
     candidates.
     """
     expected, advice = "the findings of a placement study", "Give the command of the study again."
-    content = read_result_json(path, expected, advice)
-    if content.get("schema") != SCHEMA:
-        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
-    try:
-        findings = build(PlacementFindings, _rename_keys(content), "findings")
-    except (TypeError, ValueError, UnknownName) as error:
-        raise BadFile(path, str(error), expected, advice) from error
+    findings = read_record(PlacementFindings, path, expected, advice, _rename_keys)
     if strangers := _unknown_stations(findings):
         raise BadFile(path, f"names {strangers[0]!r}, which is no candidate of it", expected, advice)
     identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}

@@ -15,14 +15,18 @@ from harness.core.ranges import check_words
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
-from harness.results.content_types import check_summary_types
+from harness.results.content_types import (
+    check_summary_types,
+    find_impossible_metric,
+    find_impossible_sigma,
+    find_impossible_statistic,
+)
 from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
+from harness.results.folder_kind import LOCK_FILE, folder_lock
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
-from harness.results.lock import LOCK_FILE, folder_lock
 from harness.results.manifest import Manifest
-from harness.results.plausibility import find_impossible_metric, find_impossible_sigma, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
 from harness.results.summary import GROUP_KEYS, SummaryStatistics
 from harness.results.table import compute_group_statistics, write_table

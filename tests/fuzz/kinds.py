@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.body.humanoid import build_body
 from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
-from harness.commands.status import _status_lines
+from harness.commands.sweep import _status_lines
 from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_runs
 from harness.core.calibration import Calibration
@@ -40,8 +40,8 @@ from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
-from harness.results.loaded_run import load_run
 from harness.results.placement_findings import read_placement
+from harness.results.reader import load_run
 from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS

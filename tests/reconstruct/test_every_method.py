@@ -20,11 +20,10 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score.angles import wrap_difference
 from harness.testing import method_checks
-from harness.testing.contract_case import make_case
+from harness.testing.contract_case import make_case, require_identical
 from harness.testing.frames import exact_frames
 from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import require_identical
 from harness.testing.rules.reproducibility import estimate_qpos, works_in_another_process
 from tests.joint_centres import joint_centres_m
 from tests.reconstruct.conftest import Scene, moved, scene

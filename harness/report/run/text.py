@@ -14,8 +14,13 @@ from harness.report.run.data import lag_of, note_of
 from harness.report.run.expectations import expected_orders, recovery_table
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
-from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, TABLE_COLUMNS
-from harness.results.sigma_table import sigma_lines
+from harness.results.reported_metrics import (
+    MAX_FALLBACK_SHARE,
+    PRIMARY_METRIC,
+    SECONDARY_METRIC,
+    TABLE_COLUMNS,
+    sigma_lines,
+)
 
 MOST_ROWS = 12
 """Rows of the short table of a run: about what a terminal shows without scrolling."""

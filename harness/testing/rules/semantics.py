@@ -18,12 +18,12 @@ from harness.testing.contract_case import (
     RATE_HZ,
     ContractCase,
     Frames,
+    RuleViolation,
     disturb_frames,
     stack_qpos,
     transform_motion,
 )
 from harness.testing.frames import drop_stations, exact_frames
-from harness.testing.rules.assertions import RuleViolation
 
 MAX_RECOVERED_RATIO = 1.5
 """An error has recovered when it is at most this many times that of an undisturbed session, plus `_TOLERANCE_MM`."""

@@ -1,19 +1,16 @@
-"""What the verbs of the command line share: common flags, their parsers, and the printing of results."""
+"""Flags and arguments that verbs of the command line share, their parsers, and flags that verbs had once."""
 
 import argparse
-import json
-import shlex
-import shutil
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from harness.commands.ending import print_data
-from harness.commands.removed_flags import refuse_removed_flags
-from harness.core.interrupts import refuse_interrupts
-from harness.errors import BadInput, Outcome, was_interrupted
+from harness.core.options import expand_alternatives, split_outside_brackets
+from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.experiment.isolation import Isolation
+    from harness.experiment.playback import Playback
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
@@ -29,10 +26,31 @@ DEVICE_STATIONS_HELP = (
     "stations of the device: head=3,torso=1 (default: the first 4)"
 )
 Action = Callable[[argparse.Namespace], Outcome]
+_SCENARIO = "Copy the scenario, {}, and name the copy"
+_MOVIE = "`harness view RUN --clip CLIP --methods METHOD --save FILE.mp4` makes a movie of any clip"
+
+REMOVED_FLAGS: Mapping[str, Mapping[str, str]] = {
+    "calibrate": {"--live": "--port alone reads a tracker: leave --live out"},
+    "characterize": {
+        "--name": "A unit has the name of its recording: rename the recording",
+        "--capture": "The recording lies beside --out with the suffix .rec: move it afterwards",
+    },
+    "emulate": {
+        "--overload": _SCENARIO.format("set tracker.overload = true in it"),
+        "--no-faults": _SCENARIO.format("remove its tables [[fault]]"),
+        "--restart": "A restart takes 0.25 s; in Python write EmulatorConfig(restart_s=15.0)",
+        "--controls": "Buttons and joystick move in turn; in Python write EmulatorConfig(controls='still')",
+    },
+    "live": {"--lsl-network": "Write --anywhere, as for `harness emulate`"},
+    "plot": {"--format": "The suffix of --out is the format: --out FILE.svg"},
+    "report": {"--movie": _MOVIE},
+    "run": {"--movie": _MOVIE},
+}
+"""Verb -> flag that it had once -> what to write instead; no help shows it."""
 
 
 def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) -> argparse.ArgumentParser:
-    """Add a verb with flags that other verbs share: any of "seed", "out", "jobs" and "mocap"."""
+    """Add a verb with flags that other verbs share: any of "seed", "out", "jobs", "mocap" and "force"."""
     verb: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
     verb.set_defaults(action=action)
     verb.add_argument("--json", action="store_true", help="print JSON instead of text")
@@ -45,7 +63,10 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
     if "mocap" in flags:
         add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
-    refuse_removed_flags(name, verb)
+    if "force" in flags:
+        verb.add_argument("--force", action="store_true", help="overwrite files that exist")
+    for flag, advice in REMOVED_FLAGS.get(name, {}).items():  # refused with or without a value
+        verb.add_argument(flag, action=_Refuse, nargs="?", const=advice, help=argparse.SUPPRESS, dest=argparse.SUPPRESS)
     return verb
 
 
@@ -86,8 +107,11 @@ def _format_value(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def add_line_flags(verb: argparse.ArgumentParser) -> None:
-    """Add the flags of a verb that opens a device's line; `line_options` reads them."""
+def add_line_flags(
+    verb: argparse.ArgumentParser, rate: str = "frames per second, for a device that does not report its rate"
+) -> None:
+    """Add `--rate`, with this help, and the flags of a verb that opens a device's line; `line_options` reads them."""
+    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=rate)
     verb.add_argument(
         "--items",
         type=parse_items,
@@ -105,14 +129,28 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--alignment", type=parse_alignment, metavar="X,Y,Z,X,Y,Z,X,Y,Z", help=text)
 
 
+def refuse_flags(args: argparse.Namespace, names: Iterable[str], where: str, advice: str) -> None:
+    """BadInput for the first of these flags (`keep_settings`) that is given; `where` follows its name."""
+    for name in names:
+        if getattr(args, name) is not None and getattr(args, name) is not False:
+            raise BadInput(f"--{name.replace('_', '-')} {where}.", advice)
+
+
+def refuse_flags_of_others(args: argparse.Namespace, flags_by_use: Mapping[str, Sequence[str]], use: str) -> None:
+    """BadInput for a flag that applies to other uses of a verb than the present one; `flags_by_use` lists all."""
+    for name in sorted({name for names in flags_by_use.values() for name in names} - set(flags_by_use[use])):
+        users = " or ".join(other for other, names in flags_by_use.items() if name in names)
+        refuse_flags(args, [name], f"with {use}", f"It applies to {users}: leave it out.")
+
+
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
     """The driver options that those flags and `--stations head=3` give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
+    if args.port.startswith("udp:"):
+        advice = "It needs commands, and UDP carries none: leave it out."
+        refuse_flags(args, sorted(LINE_FLAGS), f"with {args.port}", advice)
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
-    if options and args.port.startswith("udp:"):
-        name = min(options).replace("_", "-")
-        raise BadInput(f"--{name} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
     if characters := parse_characters(args.stations):
         options["characters"] = characters
     return options
@@ -149,6 +187,16 @@ def positive_float(text: str) -> float:
     return value
 
 
+def split_list(text: str | None) -> list[str]:
+    """The entries of a list that is separated by commas outside brackets; [] without one."""
+    return split_outside_brackets(text, ",") if text else []
+
+
+def parse_methods(text: str) -> tuple[str, ...]:
+    """Names of methods separated by commas; values of an option that are separated by `|` give a name each."""
+    return tuple(name for part in split_list(text) for name in expand_alternatives(part))
+
+
 def parse_items(text: str) -> tuple[int, ...]:
     """An output list such as 40,2,11,21,1."""
     codes = text.split(",")
@@ -180,6 +228,16 @@ def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | l
     if is_whole_number(args.stations):
         return int(args.stations)
     return parse_device_names(args.stations) if device else parse_names(args.stations)
+
+
+def open_playback(
+    args: argparse.Namespace, stations: int | list[str] | None, scenario: str = "", *, posing: bool = False
+) -> "Playback":
+    """The playback of `--clip`, `--rate`, `--noise`, `--seed` and `--mocap`; by default of the verb's scenario."""
+    from harness.experiment.playback import prepare_playback
+
+    options = {"clip": args.clip, "rate_hz": args.rate, "noise": vars(args).get("noise"), "seed": args.seed}
+    return prepare_playback(scenario or args.scenario, stations=stations, folder=args.mocap, posing=posing, **options)
 
 
 def parse_device_names(text: str) -> list[str]:
@@ -221,90 +279,25 @@ def parse_names(text: str) -> list[str]:
     return names
 
 
-@contextmanager
-def progress_note(out: Path) -> Iterator[None]:
-    """Add to a fault or an interrupt that leaves the block how much of the work in `out` is kept, for it to resume."""
-    try:
-        yield
-    except (KeyboardInterrupt, Exception) as error:
-        kept = _describe_progress(out)
-        resumes = was_interrupted(error) and out.is_dir()
-        error.add_note(f"{kept.removesuffix('.')}, and the same command resumes." if resumes else kept)
-        raise
+class _Refuse(argparse.Action):
+    """Raises BadInput with the advice that is the action's `const`."""
+
+    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None) -> None:
+        raise BadInput(f"`{parser.prog}` no longer has {option}.", f"{self.const}.")
 
 
-@contextmanager
-def recording_note(path: Path, more: str = ".") -> Iterator[None]:
-    """Add to an interrupt that leaves the block whether a recording is kept; `more` ends the sentence if it is."""
-    try:
-        yield
-    except (KeyboardInterrupt, Exception) as error:
-        if was_interrupted(error):
-            kept, nothing = f"What was recorded is kept in {path}{more}", f"Nothing was recorded into {path}."
-            error.add_note(kept if path.exists() else nothing)
-        raise
+def add_isolation_flags(verb: argparse.ArgumentParser) -> None:
+    """Add `--isolate`, `--time-limit` and `--memory-limit`."""
+    text = "run every method in a process of its own; methods from outside the package always have one"
+    verb.add_argument("--isolate", action="store_true", help=text)
+    text = "longest time of such a method for its training, and for one take (default 600)"
+    verb.add_argument("--time-limit", type=positive_float, metavar="S", help=text)
+    text = "largest memory of such a method (default 0.8 of the machine's, divided by --jobs)"
+    verb.add_argument("--memory-limit", type=positive_float, metavar="GB", help=text)
 
 
-def _describe_progress(out: Path) -> str:
-    from harness.experiment.status import read_status
+def read_isolation(args: argparse.Namespace) -> "Isolation":
+    """The isolation that those flags ask for."""
+    from harness.experiment.isolation import DEFAULT_TIME_LIMIT_S, Isolation
 
-    if not out.is_dir():
-        return f"Nothing is kept in {out}."
-    try:
-        found = read_status(out)
-    except Exception:  # no work has begun, or the fault concerns the index too
-        return f"The finished cells in {out} are kept."
-    return f"{found.finished:,} of {found.planned:,} cells in {out} are finished and kept."
-
-
-def print_status(line: str) -> None:
-    """Print a line to stderr, over the line of `show_progress`; stdout is for data."""
-    print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
-
-
-def print_caveat(path: object, caveat: str) -> None:
-    """Print what cannot be verified of a file, if there is anything."""
-    if caveat:
-        print_status(f"note: {path}: {caveat}")
-
-
-def show_progress(line: str) -> None:
-    """Replace the last line of stderr, if stderr is a terminal; what is too long for a line is cut."""
-    if sys.stderr.isatty():
-        line = line[: shutil.get_terminal_size().columns - 1]
-        print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
-
-
-def print_result(
-    args: argparse.Namespace,
-    content: Mapping[str, Any],
-    *lines: str,
-    outcome: Outcome = Outcome.PASS,
-    following: Sequence[object] = (),
-) -> Outcome:
-    """Print the lines, or with --json the content and the outcome's word; returns the outcome.
-
-    `following` are the words of the command that a user would give next, without the program's name. It is printed to
-    stderr, and with --json as "next".
-
-    It is the last thing that a verb does: signals that come later change nothing.
-    """
-    refuse_interrupts()
-    command = shlex.join(["harness", *map(str, following)]) if following else None
-    if args.json:
-        following_command = {"next": command} if command else {}
-        print_data(json.dumps({**content, **following_command, "outcome": outcome.word}) + "\n")
-        return outcome
-    if print_data("\n".join(lines) + "\n") and command:
-        print_status(f"next: {command}")
-    return outcome
-
-
-def this_words() -> list[str]:
-    """The words of the command line as typed, without the program's name."""
-    return sys.argv[1:]
-
-
-def this_command() -> str:
-    """The command line as it was typed."""
-    return shlex.join(["harness", *this_words()])
+    return Isolation(args.isolate, args.time_limit or DEFAULT_TIME_LIMIT_S, args.memory_limit)
