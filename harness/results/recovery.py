@@ -80,7 +80,8 @@ class RecoveryCollector:
 
         A record has the cell (`method`, `inputs`, `split`, `behaviour`, `clip`), its `disturbance`, and
 
-        - `evaluated_frames`: number of frames in the evaluated window; 0 if the take ends before it, and then no value is known;
+        - `evaluated_frames`: number of frames in the evaluated window; 0 if the take ends before
+          it, and then no value is known;
         - `disturbed_deg`, `undisturbed_deg`, `disturbed_mm`, `undisturbed_mm`: mean joint angle error and mean distance
           of the joint centres in the window; `ratio` is that of the angles;
         - `during`: that ratio during the disturbance, from the first bad frame to the last;

@@ -23,7 +23,7 @@ from harness.results.digests import file_digest
 from harness.results.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
 from harness.results.integrity import check_row
-from tests.results.finish import folder_bytes, make_run, write_run
+from tests.results.finish import finish_run, folder_bytes, make_run, write_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 
 MakeCell = Callable[..., storage.Cell]

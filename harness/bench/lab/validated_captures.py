@@ -24,8 +24,7 @@ from harness.core.humanoid24 import BONES
 from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.measure.pose_series import TruthPoses
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.stationary import SpeedError
+from harness.simulate.components.stationary import Clock, SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.study.trust.truth_motion import TruthMotion, nominal_mounts
 from harness.study.trust.validation import Validation, session_unit, validate_capture
