@@ -20,7 +20,7 @@ from harness.measure.unit_file import read_unit_file
 from harness.results.findings import read_findings
 from harness.results.placement_findings import read_placement
 from harness.results.reader import load_results
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.study.papers.paper_study import open_study
@@ -190,8 +190,10 @@ def test_a_paper(old: Path) -> None:
 
 
 def test_a_placement_study(old: Path) -> None:
-    best = read_placement(Path("placement/findings.json")).best[0]
-    assert (best.stations, best.ties) == (("pelvis",), (("hand",),))
+    findings = read_placement(Path("placement/findings.json"))
+    best = findings.best[0]
+    assert (best.stations, best.ties, best.selection_stability) == (("pelvis",), (("hand",),), 1.0)
+    assert findings.contributions  # its key was called worth
     assert main(["status", "placement"]) == Outcome.PASS.exit_code
 
 

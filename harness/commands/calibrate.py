@@ -125,7 +125,7 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
 
 def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import EXPECTED, write_calibration
-    from harness.core.output_file import require_writable
+    from harness.core.files import require_writable
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write, such as --out me.toml.")

@@ -97,7 +97,7 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.experiment.playback import prepare_playback
-    from harness.mocap.synthetic.rig import stretch_marks
+    from harness.mocap.synthetic.takes import stretch_marks
     from harness.stream.emulator.faults import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 

@@ -15,9 +15,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.faults import LostStation
 from harness.simulate.components.mount import MountSlip
+from harness.simulate.components.stationary import Clock
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker

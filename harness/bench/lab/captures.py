@@ -20,9 +20,9 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig, stretch_marks
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.session_bias import SessionBias
+from harness.mocap.synthetic.takes import generate_rig, stretch_marks
+from harness.simulate.components.stationary import SessionBias
+from harness.simulate.components.transient import Dropout
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.names import Label
+from harness.core.ranges import Label
 from harness.errors import BadInput
 from harness.stream.codec.assembler import FrameAssembler
 from harness.stream.codec.clock import ClockUnwrapper
