@@ -106,12 +106,12 @@ def test_replies_between_records_are_found(line: bytes) -> None:
 
 def test_a_burst_of_rubbish_costs_the_records_that_it_touches(rng: np.random.Generator) -> None:
     missing = 0
-    for trial in range(500):
+    for trial in range(200):
         data = split_records(device_bytes(stamps_s(5), seed=trial))
         garbage = rng.integers(0, 256, int(rng.integers(1, 200)), dtype=np.uint8).tobytes()
         decoded = record_bytes(decode_split(b"".join(data[:8]) + garbage + b"".join(data[8:])))
         missing += sum(record not in decoded for record in data)
-    assert missing <= 2
+    assert missing <= 1
 
 
 def test_stations_may_have_different_lists() -> None:

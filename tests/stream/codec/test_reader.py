@@ -312,9 +312,9 @@ def test_times_of_frames_increase_after_a_stamp_that_is_a_little_wrong(row: int,
     assert sum(int(frame.suspect.sum()) for frame in frames) <= 2
 
 
-ROUNDS, CLOCK_S = 5, 1.0
+SESSION_ROUNDS, CLOCK_S = 5, 1.0
 """The sessions begin a second before the first record, and so does the device's clock."""
-STAMPS_S = stamps_s(ROUNDS, begin_s=CLOCK_S)
+STAMPS_S = stamps_s(SESSION_ROUNDS, begin_s=CLOCK_S)
 
 
 def feed_rounds(reader: ContinuousFrameReader, begin_s: float) -> list[TrackerFrame]:
@@ -352,12 +352,12 @@ def test_device_time_continues_by_the_hosts_clock() -> None:
     before = feed_rounds(reader, 100.0)
     reader.begin_session(FOUR, 109.0)
     after = feed_rounds(reader, 110.0)
-    assert len(before) == len(after) == ROUNDS
+    assert len(before) == len(after) == SESSION_ROUNDS
     gap_s = after[0].measured_s[0] - before[-1].measured_s[-1]
     assert gap_s - CLOCK_S == np.float64(110.0 - before[-1].received_s)
     assert reader.device_zero_s == after[0].measured_s[0] - CLOCK_S
     assert reader.counts["sessions"] == 2
-    assert reader.counts["records"] == 2 * 4 * ROUNDS
+    assert reader.counts["records"] == 2 * 4 * SESSION_ROUNDS
 
 
 def test_a_configuration_returns_the_unfinished_frame() -> None:
