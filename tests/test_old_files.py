@@ -190,8 +190,10 @@ def test_a_paper(old: Path) -> None:
 
 
 def test_a_placement_study(old: Path) -> None:
-    best = read_placement(Path("placement/findings.json")).best[0]
-    assert (best.stations, best.ties) == (("pelvis",), (("hand",),))
+    findings = read_placement(Path("placement/findings.json"))
+    best = findings.best[0]
+    assert (best.stations, best.ties, best.selection_stability) == (("pelvis",), (("hand",),), 1.0)
+    assert findings.contributions  # its key was called worth
     assert main(["status", "placement"]) == Outcome.PASS.exit_code
 
 

@@ -52,7 +52,7 @@ def add_characterize(verbs: Verbs) -> None:
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
-    from harness.core.output_file import require_writable
+    from harness.core.files import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
@@ -126,7 +126,7 @@ def _capture_of(args: argparse.Namespace) -> Path:
 
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
-    from harness.measure.recording_time import events_for_precision
+    from harness.measure.episode_distributions import events_for_precision
     from harness.stream.driver import DriverConfig
     from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
 

@@ -65,7 +65,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
 def _load(path: Path) -> Constellation:
     """The constellation in a file; a bare name that no file has is a shipped one."""
     from harness.core.input_file import names_input_file
-    from harness.core.names import check_words
+    from harness.core.ranges import check_words
     from harness.simulate.physics.constellation import shipped_constellation
     from harness.simulate.physics.emitters import read_mcf
 

@@ -4,9 +4,8 @@ import argparse
 import re
 import sys
 from contextlib import redirect_stdout
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from harness.commands.common import (
     Verbs,
@@ -76,18 +75,13 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import sentence
+    from harness.report.placement.wording import placement_sentence
     from harness.results.folder_kind import FINDINGS
     from harness.study.placement import placement_study
 
     question = _read_question(args)
     name = question.name if question else Path(args.study).stem.removeprefix("placement_")
     out = args.out or Path("results") / f"placement_{name}"
-    study: Any = (
-        partial(placement_study.answer_question, question)
-        if question
-        else partial(placement_study.run_placement, args.study)
-    )
     with (
         progress_note(out),
         ProgressBar("cells") as bar,
@@ -95,7 +89,8 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         process_executor(args.jobs) as each,
     ):
         findings: PlacementFindings
-        findings, outcome = study(
+        findings, outcome = placement_study.run_placement(
+            question or args.study,
             out,
             folder=args.mocap,
             executor=each,
@@ -106,7 +101,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_placement_page(out)
-    answer = sentence(findings)
+    answer = placement_sentence(findings)
     content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()

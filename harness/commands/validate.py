@@ -31,8 +31,8 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
+    from harness.core.files import require_writable
     from harness.core.options import split_outside_brackets
-    from harness.core.output_file import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
@@ -52,13 +52,13 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     with ProgressBar("steps") as progress:
         found = validate_capture(args.capture, truth, expected=expected, progress=progress)
         scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
-    report = found.report(args.capture)
+    report = found.report
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
     page = validation_page(report, errors, this_command())
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
-        "numbers": {key: number.as_dict() for key, number in found.numbers.items()},
+        "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
         "exchanged": dict(found.exchanged),
         "departures": [
             {

@@ -6,7 +6,7 @@ stopped at any moment and resumed.
 """
 
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -19,8 +19,8 @@ import numpy as np
 from harness.body.mounts import locate_mount
 from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart
+from harness.core.stream_health import BAUD, RECORD_BYTES, excess_loss
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.evaluation import evaluate
@@ -69,6 +69,22 @@ class PlannedCell:
         return f"{label}{self.method} on {self.part}" + (f" ({', '.join(details)})" if details else "")
 
 
+def plan_cells(
+    scenario: Scenario, parts: Sequence[ClipPart], label: str, chosen: Collection[int] = ()
+) -> list[PlannedCell]:
+    """The cells of test clips in table order: variants change slowest, then clips, inputs and methods.
+
+    `chosen` selects variants by index; () is all.
+    """
+    return [
+        PlannedCell(variant, varied, part, method, inputs, label)
+        for varied, variant in variants(scenario, chosen)
+        for part in parts
+        for inputs in variant.inputs
+        for method in variant.methods
+    ]
+
+
 @dataclass(frozen=True)
 class ClipTask:
     """One test clip of a scenario: everything that a worker process needs."""
@@ -93,12 +109,7 @@ class ClipTask:
 
     def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
-        return [
-            PlannedCell(scenario, varied, self.part, method, inputs, self.label)
-            for varied, scenario in variants(self.scenario, self.chosen)
-            for inputs in scenario.inputs
-            for method in scenario.methods
-        ]
+        return plan_cells(self.scenario, [self.part], self.label, self.chosen)
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,9 @@ from typing import Any
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
-from harness.core.split import ClipPart
-from harness.core.training_data import declared_training_data
+from harness.core.split import ClipPart, declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
-from harness.experiment.cell_watcher import ProgressCount
+from harness.experiment.cell_watcher import ProgressCount, graceful_stop
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
@@ -32,7 +31,6 @@ from harness.experiment.cells import (
     run_task,
 )
 from harness.experiment.executors import TaskExecutor, process_executor, run_in_process
-from harness.experiment.interruption import graceful_stop
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
 from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task

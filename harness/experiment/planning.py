@@ -6,9 +6,9 @@ from itertools import pairwise
 from typing import TypeVar
 
 from harness.core.split import ClipPart
-from harness.experiment.cells import ClipTask, PlannedCell
+from harness.experiment.cells import ClipTask, plan_cells
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.scenario import Scenario, count_variants, variants
+from harness.experiment.scenario import Scenario, count_variants
 from harness.mocap.library import LibraryFolders, absolute_folders
 
 T = TypeVar("T")
@@ -30,14 +30,7 @@ def cell_names(scenario: Scenario, *, labelled: bool = True) -> list[str]:
     Without `labelled` the names leave out the scenario, as in the folder of a single run.
     """
     label = scenario_label(scenario) if labelled else ""
-    parts = [ClipPart.parse(text) for text in scenario.motion.test]
-    return [
-        str(PlannedCell(variant, varied, part, method, inputs, label))
-        for varied, variant in variants(scenario)
-        for part in parts
-        for inputs in variant.inputs
-        for method in variant.methods
-    ]
+    return [str(cell) for cell in plan_cells(scenario, list(map(ClipPart.parse, scenario.motion.test)), label)]
 
 
 def plan_tasks(
@@ -87,12 +80,10 @@ def _clip_tasks(
     scenario: Scenario, folder: LibraryFolders | None, command: str, labelled: bool, isolation: Isolation
 ) -> list[ClipTask]:
     label = scenario_label(scenario) if labelled else ""
-    parts = [ClipPart.parse(text) for text in scenario.motion.test]
-    behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     library = None if folder is None else absolute_folders(folder)  # a worker may have another working directory
     return [
-        ClipTask(scenario, part, b, library, command, label=label, isolation=isolation)
-        for part, b in zip(parts, behaviours, strict=True)
+        ClipTask(scenario, ClipPart.parse(clip), b, library, command, label=label, isolation=isolation)
+        for clip, b in scenario.motion.tested
     ]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.measure.gauss_markov import AXIS_GROUPS, CORRELATION, NOISE_KEYS, NoiseSample
 from harness.measure.noise_start import FEWEST_READINGS, SMALLEST_SHARE, noise_samples, rough_logarithms
 from harness.measure.static_series import StaticSeries
@@ -37,8 +37,6 @@ class NoiseFit:
 
     all_stations: Mapping[str, Interval]
     by_station: Mapping[str, Mapping[str, Interval]]
-    samples: int
-    """Number of readings that the likelihood used."""
 
 
 def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools], *, by_station: bool = True) -> NoiseFit:
@@ -58,7 +56,7 @@ def fit_noise(series: Sequence[StaticSeries], left_out: Sequence[Bools], *, by_s
             stations[name] = dict.fromkeys(NOISE_KEYS, Interval.missing("Too few undisturbed readings at rest."))
         else:
             stations[name] = _Likelihood(own).fit(rough_logarithms(own))
-    return NoiseFit(together, stations, sum(sample.readings for sample in samples))
+    return NoiseFit(together, stations)
 
 
 class _Likelihood:

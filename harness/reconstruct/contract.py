@@ -46,7 +46,7 @@ class Method(Protocol):
     """A configured algorithm. Its attributes are its options, and part of a cell's key (`core.object_state`).
 
     It may also have an attribute `source`, the paper it comes from, which `harness list` prints, and an attribute
-    `training_data` (`core.training_data`). Without the latter its rank has the note "training data unknown".
+    `training_data` (`core.split`). Without the latter its rank has the note "training data unknown".
     """
 
     @property

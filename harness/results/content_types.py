@@ -49,7 +49,7 @@ _GROUP_METRICS: Mapping[str, Any] = {
 _RECOVERY: Mapping[str, Any] = {
     **dict.fromkeys(("method", "inputs", "split", "behaviour", "clip", "disturbance"), str),
     **dict.fromkeys(("disturbed_deg", "undisturbed_deg", "during", "ratio", "back_after_s", "status_right"), _Number),
-    "judged": int,
+    "evaluated_frames": int,
 }
 _ORDER: Mapping[str, Any] = {
     **dict.fromkeys(("source", "method", "behaviour", "inputs", "performer"), str),

@@ -44,7 +44,7 @@ class Recovery:
     behaviour: str
     clip: str
     disturbance: str
-    judged: int
+    evaluated_frames: int
     """Number of frames in the evaluated window; 0 if the take ends before it, and then no value below is known."""
     disturbed_deg: float
     """Mean joint angle error in the evaluated window [deg]."""
@@ -107,7 +107,7 @@ class RecoveryCollector:
         )
 
     def pairs(self) -> list[Recovery]:
-        """Recovery of every disturbed cell that has an undisturbed twin; `judged` is 0 for takes that end too soon."""
+        """Recovery of every disturbed cell with an undisturbed twin; 0 `evaluated_frames`: the take ends too soon."""
         found = []
         for courses in self._courses.values():
             if (plain_course := courses.get("none")) is not None:
@@ -126,18 +126,18 @@ def _recovery(course: _CellErrors, undisturbed: _CellErrors) -> Recovery:
     since_s = common - (bad[-1] if len(bad) else np.inf)
     long_enough = len(since_s) > 0 and since_s[-1] > SETTLING_S + WINDOW_S - 1e-9
     until = (since_s <= SETTLING_S + WINDOW_S + 1e-9) & long_enough
-    judged, during = until & (since_s > SETTLING_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
+    after, during = until & (since_s > SETTLING_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
     right = _status_is_correct(course.time_s, course.reporting, course.status)
     return Recovery(
         **course.cell,
         disturbance=str(course.disturbance["kind"]),
-        judged=int(np.count_nonzero(judged)),
-        disturbed_deg=_mean_over(disturbed_deg, judged),
-        undisturbed_deg=_mean_over(undisturbed_deg, judged),
+        evaluated_frames=int(np.count_nonzero(after)),
+        disturbed_deg=_mean_over(disturbed_deg, after),
+        undisturbed_deg=_mean_over(undisturbed_deg, after),
         during=error_ratio(_mean_over(disturbed_deg, during), _mean_over(undisturbed_deg, during)),
-        disturbed_mm=_mean_over(course.error_mm[here], judged),
-        undisturbed_mm=_mean_over(undisturbed.error_mm[there], judged),
+        disturbed_mm=_mean_over(course.error_mm[here], after),
+        undisturbed_mm=_mean_over(undisturbed.error_mm[there], after),
         back_after_s=_back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
         status_right=_mean_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
     )
@@ -191,7 +191,7 @@ def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
     found = []
     for (method, inputs, split), group in groups.items():
         after: dict[str, Any] = dict.fromkeys(row["disturbance"] for row in group)
-        known = [row for row in group if row["judged"]]
+        known = [row for row in group if row["evaluated_frames"]]
         for kind in dict.fromkeys(row["disturbance"] for row in known):
             those = [row for row in known if row["disturbance"] == kind]
             means = [_mean(those, name) for name in ("disturbed_deg", "undisturbed_deg")]

@@ -11,9 +11,8 @@ from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
-from harness.core.hearing import hearing_key
-from harness.core.motion import BodyMotion
-from harness.core.time_grid import count_steps
+from harness.core.motion import BodyMotion, count_steps
+from harness.core.stream_health import hearing_key
 from harness.errors import BadInput
 from harness.simulate.components.soft_tissue import skin_below, tissue_force_m_s2
 from harness.simulate.link import TrackerConfig, transmit
@@ -21,9 +20,8 @@ from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import position_range_m
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 

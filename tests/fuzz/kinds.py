@@ -4,7 +4,6 @@ import io
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,7 @@ from harness.core.package_data import data_folder
 from harness.experiment.planning import cell_names
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import find_playback
-from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
 from harness.experiment.status import read_status
 from harness.experiment.sweep_config import expand_sweep, load_sweep
 from harness.mocap.file_inspection import inspect_file
@@ -35,10 +34,10 @@ from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
+from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
+from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.report.sweep.reader import read_sweep
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run
@@ -47,11 +46,10 @@ from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
-from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.summary import StreamSummary
-from harness.study.placement.config import base_scenario, load_placement_study, load_scenario_beside
+from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
+from harness.study.placement.config import base_scenario, load_placement_study
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_calibration, mend_findings, mend_index, mend_run
@@ -140,7 +138,10 @@ def _read_sweep(folder: Path) -> object:
 
 def _read_placement(folder: Path) -> object:
     study = load_placement_study(folder / "x.toml")
-    load = partial(load_scenario_beside, beside=folder)
+
+    def load(name: str) -> Scenario:
+        return load_scenario(find_scenario(name, folder))
+
     return [base_scenario(study, load, condition) for condition in (None, *study.condition)]
 
 

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from harness.measure.episode_distributions import fit_length
 from harness.measure.gaps import find_gaps_at_rest, leaked_tilt_rad
-from harness.measure.vector_length import fit_length
 from harness.simulate.components.transient import Dropout
 from harness.simulate.noise import Noise
-from tests.measure.resting import RATE_HZ, default_noise, rest_series, simulate_rest
-from tests.measure.static_readings import simulate_static
+from tests.measure.resting_stations import RATE_HZ, default_noise, rest_series, simulate_rest, simulate_static
 
 
 def test_gaps_and_coastings_are_those_of_the_simulation() -> None:

@@ -13,7 +13,7 @@ from harness.simulate.components.stationary import DriftNoise
 from harness.simulate.components.transient import Echo, Excursion
 from harness.simulate.noise import Noise, noise_preset
 from harness.stream.recording.station_readings import StationReadings
-from tests.measure.static_readings import simulate_static, station_readings
+from tests.measure.resting_stations import simulate_static, station_readings
 
 
 def whole_series(readings: StationReadings, rate_hz: float = 40.0) -> StaticSeries:

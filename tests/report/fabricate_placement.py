@@ -15,6 +15,7 @@ from harness.core.seeds import generator
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.placement_findings import (
     BestSet,
+    CandidatePlace,
     MarginalContribution,
     PlacementCondition,
     PlacementFindings,
@@ -24,23 +25,22 @@ from harness.results.placement_findings import (
     Ranking,
     SearchStep,
     StationNames,
-    StationPlacement,
     StationSetResult,
     write_placement,
 )
 
 PLACES = (
-    StationPlacement("head", "head", 1.0, 0.0),
-    StationPlacement("sternum", "thorax", 0.5, 0.0),
-    StationPlacement("pelvis", "lhipjoint", 0.0, 165.0),
-    StationPlacement("left_hand", "lhand", 1.0, -90.0, side="left"),
-    StationPlacement("right_hand", "rhand", 1.0, 90.0, side="right"),
-    StationPlacement("left_upper_arm", "lhumerus", 0.5, -90.0, side="left"),
-    StationPlacement("right_upper_arm", "rhumerus", 0.5, 90.0, side="right"),
-    StationPlacement("left_thigh", "lfemur", 0.6, -90.0, side="left"),
-    StationPlacement("right_thigh", "rfemur", 0.6, 90.0, side="right"),
-    StationPlacement("left_ankle", "ltibia", 0.9, -90.0, side="left"),
-    StationPlacement("right_ankle", "rtibia", 0.9, 90.0, side="right"),
+    CandidatePlace("head", "head", 1.0, 0.0),
+    CandidatePlace("sternum", "thorax", 0.5, 0.0),
+    CandidatePlace("pelvis", "lhipjoint", 0.0, 165.0),
+    CandidatePlace("left_hand", "lhand", 1.0, -90.0, side="left"),
+    CandidatePlace("right_hand", "rhand", 1.0, 90.0, side="right"),
+    CandidatePlace("left_upper_arm", "lhumerus", 0.5, -90.0, side="left"),
+    CandidatePlace("right_upper_arm", "rhumerus", 0.5, 90.0, side="right"),
+    CandidatePlace("left_thigh", "lfemur", 0.6, -90.0, side="left"),
+    CandidatePlace("right_thigh", "rfemur", 0.6, 90.0, side="right"),
+    CandidatePlace("left_ankle", "ltibia", 0.9, -90.0, side="left"),
+    CandidatePlace("right_ankle", "rtibia", 0.9, 90.0, side="right"),
 )
 WORTH = {
     "walking": (0.1, 0.3, 0.9, 0.25, 0.25, 0.1, 0.1, 0.5, 0.5, 1.1, 1.1),
@@ -86,7 +86,7 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
         circumstances={"harness": "0.1.0", "commit": "0123456789abcdef", "dirty": False, "python": "3.11.2"},
         rankings=rankings,
         searches=(_greedy(best, errors),),
-        worth=(
+        contributions=(
             *(_worth(name, "ablate", names, whole[_without(names, name)], whole[names]) for name in names),
             *(_worth(name, "add", base, errors[base], more[stations]) for stations, name in added.items()),
         ),

@@ -4,13 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
-from harness.measure.accuracy import ErrorQuantiles, StationAccuracy
 from harness.measure.departures import compare_with_expected
 from harness.measure.profile import StretchLength
 from harness.measure.unit_report import CaptureSummary
-from harness.measure.validation_report import ROOM, EstimatedPose, ResidualSeries, ValidationReport
+from harness.measure.validation_report import (
+    ROOM,
+    ErrorQuantiles,
+    EstimatedPose,
+    ResidualSeries,
+    StationAccuracy,
+    ValidationReport,
+)
 from tests.report.fabricate_lab import STATIONS, exact, number
 
 NO_STAMPS = "The stream has no stamps."

@@ -99,7 +99,7 @@ def test_a_take_that_ends_too_soon_tells_nothing(bent: Callable[..., Cell]) -> N
     recoveries = RecoveryCollector()
     for kind in ("none", "one_lost"):
         recoveries.add(bent(kind, 2.0, defined_by={"clip": "walk_01", "disturbance": {"kind": kind, **late}}))
-    assert [found.judged for found in recoveries.pairs()] == [0]
+    assert [found.evaluated_frames for found in recoveries.pairs()] == [0]
     (row,) = tabulate_recovery(json.loads(json.dumps(to_json_types(recoveries.rows()))))
     assert (row["clips"], row["after"]) == (0, {"one_lost": None})
 

@@ -489,6 +489,17 @@ def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
         storage.read_summary(run_folder)
 
 
+def test_a_recovery_row_of_an_earlier_version_has_its_key_renamed(run_folder: Path, make_cell: MakeCell) -> None:
+    storage.write_cell(run_folder, make_cell())
+    content = finish_run(run_folder, keys=[make_cell().key], planned=1)
+    names = ("method", "inputs", "split", "behaviour", "clip", "disturbance")
+    numbers = ("disturbed_deg", "undisturbed_deg", "during", "ratio", "back_after_s", "status_right")
+    row = {**dict.fromkeys(names, "a"), **dict.fromkeys(numbers, 1.0), "judged": 40}
+    write_json(run_folder / "summary.json", content | {"recovery": [row]})
+    (read,) = storage.read_summary(run_folder)["recovery"]
+    assert (read["evaluated_frames"], "judged" in read) == (40, False)
+
+
 def test_a_run_without_an_index_is_refused_with_advice(run_folder: Path, make_cell: MakeCell) -> None:
     make_run(run_folder, manifest())
     storage.write_cell(run_folder, make_cell())

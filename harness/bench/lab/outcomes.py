@@ -116,7 +116,7 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
         against = validate_planted(kind, seed, folder)
         exchanged = tuple(f"{station}: {body}" for station, body in sorted(against.exchanged.items()))
         errors = registration_errors(against, seed) if kind in NO_FAULTS else {}
-        checks = stored_checks(against.checks)
+        checks = stored_checks(against.report.checks)
         return CaptureOutcome(kind, seed, source_hash(), checks, errors=errors, exchanged=exchanged)
     found = characterize_capture(planted_capture(kind, seed, folder))
     parameters = tuple(

@@ -13,8 +13,7 @@ from harness.bench.lab.planted_errors import METRIC, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.study.trust.equivalence import judge_equivalence
-from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_pairs
+from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_equivalence, judge_pairs
 
 CLIPS = 12
 SIMULATED_SEEDS = 5

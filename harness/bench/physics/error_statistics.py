@@ -8,7 +8,7 @@ import numpy as np
 from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
 from harness.measure.episodes import Episodes, find_excursions, find_gaps
-from harness.measure.spectrum import ErrorSpectrum, measure_spectrum, pool_spectra
+from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
 from harness.report.physics.error_comparison import ERROR_QUANTILES, TrackerErrorStatistics
 
 LIMIT_M, MERGE_S, SEGMENT_S = 0.01, 0.5, 10.0

@@ -17,8 +17,8 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.core.hinges import hinge_angles, hinge_rotation
 from harness.core.humanoid24 import QPOS_OF_DOF
+from harness.core.skeleton import hinge_angles, hinge_rotation
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 

@@ -28,7 +28,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.core.training_data import declared_training_data
+from harness.core.split import declared_training_data
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.hinge_limits import HingeLimits

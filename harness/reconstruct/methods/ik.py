@@ -29,7 +29,7 @@ from harness.body.humanoid import Body
 from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.core.training_data import EXAMPLES, NONE
+from harness.core.split import EXAMPLES, NONE
 from harness.reconstruct.contract import Fitted
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad

@@ -10,8 +10,8 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF
+from harness.core.skeleton import are_gimbal, equivalent_euler_angles
 
 _UNLIMITED_RANGE_RAD = np.deg2rad(350.0)
 _FULL_TURN_RAD = 2.0 * np.pi

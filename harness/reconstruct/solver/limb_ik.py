@@ -215,7 +215,7 @@ def _ball_rotation(limb: Limb, angles: Floats) -> Floats:
 
 @compiled
 def _euler(axes: Floats, rotation: Floats) -> Floats:
-    """Angles (3,) about right-handed orthogonal axes (3, 3) that give a rotation (3, 3); see `core.hinges`."""
+    """Angles (3,) about right-handed orthogonal axes (3, 3) that give a rotation (3, 3); see `core.skeleton`."""
     m = np.empty((3, 3))
     for j in range(3):
         column = multiply_vector(rotation, axes[j])

@@ -8,9 +8,8 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.names import Text
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import Range, Text, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.simulate.physics.emitters import MCF_SUFFIX, find_emitter_fault, read_mcf

@@ -14,7 +14,7 @@ import numpy as np
 from harness.core.files import write_bytes
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, shorten
-from harness.stream.codec.replies import Emitter
+from harness.stream.codec.replies import Emitter, parse_reply
 
 FEWEST, MOST = 3, 200
 """Numbers of emitters of a constellation. A position needs three ranges; no known constellation has 200."""
@@ -141,4 +141,5 @@ def write_mcf(path: Path, emitters: Sequence[Emitter]) -> None:
 def _parse_line(line: bytes) -> Emitter | None:
     if len(line) > _LONGEST_LINE or not line.isascii():
         return None
-    return Emitter.parse(line.decode("ascii").rstrip(" "))
+    reply = parse_reply(line.rstrip(b" "))
+    return reply if isinstance(reply, Emitter) else None

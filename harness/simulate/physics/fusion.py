@@ -11,8 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.names import Name
-from harness.core.ranges import CheckedFields, Range
+from harness.core.ranges import CheckedFields, Name, Range
 from harness.errors import ShapeError
 from harness.simulate.physics.acquisition import FIRST_TILT_VARIANCE, HEARD, LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS
 from harness.simulate.physics.filter import advance

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.hearing import ENOUGH_EMITTERS
+from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import InertialUnit, true_increments

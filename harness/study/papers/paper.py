@@ -17,9 +17,8 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
-from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios, shorten_scenario
 from harness.study.papers.provenance import provenance_tables
-from harness.study.papers.quick_form import shorten
 
 PAPERS = ("liu2011", "kim2012")
 """Names of modules of this folder, each with a `PAPER`."""
@@ -86,7 +85,7 @@ def reproduce(
     result.
     """
     motion: Motion = "cmu" if library else "builtin"
-    plan = {name: shorten(run) if quick else run for name, run in paper.plan(motion, seed).items()}
+    plan = {name: shorten_scenario(run) if quick else run for name, run in paper.plan(motion, seed).items()}
     if not plan:
         raise BadInput(f"{paper.name} has no runs on {motion} motion.", "Choose the other motion.")
     runs = {name: run for name, run in plan.items() if paper.needs(name)}

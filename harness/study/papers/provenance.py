@@ -68,10 +68,9 @@ def _varied_value_text(key: str, value: Any) -> str:
 
 def _database_rows(study: PaperStudy, scenario: Scenario) -> Iterator[tuple[str, ...]]:
     motion = scenario.motion
-    shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
     source = open_scenario_motion(motion, study.library, scenario.seed)
-    for behaviour in dict.fromkeys(shown):
-        tested = [clip for clip, what in zip(motion.test, shown, strict=True) if what == behaviour]
+    for behaviour in dict.fromkeys(what for _, what in motion.tested):
+        tested = [clip for clip, what in motion.tested if what == behaviour]
         same_behaviour = motion.database == "behaviour"
         examples = [name for name in motion.examples if not same_behaviour or source.behaviour(name) == behaviour]
         frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in examples)

@@ -15,8 +15,7 @@ from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed,
 from harness.results import manifest
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.findings import BarChart, FindingsTable, PaperExperiment
-from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.quick_form import DATABASE_SHARE
+from harness.study.papers.paper_study import DATABASE_SHARE, PaperStudy
 from harness.study.papers.speed_dataset import MAX_TEST_S, build_speed_dataset, missing_clips
 
 _REAL_NOTE = (
@@ -97,8 +96,8 @@ def _measure(study: PaperStudy, published: PublishedSpeed, frames: Mapping[str, 
     machine = f"{circumstances['processor']}, {circumstances['cpu_count']} cores"
     if absent := missing_clips(study, frames):
         return {"absent": absent, "machine": machine}
-    dataset = build_speed_dataset(study, frames, benchmark_clips.load_clean_scenario(published.scenario), folder)
-    speeds = measure_speed(published.methods, dataset.database, dataset.test_clips, study.seed)
+    scenario = benchmark_clips.load_clean_scenario(published.scenario)
+    speeds = measure_speed(published.methods, *build_speed_dataset(study, frames, scenario, folder), study.seed)
     return {"speeds": [asdict(speed) for speed in speeds], "machine": machine}
 
 

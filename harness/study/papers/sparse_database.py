@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.five_stations import (
     KERNEL_CCA,
@@ -21,7 +20,7 @@ from harness.study.papers.five_stations import (
 )
 from harness.study.papers.leave_one_out import Order
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, error_lines, errors_by_joint_group, errors_by_unit, mean_bars, mean_table
+from harness.study.papers.tables import error_lines, errors_by_joint_group, errors_by_unit, mean_bars, mean_table
 
 DATABASE_FRAMES = {"table_tennis": 31, "walking": 43}
 ONE_DATABASE_FRAMES = sum(DATABASE_FRAMES.values())
@@ -112,17 +111,14 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
         "as printed": (KERNEL_CCA_LITERAL, WEIGHTED_BLEND_LITERAL),
         "ours": (KERNEL_CCA, WEIGHTED_BLEND),
     }
-    errors, roots = (
-        {
-            m: {
-                **errors_by_joint_group(study.cells(run, method=m + option), ARM_AND_SPINE, metric),
-                "whole body": errors_by_unit(study.rows(run, method=m + option), metric),
-            }
-            for pair in pairs.values()
-            for m in pair
+    errors = {
+        m: {
+            **errors_by_joint_group(study.cells(run, method=m + option), ARM_AND_SPINE),
+            "whole body": errors_by_unit(study.rows(run, method=m + option)),
         }
-        for metric in (METRIC, RMS)
-    )
+        for pair in pairs.values()
+        for m in pair
+    }
     claims = [
         claim_in_run(
             *(study, run, f"{label_in(study, 'table_tennis')}, {group}: {lower} errs less than {higher}"),
@@ -133,10 +129,7 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
         for reading, (lower, higher) in pairs.items()
         for group in ("right arm", "spine", "whole body")
     ]
-    groups, root_groups = (
-        {group: {method: side[method][group] for method in side} for group in side[KERNEL_CCA]}
-        for side in (errors, roots)
-    )
+    groups = {group: {method: errors[method][group] for method in errors} for group in errors[KERNEL_CCA]}
     label = label_in(study, "table_tennis")
     title = f"Three stations, 31 frames of {label}, no final inverse kinematics"
     caption = "Mean error of the hinges of each group."
@@ -158,7 +151,7 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
             *differences(study),
         ),
         claims=tuple(claims),
-        tables=(mean_table(f"{title} [deg]", "hinges of", groups, root_groups),) if run in study.runs else (),
+        tables=(mean_table(f"{title} [deg]", "hinges of", groups),) if run in study.runs else (),
         figures=(mean_bars(title, "deg", groups, caption=caption),) if run in study.runs else (),
         runs=(run,) if run in study.runs else (),
     )

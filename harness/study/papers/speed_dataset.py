@@ -6,7 +6,7 @@ resumed study opens it again.
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from harness.core.files import content_key
@@ -26,14 +26,6 @@ MAX_TEST_S = 12.0
 """Longest part of a held-out take that is followed [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class SpeedDataset:
-    """A database to learn from, and held-out clips to follow."""
-
-    database: MotionDatabase
-    test_clips: list[BenchmarkClip]
-
-
 def missing_clips(study: PaperStudy, frames: Mapping[str, int]) -> str:
     """Explain why the library has no clips for these behaviours; "" where it has, and always for synthetic motion."""
     if study.library is None:
@@ -48,7 +40,9 @@ def missing_clips(study: PaperStudy, frames: Mapping[str, int]) -> str:
     return f"the library lacks one clip to follow and another to learn from for {', '.join(frames)}"
 
 
-def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], scenario: Scenario, folder: Path) -> SpeedDataset:
+def build_speed_dataset(
+    study: PaperStudy, frames: Mapping[str, int], scenario: Scenario, folder: Path
+) -> tuple[MotionDatabase, list[BenchmarkClip]]:
     """Build a database with `frames` of each behaviour; simulate a held-out take of each as `scenario` reads it.
 
     A library may have fewer frames. Where several behaviours are asked for together, its clips of every behaviour are
@@ -64,13 +58,12 @@ def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], scenario: 
             benchmark_clips.generate_held_out_takes(1, study.seed, MAX_TEST_S, [behaviour])[0] for behaviour in frames
         ]
         database = build_database(folder, {"seed": study.seed, "frames": frames}, lambda: factories)
-        return SpeedDataset(database, benchmark_clips.simulate_clips(takes, study.seed, scenario))
+        return database, benchmark_clips.simulate_clips(takes, study.seed, scenario)
     evaluations, wanted = _test_clip_evaluations(study, study.library, frames, scenario), sum(frames.values())
     files = {entry.name: _digest(entry.path) for entry in MotionLibrary(study.library).entries()}
     content = {"files": files, "examples": evaluations[0].scenario.motion.examples, "frames": wanted}
     database = build_database(folder, content, lambda: truncate_motions(evaluations[0].training.examples, wanted))
-    clips = [BenchmarkClip.from_simulation(e.part.clip, e.simulation) for e in evaluations]
-    return SpeedDataset(database, clips)
+    return database, [BenchmarkClip.from_simulation(e.part.clip, e.simulation) for e in evaluations]
 
 
 def build_database(
@@ -94,9 +87,7 @@ def list_test_clips(study: PaperStudy) -> dict[str, set[str]]:
     """Behaviour -> test clips of the study's runs."""
     clips: dict[str, set[str]] = {}
     for scenario in study.runs.values():
-        motion = scenario.motion
-        shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-        for text, behaviour in zip(motion.test, shown, strict=True):
+        for text, behaviour in scenario.motion.tested:
             clips.setdefault(behaviour, set()).add(ClipPart.parse(text).clip)
     return clips
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.departures import Departure
 from harness.measure.profile import UnitProfile, measure_profile
@@ -17,13 +17,13 @@ from harness.results.digests import file_digest
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.study.trust.expected_values import (
     UNIFORM_KEYS,
+    check_departures,
     flatten_components,
     nest_components,
     preset_components,
     preset_values,
     unit_values,
 )
-from harness.study.trust.named_departures import check_departures
 
 REFERENCE_NEEDED = "A reference is needed: `harness validate`."
 DEFAULT_KEPT = {
@@ -113,7 +113,8 @@ def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dic
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
     if resolution.value > 2.0 * profile.timing.expected_resolution_s:  # else it is as fine as the format allows
         line["timing.stamp_resolution_s"] = profile.timing.expected_resolution_s
-    return {(key, ""): one for key, one in {**known, **{key: _exact(value) for key, value in line.items()}}.items()}
+    numbers = {**known, **{key: Interval.normal(value, 0.0) for key, value in line.items()}}
+    return {(key, ""): number for key, number in numbers.items()}
 
 
 def _means(profile: UnitProfile) -> dict[str, Interval]:
@@ -139,7 +140,3 @@ def _describe_capture(profile: UnitProfile, path: Path) -> dict[str, Any]:
         "rest_s": round(float(np.sum([one.duration_s for one in profile.rest])), 3),
         "damage": list(profile.damage),
     }
-
-
-def _exact(value: float) -> Interval:
-    return Interval(value, value, value)

@@ -1,12 +1,14 @@
-"""Numbers that a unit is expected to have: those of a noise preset, or of an earlier unit file."""
+"""Numbers that a unit is expected to have, by a noise preset or an earlier unit file, and departures from them."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
+from harness.compare.significance import holm
 from harness.core.fields import replace_fields
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
+from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import noise_preset
 
@@ -32,7 +34,7 @@ def preset_components() -> dict[str, Any]:
 
 def preset_values() -> dict[str, Interval]:
     """Dotted key -> number of the preset `default`, known exactly; of a uniform distribution also its mean."""
-    return _with_means({key: _exact(value) for key, value in flatten_components(preset_components())})
+    return _with_means({key: Interval.normal(value, 0.0) for key, value in flatten_components(preset_components())})
 
 
 def unit_values(unit: UnitFile) -> dict[str, Interval]:
@@ -88,9 +90,27 @@ def _with_means(values: dict[str, Interval]) -> dict[str, Interval]:
         ends = [values.get(f"{key}.{i}") for i in (0, 1)]
         if key not in values and ends[0] is not None and ends[1] is not None:
             middle = 0.5 * (ends[0].value + ends[1].value)
-            values[key] = _exact(middle)
+            values[key] = Interval.normal(middle, 0.0)
     return values
 
 
-def _exact(value: float) -> Interval:
-    return Interval(value, value, value)
+def check_departures(
+    measured: Mapping[tuple[str, str], Interval], expected: Mapping[tuple[str, str], Interval]
+) -> list[Departure]:
+    """Compare every number that was measured and is expected; both map (key, station) to a number.
+
+    A station's number whose own expectation is missing is compared with that of all stations (station ""). The result
+    is in the order of `measured`, with p-values that Holm's correction over all checks has raised.
+    """
+    checks = []
+    for (key, station), number in measured.items():
+        reference = expected.get((key, station), expected.get((key, "")))
+        if number.is_measured and reference is not None and reference.is_measured:
+            checks.append(compare_with_expected(key, station, number, reference))
+    return correct_departures(checks)
+
+
+def correct_departures(checks: Sequence[Departure]) -> list[Departure]:
+    """The checks with their p-values corrected for their number."""
+    corrected = holm([check.p for check in checks])
+    return [replace(check, p_holm=p) for check, p in zip(checks, corrected, strict=True)]

@@ -9,9 +9,9 @@ import pytest
 
 from harness.body import humanoid
 from harness.core.arrays import Floats
-from harness.core.hinges import equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF, pack
 from harness.core.motion import BodyMotion
+from harness.core.skeleton import equivalent_euler_angles
 from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase, TakeSegment

@@ -12,10 +12,10 @@ from harness.cli import main
 from harness.report.kit.render_process import start_renderer
 from harness.report.placement import body_map as body
 from harness.report.placement import page as placement_page
-from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
+from harness.report.placement.body_map import draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
-from harness.report.placement.wording import sentence, set_name, smallest_sufficient_set
+from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
 from harness.results.placement_findings import BestSet, PlacementFindings, StationNames, StationSetResult
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 from tests.report.reading import text_of
@@ -45,7 +45,7 @@ def study_of(errors: dict[StationNames, list[float | None]], better: str = "lowe
         for stations, values in errors.items()
     ]
     best = tuple(BestSet(t.stations) for t in tried)
-    whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), worth=())
+    whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), contributions=())
     return replace(whole, compared=(), conditions=(), agreements=(), better="higher" if better == "higher" else "lower")
 
 
@@ -68,9 +68,9 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
     chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
-    assert sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
+    assert placement_sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
     apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
-    assert sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
+    assert placement_sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
     fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
     chosen = smallest_sufficient_set(fps)
     assert chosen is not None
@@ -79,12 +79,12 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
 
 def test_too_few_clips_are_said_to_be_too_few() -> None:
     few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in sentence(few)
+    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in placement_sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended() -> None:
     nothing = study_of({("pelvis",): [None] * 8})
-    assert sentence(nothing) == "No set of stations was measured."
+    assert placement_sentence(nothing) == "No set of stations was measured."
     assert "not measured" in placement_text(nothing)
     assert pareto_chart(nothing) is None
 
@@ -125,7 +125,9 @@ def test_ties_are_called_ties(findings: PlacementFindings) -> None:
 @pytest.mark.usefixtures("unseen")
 def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, findings: PlacementFindings) -> None:
     hostile = "<script>alert(1)</script>"
-    shown = replace(findings, notes=(hostile,), rankings=findings.rankings[1:], worth=findings.worth[:11])
+    shown = replace(
+        findings, notes=(hostile,), rankings=findings.rankings[1:], contributions=findings.contributions[:11]
+    )
     page = write_placement_page(write_made_up(tmp_path, shown))
     content, said = page.read_text(encoding="utf-8"), text_of(page)
     assert f"<h1>{ANSWER}</h1>" in content
@@ -150,7 +152,7 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
 
 @pytest.mark.usefixtures("unseen")
 def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = write_made_up(tmp_path, replace(made_up(at_most=1), worth=()))
+    folder = write_made_up(tmp_path, replace(made_up(at_most=1), contributions=()))
     first = write_placement_page(folder).read_bytes()
     assert main(["report", str(folder), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -161,12 +163,11 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
-    among, more = select_body_maps(findings.worth)
-    assert len(among.values) == len(PLACES)
-    assert among.description == "error without it minus error with all 11 stations"
-    assert among.base == ()
-    assert more.base == ("pelvis", "left_ankle", "right_ankle")
-    assert set(more.values) == {place.name for place in PLACES} - set(more.base)
+    among, more = select_body_maps(findings.contributions)
+    assert len(among[0]) == len(PLACES)
+    assert among[1:] == ("error without it minus error with all 11 stations", ())
+    assert more[2] == ("pelvis", "left_ankle", "right_ankle")
+    assert set(more[0]) == {place.name for place in PLACES} - set(more[2])
     assert select_body_maps(()) == []
 
 
@@ -192,7 +193,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
     }
     monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", ("right_ankle",)), unit="deg")
+    chart, missing = draw_body_map(PLACES, values, "worth", ("right_ankle",), unit="deg")
     assert chart is not None
     assert missing == ""
     assert "right ankle (worn)" in chart.svg
@@ -208,18 +209,18 @@ def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
     )
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_body_map(PLACES, BodyMapValues({"head": None}, "worth"), unit="deg") == (
+    assert draw_body_map(PLACES, {"head": None}, "worth", unit="deg") == (
         None,
         "no candidate has a value",
     )
     monkeypatch.setattr(body, "find_spec", lambda name: None)
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -230,13 +231,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, values: object, description: str, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
     values = {"head": 0.0, "left_ankle": 0.5}
     worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert draw_body_map(PLACES, BodyMapValues(values, "worth", worn), unit="deg")[1] == ""
+    assert draw_body_map(PLACES, values, "worth", worn, unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 
@@ -260,7 +261,7 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
 
 
 def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(findings: PlacementFindings) -> None:
-    best = tuple(replace(each, held_out=None, crossed=3.21) for each in findings.best)
+    best = tuple(replace(each, held_out=None, cross_validated_error=3.21) for each in findings.best)
     lines = placement_text(replace(findings, best=best)).splitlines()
     head = next(line for line in lines if line.startswith("stations  best set"))
     assert "cross-validated" in head

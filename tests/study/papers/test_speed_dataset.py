@@ -47,14 +47,12 @@ def library(tmp_path: Path) -> PaperStudy:
 def test_built_in_frames_are_counted_by_behaviour(tmp_path: Path) -> None:
     study, frames = PaperStudy(tmp_path, "builtin", 1, {}), {"golf": 850, "boxing": 40}
     assert missing_clips(study, frames) == ""
-    found = build_speed_dataset(study, frames, WORN, tmp_path / "databases")
-    counted = {b: sum(len(run) for run in found.database.segments if run.behaviour == b) for b in synthetic.BEHAVIOURS}
+    database, clips = build_speed_dataset(study, frames, WORN, tmp_path / "databases")
+    counted = {b: sum(len(run) for run in database.segments if run.behaviour == b) for b in synthetic.BEHAVIOURS}
     assert {behaviour: count for behaviour, count in counted.items() if count} == frames
-    assert len(found.test_clips) == 2
-    assert not {trial.take for trial in found.test_clips} & {run.take for run in found.database.segments}
-    assert len(found.test_clips[0].simulation.frames) == pytest.approx(
-        speed_dataset.MAX_TEST_S * benchmark_clips.RATE_HZ, abs=2
-    )
+    assert len(clips) == 2
+    assert not {trial.take for trial in clips} & {run.take for run in database.segments}
+    assert len(clips[0].simulation.frames) == pytest.approx(speed_dataset.MAX_TEST_S * benchmark_clips.RATE_HZ, abs=2)
 
 
 def test_a_database_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,11 +80,11 @@ def test_as_many_frames_as_there_are(count: int, lengths: list[int]) -> None:
 
 def test_a_library_gives_what_it_has_and_keeps_the_longest_judged_clip(library: PaperStudy) -> None:
     assert list_test_clips(library) == {"walking": {"91_01", "91_02"}, "golf": {"93_01"}}
-    found = build_speed_dataset(library, {"walking": 10_000}, WORN, library.out / "databases")
-    assert [trial.take for trial in found.test_clips] == ["91_02"]
-    assert {run.take for run in found.database.segments} == {"91_01", "92_01"}
-    assert len(found.database) == pytest.approx((360 + 420) / 3, abs=4)
-    assert len(build_speed_dataset(library, {"walking": 70}, WORN, library.out / "databases").database) == 70
+    database, clips = build_speed_dataset(library, {"walking": 10_000}, WORN, library.out / "databases")
+    assert [trial.take for trial in clips] == ["91_02"]
+    assert {run.take for run in database.segments} == {"91_01", "92_01"}
+    assert len(database) == pytest.approx((360 + 420) / 3, abs=4)
+    assert len(build_speed_dataset(library, {"walking": 70}, WORN, library.out / "databases")[0]) == 70
     assert len(list((library.out / "databases").iterdir())) == 2
 
 
@@ -96,7 +94,7 @@ def test_what_a_library_lacks_is_named(library: PaperStudy) -> None:
     assert "table_tennis" in missing_clips(library, {"table_tennis": 5})
     together = {"walking": 5, "golf": 5, "table_tennis": 5_000}
     assert missing_clips(library, together) == ""
-    found = build_speed_dataset(library, together, WORN, library.out / "databases")
-    assert {trial.take for trial in found.test_clips} == {"91_02", "93_01"}
-    assert {run.take for run in found.database.segments} == {"91_01", "92_01"}
-    assert isinstance(found.database, MotionDatabase)
+    database, clips = build_speed_dataset(library, together, WORN, library.out / "databases")
+    assert {trial.take for trial in clips} == {"91_02", "93_01"}
+    assert {run.take for run in database.segments} == {"91_01", "92_01"}
+    assert isinstance(database, MotionDatabase)
