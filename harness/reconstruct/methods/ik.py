@@ -6,7 +6,7 @@ has no prior. A position that jumps is left out by the outlier gate.
 
 Source: the field's standard method; papers use it as a baseline and as the last step of other methods.
 
-Options, with units and defaults, are the fields of `Ik`. Three groups matter:
+Options, with units and defaults, are the fields of `Ik` and of `SolverOptions`. Three groups matter:
 
 - The prior: its mean lies between the last estimate (`towards_mean` 0) and the examples' mean posture (1); default 0.1.
   Its standard deviation is 30 deg (RMS over hinges), in proportion to each hinge's spread over the examples (`spread`).

@@ -12,7 +12,7 @@ For every frame (Kim et al. 2012):
 Ours: features relative to an anchor station instead of the room, weights by the readings' confidence, the outlier gate,
 and whole-body inverse kinematics with a prior about the regressed pose (`solve` "limbs" is closed-form limb IK).
 
-The options are the fields of `LocalRegression`; each method adds its own.
+The options are the fields of `LocalRegression`, and each method adds its own.
 
 Weighted blend (`weighted_blend`, docs/papers.md C3) weighs neighbours by a power of their distance in feature space. It
 is the baseline of Kim et al. 2012, which prints no weights; the power is ours. scenarios/tune_weighted_blend.toml chose
