@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from harness.bench.lab.outcomes import CaptureOutcome
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.study.trust.expected_values import preset_values
+from harness.study.trust.characterization import preset_values
 
 LEAST, MOST = 0.90, 0.99
 """Shares of the captures between which the coverage of a 95 % interval has to lie."""

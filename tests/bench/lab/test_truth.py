@@ -12,7 +12,7 @@ from harness.bench.lab.coverage import coverage_rows
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber
 from harness.bench.lab.registration_errors import PROMISES, registration_rows
 from harness.bench.lab.truth import KINDS, fault_row, fault_rows, needed_captures
-from harness.study.trust.expected_values import preset_values
+from harness.study.trust.characterization import preset_values
 
 
 def _check(key: str, value: float, station: str = "", *, half: float = 0.0, named: bool = True) -> StoredCheck:
