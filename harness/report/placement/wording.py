@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.units import count_clips, count_units
 from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_share
+from harness.core.number_format import NOT_MEASURED, count_noun
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
@@ -255,11 +255,6 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     verb = "changes its" if pair.changes == 1 else "change their"
     example = f"{set_name(first.first)} against {set_name(first.second)}, {before} to {after} {findings.unit}".rstrip()
     return f"{pair.changes:,} of {pairs:,} pairs {verb} order{shown}: first {example}"
-
-
-def format_stability(share: float | None) -> str:
-    """The share of resamples in which a set stays best, in per cent; empty for None."""
-    return "" if share is None else format_share(share)
 
 
 def format_rank_range(rank_low: int, rank_high: int) -> str:
