@@ -83,7 +83,7 @@ def reproduce(
 ) -> tuple[PaperFindings, Outcome]:
     """Run what is not finished, evaluate the experiments, and write findings.json into `out`.
 
-    The motion is synthetic, or that of `library`. `quick` runs the form of `quick_form`, which decides nothing.
+    The motion is synthetic, or that of `library`. `quick` runs the form of `shorten_scenario`, which decides nothing.
     `out` is created, or resumed when it holds the same study, else refused (BadInput). Its lock is held meanwhile.
     The outcome is INCOMPLETE when a cell or an experiment failed, else PASS: a claim that is not reproduced is a
     result.

@@ -46,7 +46,7 @@ class PaperStudy:
     failures: Mapping[str, str] = field(default_factory=dict)
     """"run: cell", or the name of a run that was refused as a whole -> traceback or message of its failure."""
     quick: bool = False
-    """Whether this is the quick form (see `quick_form`)."""
+    """Whether this is the quick form (see `shorten_scenario`)."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
