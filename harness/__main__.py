@@ -51,7 +51,7 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
-    from harness.core.python_process import leave_working_folder_out
+    from harness.core.working_folder import leave_working_folder_out
 
     leave_working_folder_out(working_folder)
     sys.exit(main())

@@ -39,10 +39,9 @@ from harness.commands.trust import add_trust
 from harness.commands.validate import add_validate
 from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
-from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
-from harness.core.python_process import THREAD_VARIABLES, safe_import_path
-from harness.core.working_folder import serve_folder
+from harness.core.ranges import check_command_line, check_words
+from harness.core.working_folder import THREAD_VARIABLES, safe_import_path, serve_folder
 from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {

@@ -20,7 +20,7 @@ from harness.measure.unit_file import read_unit_file
 from harness.results.findings import read_findings
 from harness.results.placement_findings import read_placement
 from harness.results.reader import load_results
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.study.papers.paper_study import open_study

@@ -25,12 +25,11 @@ from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.library import LibraryFolders
-from harness.mocap.skeletons import read_skeletons
-from harness.mocap.sources import POPULATION_SIZE
+from harness.mocap.sources import POPULATION_SIZE, read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.simulate import noise as noises
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.held_poses import hold_poses, hold_times_s
-from harness.simulate.mounting import perturb_mounts
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 

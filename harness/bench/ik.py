@@ -26,8 +26,8 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
-from harness.core.plain_import import plain_import
 from harness.core.seeds import generator
+from harness.core.working_folder import plain_import
 from harness.experiment.round_robin_timing import MethodTimings, TimedStep, take_turns
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import Ik

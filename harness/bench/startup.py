@@ -16,7 +16,7 @@ from threading import Thread
 import numpy as np
 
 from harness.bench.cpu_time import hold_cpu_to_limit, process_times
-from harness.core.python_process import python_command, python_environment
+from harness.core.working_folder import python_command, python_environment
 from harness.errors import HarnessError
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 

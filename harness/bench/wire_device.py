@@ -37,7 +37,7 @@ def main(file: str, seed: str, stations: str, rate_hz: str, kind: str, pace: str
         written_s=[sent.written_s for sent in same_length],
         unread=[sent.unread for sent in same_length],
         data=np.frombuffer(b"".join(sent.data for sent in same_length), np.uint8),
-        dropped=device.server.emulator.line.dropped,
+        dropped=device.emulator.line.dropped,
     )
 
 

@@ -96,7 +96,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
 def _draw_sheet(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.poses import POSES
     from harness.core.humanoid24 import standard_skeleton
-    from harness.live.pose_sheet import draw_poses
+    from harness.live.viewer import draw_poses
 
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
@@ -125,7 +125,7 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
 
 def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import EXPECTED, write_calibration
-    from harness.core.output_file import require_writable
+    from harness.core.files import require_writable
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write, such as --out me.toml.")

@@ -68,10 +68,10 @@ def add_emulate(verbs: Verbs) -> None:
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
     from harness.experiment.playback import prepare_playback
+    from harness.stream.codec.capacity import check_emulated_capacity, check_range
     from harness.stream.codec.items import missing_items
-    from harness.stream.emulator.capacity import check_capacity, check_range
     from harness.stream.emulator.server import open_port, play_samples
-    from harness.stream.emulator.udp_port import LOOPBACK, parse_udp_address
+    from harness.stream.emulator.udp_broadcast import LOOPBACK, parse_udp_address
 
     if args.pty and args.anywhere and not args.udp:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
@@ -94,7 +94,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     items = args.items or tracker.items
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or tracker.overload):
-        check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
+        check_emulated_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     with ExitStack() as opened:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)

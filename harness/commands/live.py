@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from harness.experiment.playback import Playback
     from harness.live.pose import Output
     from harness.stream.driver import Tracker
-    from harness.stream.event_counter import EventCounter
-    from harness.stream.recording.recording_switch import RecordingSwitch
+    from harness.stream.line_events import EventCounter
+    from harness.stream.recording.recorder import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -101,8 +101,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
-    from harness.stream.event_counter import EventCounter
-    from harness.stream.recording.recording_switch import RecordingSwitch
+    from harness.stream.line_events import EventCounter
+    from harness.stream.recording.recorder import RecordingSwitch
 
     options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
@@ -194,9 +194,8 @@ def _open_outputs(
     args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch", opened: ExitStack
 ) -> "list[Output]":
     """Open the requested outputs; `opened` closes them again, also when a later one is refused."""
-    from harness.live.bvh import BvhOutput
+    from harness.live.file_outputs import BvhOutput, PoseTableOutput
     from harness.live.lsl import LslOutput
-    from harness.live.pose_table import PoseTableOutput
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
 

@@ -75,7 +75,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import sentence
+    from harness.report.placement.wording import placement_sentence
     from harness.results.folder_kind import FINDINGS
     from harness.study.placement import placement_study
 
@@ -101,7 +101,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_placement_page(out)
-    answer = sentence(findings)
+    answer = placement_sentence(findings)
     content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()

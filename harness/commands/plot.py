@@ -34,7 +34,7 @@ def add_plot(verbs: Verbs) -> None:
 
 def run_plot(args: argparse.Namespace) -> Outcome:
     from harness.core.options import split_outside_brackets
-    from harness.report.figures.selection import FigureSelection
+    from harness.report.figures.print_figure import FigureSelection
     from harness.report.figures.writer import write_figure
 
     selection = FigureSelection(

@@ -97,8 +97,8 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.experiment.playback import prepare_playback
-    from harness.mocap.synthetic.rig import stretch_marks
-    from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
+    from harness.mocap.synthetic.takes import stretch_marks
+    from harness.stream.emulator.faults import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
@@ -188,8 +188,7 @@ def _record_served(args: argparse.Namespace) -> Outcome:
 
 def _record_commands(args: argparse.Namespace) -> Outcome:
     from harness.stream.driver import DriverConfig
-    from harness.stream.recording.command_recording import check_commands, record_commands
-    from harness.stream.recording.exchange_text import format_exchanges
+    from harness.stream.recording.command_recording import check_commands, format_exchanges, record_commands
     from harness.stream.recording.recording import RecordingWriter
 
     for name in ("stations", *LINE_FLAGS):
@@ -206,8 +205,7 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
         exchanges = record_commands(
             args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
         )
-    content = [exchange.as_dict() for exchange in exchanges]
-    return _print_recording(args, writer, more={"exchanges": content}, lines=format_exchanges(content))
+    return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
 
 
 def _print_recording(

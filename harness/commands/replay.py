@@ -65,16 +65,15 @@ def run_replay(args: argparse.Namespace) -> Outcome:
 
 def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
     """Print the commands of a recording that has no frames."""
-    from harness.stream.recording.exchange_text import format_exchanges
+    from harness.stream.recording.command_recording import format_exchanges
 
     content = {"frames": 0, "lost": recording.damage, "answers": recording.answers}
     return print_result(args, content, *format_exchanges(recording.answers))
 
 
 def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness.stream.recording.exchange_text import format_exchanges
-    from harness.stream.recording.frame_table import FRAME_COLUMNS, format_csv_row, frame_rows
-    from harness.stream.recording.summary import StreamSummary
+    from harness.stream.recording.command_recording import format_exchanges
+    from harness.stream.station_counts import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:

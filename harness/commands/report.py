@@ -31,7 +31,7 @@ def run_report(args: argparse.Namespace) -> Outcome:
         require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
-    from harness.report.run.writer import write_run_page
+    from harness.report.run.page import write_run_page
 
     with show_steps("parts of the report"):
         page = write_run_page(args.run)
@@ -62,8 +62,7 @@ def _report_placement(args: argparse.Namespace) -> Outcome:
 
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
-    from harness.report.paper.page import write_paper_page
-    from harness.report.paper.readme import update_readme
+    from harness.report.paper.page import update_readme, write_paper_page
     from harness.results.findings import read_findings
     from harness.results.folder_kind import FINDINGS
 

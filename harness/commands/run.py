@@ -67,7 +67,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         )
     page = None
     if args.report:
-        from harness.report.run.writer import write_run_page
+        from harness.report.run.page import write_run_page
 
         print("writing the report", file=sys.stderr)
         with show_steps("parts of the report"):

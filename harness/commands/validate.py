@@ -31,8 +31,8 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
+    from harness.core.files import require_writable
     from harness.core.options import split_outside_brackets
-    from harness.core.output_file import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text

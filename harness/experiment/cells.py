@@ -20,8 +20,8 @@ import numpy as np
 from harness.body.mounts import locate_mount
 from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart
+from harness.core.stream_health import BAUD, RECORD_BYTES, excess_loss
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.evaluation import evaluate

@@ -19,8 +19,7 @@ from typing import Any
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
-from harness.core.split import ClipPart
-from harness.core.training_data import declared_training_data
+from harness.core.split import ClipPart, declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cell_watcher import ProgressCount, graceful_stop
 from harness.experiment.cells import (

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from harness.core.python_process import THREAD_VARIABLES
+from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import HarnessError
 from harness.reconstruct.source_files import (
     CACHE_FOLDER,

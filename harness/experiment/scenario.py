@@ -13,10 +13,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import MAX_TOML_BYTES, read_toml
 from harness.core.input_file import check_input_file, names_input_file
-from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields, check_words
 from harness.core.split import ClipPart, StatisticalUnit
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.fitted_unit import merge_fitted_unit

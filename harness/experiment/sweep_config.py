@@ -6,10 +6,9 @@ from typing import Annotated, Any
 
 from harness.core.fields import build
 from harness.core.files import read_toml
-from harness.core.names import FileName, MethodName, Name, Text
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range
+from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.scenario import (
     SCHEMA,

@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.time_grid import count_steps
+from harness.core.motion import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.errors import BadInput
 
 FEWEST_VALUES = 10

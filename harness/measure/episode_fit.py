@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
 from harness.measure.episode_distributions import episode_share, fit_length, fit_uniform
 from harness.measure.excursions import (

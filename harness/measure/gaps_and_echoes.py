@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.runs import find_runs
+from harness.core.arrays import Bools, Floats, Ints, find_runs, freeze
 from harness.measure.static_series import StaticSeries
 
 GRAVITY_M_S2 = 9.81

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.errors import BadInput
 from harness.measure.gauss_markov import AXIS_GROUPS, CORRELATION, NOISE_KEYS, NoiseSample
 from harness.measure.static_series import StaticSeries

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.arrays import Bools, Floats, Ints, find_runs, freeze
 from harness.core.compiled import compiled
-from harness.core.runs import find_runs
 from harness.errors import BadInput
 
 _LEAST_SHARE = 0.75

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
+from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
 from harness.measure.angular_speed import TimeOffset, coarse_offset, record_period_s
 from harness.measure.conventions import (

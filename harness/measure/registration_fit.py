@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
-from harness.core.runs import find_runs
+from harness.core.arrays import Bools, Floats, find_runs
 from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration_model import OWN, SHARED, RegistrationState, linearise

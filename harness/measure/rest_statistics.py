@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
+from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.static_series import StaticSeries

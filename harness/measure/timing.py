@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 

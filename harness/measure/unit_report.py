@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.departures import Departure
 from harness.measure.episode_distributions import events_for_precision, recording_minutes

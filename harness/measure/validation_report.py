@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
 from harness.measure.departures import Departure
 from harness.measure.registration import Registration

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from harness.core.line_loss import excess_loss
-from harness.core.names import check_words
+from harness.core.ranges import check_words
+from harness.core.stream_health import excess_loss
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder, read_content, row_of_content
 from harness.results.digests import check_file, check_key, read_result_json
@@ -51,8 +51,8 @@ class CellResult:
     metrics: Mapping[str, float | None]
     """By name; None is "not measured"."""
     line_loss: float = 0.0
-    """Share of the records that the line dropped beyond what the scenario allows (see `core.line_loss.excess_loss`);
-    0 in a baseline."""
+    """Share of the records that the line dropped beyond what the scenario allows, 0 in a baseline (see
+    `core.stream_health.excess_loss`)."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import TEMPORARY, content_key, digest
-from harness.core.line_loss import BAUD, describe_line_loss
-from harness.core.names import check_words
+from harness.core.ranges import check_words
+from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.results.content_types import check_summary_types
@@ -151,7 +151,7 @@ def write_summary(
     """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
     summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason), line_loss
-    (see `core.line_loss`; absent where every line let its cell be measured) and groups (see
+    (see `core.stream_health`; absent where every line let its cell be measured) and groups (see
     `table.compute_group_statistics`). The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell
     was measured. With `orders`, as a run has them, it also has statistics over frames, for
     which every cell is read: methods (with their declared `training_data`) and behaviours (see

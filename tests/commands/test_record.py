@@ -18,14 +18,14 @@ import pytest
 from harness.cli import main
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenario import find_scenario
-from harness.stream.codec.blocks import CONFIGURED, FILE_HEADER, RECEIVED
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.driver.transport import open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator
-from harness.stream.recording.frame_table import FRAME_COLUMNS
+from harness.stream.recording.blocks import CONFIGURED, FILE_HEADER, RECEIVED
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader
+from harness.stream.station_counts import FRAME_COLUMNS
 from harness.study.trust.plan import plan_digest
 from tests.interrupts import heeding_interrupts
 from tests.stream.recording.test_recording import newer_file

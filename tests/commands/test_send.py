@@ -9,24 +9,24 @@ import pytest
 
 from harness.cli import main
 from harness.stream.emulator import EmulatorConfig, serve_emulator
-from harness.stream.emulator.server import RunningEmulator
+from harness.stream.emulator.server import EmulatorServer
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from tests.stream.emulator.played import make_samples
 
 
 @pytest.fixture
-def device() -> Iterator[RunningEmulator]:
+def device() -> Iterator[EmulatorServer]:
     with serve_emulator(make_samples(), EmulatorConfig(paced=False), tcp="127.0.0.1:0") as running:
         yield running
 
 
-def send(device: RunningEmulator, path: Path, *texts: str, more: tuple[str, ...] = ()) -> int:
+def send(device: EmulatorServer, path: Path, *texts: str, more: tuple[str, ...] = ()) -> int:
     return main(["record", device.name, str(path), *(word for text in texts for word in ("--send", text)), *more])
 
 
 def test_answers_are_printed_decoded_and_recorded(
-    device: RunningEmulator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    device: EmulatorServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "answers.rec"
     assert send(device, path, "S", "O1", "x0.2,0.2,0.8,0.8", "O1,2,2", more=("--json",)) == 0
@@ -47,7 +47,7 @@ def test_answers_are_printed_decoded_and_recorded(
     assert "O1: 21O 2 4 1\\r\\n\n    OutputList: station 1, items 2 4 1\n" in capsys.readouterr().out
 
 
-def test_default_ascii_records_are_recorded_and_replayed(device: RunningEmulator, tmp_path: Path) -> None:
+def test_default_ascii_records_are_recorded_and_replayed(device: EmulatorServer, tmp_path: Path) -> None:
     """List 2,4,1 in inches, which no set-up of the driver asks for; station 1 moves on y = -0.5 m, z = 1.5 m."""
     path = tmp_path / "ascii.rec"
     assert send(device, path, "F", "C", more=("--seconds", "1")) == 0
@@ -60,7 +60,7 @@ def test_default_ascii_records_are_recorded_and_replayed(device: RunningEmulator
 
 
 def test_polled_records_are_decoded_in_si_units(
-    device: RunningEmulator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    device: EmulatorServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert send(device, tmp_path / "a.rec", "O1,2,22,23,1", "P", more=("--json",)) == 0
     *_, poll = json.loads(capsys.readouterr().out)["exchanges"]
@@ -74,7 +74,7 @@ def test_polled_records_are_decoded_in_si_units(
 
 
 def test_replies_between_records_of_a_stream_are_decoded(
-    device: RunningEmulator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    device: EmulatorServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "a.rec"
     assert send(device, path, "C", "MG", "c", "S") == 0
@@ -97,7 +97,7 @@ def test_commands_that_last_are_refused_before_the_port_is_opened(
     assert said.count("\n") == 1
 
 
-def test_they_are_sent_when_they_are_allowed(device: RunningEmulator, tmp_path: Path) -> None:
+def test_they_are_sent_when_they_are_allowed(device: EmulatorServer, tmp_path: Path) -> None:
     assert send(device, tmp_path / "a.rec", "ML0", "^K", "ML1", "^Y", more=("--allow-writes",)) == 0
     assert not device.emulator.device.settings.lights  # the saved settings returned with the restart
 
@@ -124,7 +124,7 @@ def test_flags_that_do_not_fit_are_refused(
     assert not (tmp_path / "a.rec").exists()
 
 
-def test_boresight_and_alignment_reach_the_device(device: RunningEmulator, tmp_path: Path) -> None:
+def test_boresight_and_alignment_reach_the_device(device: EmulatorServer, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     frame = "1,0,0,1,1,0,0,0,0"  # the origin 1 m along X; X along the old Y, Y against the old X
     flags = ["--boresight", "--alignment", frame, "--seconds", "0.5"]

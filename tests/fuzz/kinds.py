@@ -34,22 +34,21 @@ from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
+from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
+from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.report.sweep.reader import read_sweep
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
 from harness.results.loaded_run import load_run
 from harness.results.placement_findings import read_placement
 from harness.results.storage import read_summary
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
-from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.summary import StreamSummary
+from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
 from harness.study.placement.config import base_scenario, load_placement_study
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING

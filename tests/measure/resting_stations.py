@@ -6,8 +6,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.measure.static_series import StaticSeries, find_rest, static_series
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import DriftNoise, WhiteNoise
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.readings import SimulatedReadings
 from harness.stream.recording.station_readings import StationReadings

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.departures import compare_with_expected
 
 

@@ -15,8 +15,7 @@ from harness.measure.gaps_and_echoes import (
     leaked_tilt_rad,
 )
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.echo import Echo
+from harness.simulate.components.transient import Dropout, Echo
 from harness.simulate.noise import Noise
 from tests.measure.resting_stations import (
     QUIET,

@@ -11,8 +11,8 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
-from harness.core.interval import Interval
 from harness.core.motion import BodyMotion
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.pose_series import MeasuredPoses, TruthPoses

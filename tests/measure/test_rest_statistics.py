@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.rest_statistics import drift_speed, mean_drift

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.measure.unit_file import UnitFile, read_unit_file, write_unit_file
 from tests.core.digested_toml import as_earlier_version, declare_edited

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.profile import QualityClass, StretchLength

@@ -14,7 +14,7 @@ from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
 from harness.report.physics.page import write_physics_page
 from harness.report.placement import page as placement_page
-from harness.report.run.writer import write_run_page
+from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from tests.report.fabricate import Plan, fabricate
 from tests.report.fabricate_comparison import comparison

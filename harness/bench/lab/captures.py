@@ -20,16 +20,14 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig, stretch_marks
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.session_bias import SessionBias
+from harness.mocap.synthetic.takes import generate_rig, stretch_marks
+from harness.simulate.components.stationary import SessionBias
+from harness.simulate.components.transient import Dropout
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
-from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.faulty_capture import add_byte_faults
+from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.emulator.faults import Fault, add_byte_faults
 from harness.stream.recording.recording import record_capture
 
 SCENARIO = "lab"

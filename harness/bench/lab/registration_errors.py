@@ -9,8 +9,7 @@ from harness.bench.lab.captures import planted_scenario, station_offset_m
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.speed_error import SpeedError
+from harness.simulate.components.stationary import Clock, SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER
 from harness.study.trust.validation import Validation
 

@@ -13,12 +13,11 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.experiment.clip_evaluation import mounts_of, noise_of
 from harness.experiment.playback import prepare_playback
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.mocap.synthetic.rig import generate_rig
+from harness.mocap.synthetic.takes import generate_rig
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ByteCapture, WireFormat
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.study.trust.trust_study import run_trust_study
 

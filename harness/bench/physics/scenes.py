@@ -15,15 +15,15 @@ from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import load_constellation
-from harness.simulate.physics.filter_readings import FilterReadings
+from harness.simulate.physics.filter_state import RangingModel, range_variance
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
 from harness.simulate.physics.ranging import Ranges
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.room import Box, PlacedRoom
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
+from harness.simulate.readings import FilterReadings
 from harness.simulate.simulation import (
     WORLD_FROM_TRACKER,
     TrackerConfig,

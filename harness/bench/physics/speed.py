@@ -23,7 +23,7 @@ from harness.core.child_process import run_python
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
-from harness.simulate.components.clock import Clock
+from harness.simulate.components.stationary import Clock
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics import physical_tracker
 from harness.simulate.physics.settings import Physics

@@ -26,7 +26,7 @@ from harness.bench.physics.scenes import (
 )
 from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict

@@ -1,13 +1,10 @@
 """The page of a placement study: recommended set, body map, error by number of stations, then every ranking."""
 
-import json
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.core.files import to_json_types
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.page import (
     Block,
@@ -21,6 +18,7 @@ from harness.report.kit.page import (
     Section,
     Stack,
     TerminalOnly,
+    json_listing,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
@@ -44,11 +42,11 @@ from harness.report.placement.wording import (
     held_out_error,
     list_sets,
     original_candidates,
+    placement_sentence,
     plain_name,
     power_sentences,
     ranks_by_condition,
     search_gain_sentence,
-    sentence,
     set_error,
     set_name,
 )
@@ -75,7 +73,7 @@ def write_placement_page(folder: Path) -> Path:
     findings = read_placement(folder / FINDINGS)
     plots = clear_plots(folder)
     maps = [
-        draw_body_map(findings.candidates, shown, unit=findings.unit, number=number)
+        draw_body_map(findings.candidates, *shown, unit=findings.unit, number=number)
         for number, shown in enumerate(select_body_maps(findings.contributions), start=1)
     ]
     missing = dict.fromkeys(f"The body map: {reason}" for chart, reason in maps if chart is None)
@@ -100,7 +98,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     return Page(
         verb="placement",
         name=findings.name,
-        headline=sentence(findings),
+        headline=placement_sentence(findings),
         lead=[_best_table(findings)],
         facts={
             "Question": findings.title,
@@ -116,7 +114,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
         },
         missing=missing,
         sections=[
-            Section("Body map", "body", [Drawing(partial(_drawn, chart)) for chart in maps]),
+            Section("Body map", "body", [Drawing(chart) for chart in maps]),
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
             Section("Published statements", "claims", [claims_table(findings.claims)]),
             Section("Rankings", "rankings", _rankings(findings)),
@@ -133,10 +131,6 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
             Section("Circumstances", "circumstances", _circumstances(findings), terminal=False),
         ],
     )
-
-
-def _drawn(chart: Chart) -> Chart:
-    return chart
 
 
 def _best_table(findings: PlacementFindings) -> DataTable:
@@ -335,8 +329,6 @@ def _failures(findings: PlacementFindings) -> list[Block]:
 
 
 def _circumstances(findings: PlacementFindings) -> list[Block]:
-    text = json.dumps(to_json_types(findings.circumstances), indent=2, ensure_ascii=False)
-    return [
-        Code(findings.command),
-        *([Code(text, "All versions and circumstances")] if findings.circumstances else []),
-    ]
+    versions = findings.circumstances
+    more = [json_listing(versions, "All versions and circumstances")] if versions else []
+    return [Code(findings.command), *more]

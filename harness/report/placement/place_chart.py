@@ -5,19 +5,15 @@ docs/studies.md shows it. It needs matplotlib, pyvista and OpenGL.
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from harness.body.places import NAMED_PLACES
 from harness.core.files import write_bytes
 from harness.errors import SystemFault
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.style import FAINT, Chart
+from harness.report.kit.style import FAINT, Chart, Figure
 from harness.report.placement.body_map import label_places, render_body
 from harness.report.placement.wording import plain_name
 from harness.results.placement_findings import CandidatePlace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _HEIGHT_IN = 4.6
 
@@ -30,7 +26,7 @@ def draw_place_chart() -> Chart:
         raise SystemFault(f"The body cannot be drawn ({reason}).", "Install the extra viz, and OpenGL of the system.")
     at, pictures = views["at"], views["picture"]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         for side, title in enumerate(("from the front", "from behind")):
             axes = figure.add_subplot(1, 2, side + 1)
             axes.imshow(pictures[side], interpolation="none")

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.units import count_clips, count_units
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
@@ -67,7 +66,7 @@ def _plural(name: str) -> str:
     return " ".join([*before, _IRREGULAR.get(last, f"{last}s")])
 
 
-def sentence(findings: PlacementFindings) -> str:
+def placement_sentence(findings: PlacementFindings) -> str:
     """The answer: the best set of each size that was asked about.
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
@@ -98,7 +97,8 @@ def _size_sentence(findings: PlacementFindings, size: int) -> str:
     if best is None:
         return f"No set of {count_noun(size, 'station')} was measured."
     behaviours = " and ".join(map(plain_name, findings.behaviours))
-    stations = f"{_number_word(size)} stations" if size > 1 else "station"
+    number = _NUMBERS[size] if size < len(_NUMBERS) else str(size)
+    stations = f"{number} stations" if size > 1 else "station"
     return (
         f"Best {stations} for {behaviours}: {set_name(best.stations)}, {_size_error(findings, best)}; "
         f"{_size_ties(findings, best)}."
@@ -125,10 +125,6 @@ def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
         return f"tied with the only other {noun} that was tried: {list_sets(best.ties)}"
     others = f"{best.of - 1:,} other {noun}s that were tried"
     return f"tied with {len(best.ties):,} of the {others}: {list_sets(best.ties)}"
-
-
-def _number_word(number: int) -> str:
-    return _NUMBERS[number] if number < len(_NUMBERS) else str(number)
 
 
 def power_sentences(power: StatisticalPower) -> list[str]:

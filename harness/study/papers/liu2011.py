@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from harness.compare.claims import claim_lower_error, claim_published_value
-from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.results.benchmark_statement import Reading, StatementKind
 from harness.results.findings import FindingsTable, LineChart, PaperExperiment

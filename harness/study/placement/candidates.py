@@ -24,8 +24,7 @@ from typing import Annotated, Literal
 
 from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.names import Name
-from harness.core.ranges import Range
+from harness.core.ranges import Name, Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
 from harness.results.placement_findings import CandidatePlace

@@ -14,7 +14,7 @@ from typing import Literal
 
 from harness.body.places import select_places
 from harness.compare.significance import count_needed
-from harness.core.names import Name
+from harness.core.ranges import Name
 from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders

@@ -15,9 +15,9 @@ import numpy as np
 
 from harness.compare.units import Sampling
 from harness.core.files import content_key, to_json_types
-from harness.core.line_loss import BAUD, describe_line_loss
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
+from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
 from harness.experiment.cells import cell_names, open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
@@ -78,7 +78,7 @@ class SetResults:
 
     @property
     def line_loss(self) -> str:
-        """A sentence on cells whose line let nothing be measured; "" if there are none (see `core.line_loss`)."""
+        """A sentence on cells whose line let nothing be measured; "" if there are none (see `core.stream_health`)."""
         return describe_line_loss(row for row in self._rows.values() if BAUD in row["health"])
 
     def run_missing(self, requests: Iterable[SetRequest]) -> None:

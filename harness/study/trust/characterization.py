@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.compare.significance import holm
 from harness.core.fields import replace_fields
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure.departures import Departure, compare_with_expected

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints
-from harness.core.runs import find_runs
+from harness.core.arrays import Bools, Floats, Ints, find_runs
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.experiment.observed_take import ObservedTake

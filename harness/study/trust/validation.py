@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each

@@ -5,7 +5,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import LOST_AFTER_S, Origin, Status, session_lag
-from harness.core.training_data import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
+from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
 from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals

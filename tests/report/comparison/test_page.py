@@ -11,19 +11,18 @@ from matplotlib.figure import Figure
 from harness.compare.comparison import Comparison, Difference
 from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
-from harness.report.comparison.interval_chart import _draw as draw_intervals
-from harness.report.comparison.interval_chart import interval_charts
+from harness.report.comparison.charts import BETTER_COLOUR, WORSE_COLOUR, interval_charts, slope_chart
+from harness.report.comparison.charts import _draw_intervals as draw_intervals
+from harness.report.comparison.charts import _draw_line as draw_slopes
 from harness.report.comparison.page import comparison_page, comparison_text, write_comparison_page
-from harness.report.comparison.slope_chart import BETTER_COLOUR, WORSE_COLOUR, slope_chart
-from harness.report.comparison.slope_chart import _draw as draw_slopes
 from harness.report.comparison.wording import (
     MARKS,
     MEANINGS,
     OUTCOME_TITLES,
+    comparison_sentence,
     count_directions,
     count_verdicts,
     line_interval,
-    sentence,
 )
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html
@@ -67,9 +66,9 @@ def test_the_first_line_is_the_verdict() -> None:
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
-    assert said in sentence(shown)
+    assert said in comparison_sentence(shown)
     found = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-    assert f"{OUTCOME_TITLES[shown.outcome]} {sentence(shown)}" in found
+    assert f"{OUTCOME_TITLES[shown.outcome]} {comparison_sentence(shown)}" in found
     assert "nan" not in found.lower().split()
 
 

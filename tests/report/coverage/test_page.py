@@ -11,10 +11,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from harness.report.coverage import charts
-from harness.report.coverage.charts import dilution_chart, heard_chart, station_chart
+from harness.report.coverage import page as coverage
 from harness.report.coverage.content import CoverageContent
-from harness.report.coverage.page import coverage_page, heading, place_table, station_table
+from harness.report.coverage.page import (
+    coverage_page,
+    coverage_sentence,
+    dilution_chart,
+    heard_chart,
+    place_table,
+    station_chart,
+    station_table,
+)
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html, write_page
 from harness.report.kit.style import Chart
@@ -28,11 +35,11 @@ def written(folder: Path, content: CoverageContent) -> Path:
 
 
 def test_the_heading_names_the_coverage_and_the_station_that_hears_least() -> None:
-    assert heading(fabricate_coverage()) == (
+    assert coverage_sentence(fabricate_coverage()) == (
         "9 emitters: three or more are heard in 90 % of the cube below them, at a median DOP of 1.25; "
         "<b>torso</b> hears three for 25 % of golf_p1_01"
     )
-    assert heading(fabricate_coverage(stations=False)).endswith("at a median DOP of 1.25")
+    assert coverage_sentence(fabricate_coverage(stations=False)).endswith("at a median DOP of 1.25")
 
 
 def test_tables_have_the_numbers() -> None:
@@ -76,7 +83,7 @@ def figure_of(monkeypatch: pytest.MonkeyPatch, chart: Callable[[CoverageContent]
 
         return draw_chart(name, title, caption, alt, keep, height_in)
 
-    monkeypatch.setattr(charts, "draw_chart", draw_and_keep)
+    monkeypatch.setattr(coverage, "draw_chart", draw_and_keep)
     chart(fabricate_coverage())
     return kept[0]
 

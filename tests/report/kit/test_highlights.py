@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.report.kit.highlights import Highlights, choose_highlights
+from harness.report.kit.error_lines import Highlights, choose_highlights
 from harness.report.kit.style import COLOURS, MUTED, STYLES
 
 

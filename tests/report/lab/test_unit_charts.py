@@ -35,7 +35,7 @@ def figures_of(report: UnitReport) -> dict[str, Figure]:
 def charts(report: UnitReport) -> dict[str, Chart]:
     """Name of the chart -> the chart, of all that the page draws."""
     blocks = [block for section in unit_page(report, "").sections for block in section.blocks]
-    drawn = [block.draw() for block in blocks if isinstance(block, Drawing)]
+    drawn = [block.chart() for block in blocks if isinstance(block, Drawing) and callable(block.chart)]
     return {chart.name: chart for chart in drawn if chart}
 
 

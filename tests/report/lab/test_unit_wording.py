@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.unit_report import ParameterRow, RecordingAdvice, UnitReport
 from harness.report.lab.departures import condense_departures, departure_texts, departures_sentence

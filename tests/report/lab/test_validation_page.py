@@ -7,14 +7,20 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import ShapeError
 from harness.measure.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.kit.style import to_svg
-from harness.report.lab.validation_charts import largest_of_stretches, offsets_chart, residuals_chart
-from harness.report.lab.validation_page import registration_sentences, validation_answer, validation_page
+from harness.report.lab.validation_page import (
+    largest_of_stretches,
+    offsets_chart,
+    registration_sentences,
+    residuals_chart,
+    validation_answer,
+    validation_page,
+)
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_lab import STATIONS
 from tests.report.fabricate_validation import (

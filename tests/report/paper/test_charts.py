@@ -12,12 +12,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
+from harness.core.number_format import Interval
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS
-from harness.report.paper.bar_chart import draw_bars, height_in, is_horizontal
-from harness.report.paper.charts import figure_charts
-from harness.report.paper.figure_table import figure_table
-from harness.report.paper.line_chart import draw_lines
+from harness.report.paper.charts import figure_charts, figure_table
+from harness.report.paper.figures import draw_bars, draw_lines, height_in, is_horizontal
 from harness.results.findings import BarChart, LineChart, PaperExperiment
 from tests.report.fabricate_paper import METHODS, curves, liu, sets
 
@@ -138,4 +137,4 @@ def test_the_table_of_a_figure_has_every_number() -> None:
     assert len(rows) == 31
     for row, group, value in zip(rows, shown.groups, shown.series["kernel_cca"], strict=True):
         assert value is not None
-        assert row == (group, f"{value:.2f} ({0.9 * value:.2f} to {1.15 * value:.2f})")
+        assert row == (group, str(Interval.of(value, 0.9 * value, 1.15 * value)))

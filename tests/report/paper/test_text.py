@@ -9,11 +9,10 @@ import pytest
 
 import harness
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import WIDTH
-from harness.report.paper.page import claims_table, paper_text, statements_table, statements_text
-from harness.report.paper.readme import update_readme
+from harness.report.paper.page import claims_table, paper_text, statements_table, statements_text, update_readme
 from harness.results.benchmark_statement import BenchmarkStatement, Verdict
 from harness.results.findings import PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study

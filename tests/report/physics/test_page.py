@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, ShapeError
-from harness.report.physics.page import write_physics_page
-from harness.report.physics.truth_table import result_sentence
+from harness.report.physics.page import result_sentence, write_physics_page
 from tests.report.fabricate_physics import ROWS, made_up, statistics, without_episodes
 from tests.report.reading import read, text_of
 

@@ -12,10 +12,10 @@ from harness.cli import main
 from harness.report.kit.render_process import start_renderer
 from harness.report.placement import body_map as body
 from harness.report.placement import page as placement_page
-from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
+from harness.report.placement.body_map import draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
-from harness.report.placement.wording import sentence, set_name, smallest_sufficient_set
+from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
 from harness.results.placement_findings import BestSet, PlacementFindings, StationNames, StationSetResult
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 from tests.report.reading import text_of
@@ -68,9 +68,9 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
     chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
-    assert sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
+    assert placement_sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
     apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
-    assert sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
+    assert placement_sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
     fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
     chosen = smallest_sufficient_set(fps)
     assert chosen is not None
@@ -79,12 +79,12 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
 
 def test_too_few_clips_are_said_to_be_too_few() -> None:
     few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in sentence(few)
+    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in placement_sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended() -> None:
     nothing = study_of({("pelvis",): [None] * 8})
-    assert sentence(nothing) == "No set of stations was measured."
+    assert placement_sentence(nothing) == "No set of stations was measured."
     assert "not measured" in placement_text(nothing)
     assert pareto_chart(nothing) is None
 
@@ -164,11 +164,10 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
     among, more = select_body_maps(findings.contributions)
-    assert len(among.values) == len(PLACES)
-    assert among.description == "error without it minus error with all 11 stations"
-    assert among.base == ()
-    assert more.base == ("pelvis", "left_ankle", "right_ankle")
-    assert set(more.values) == {place.name for place in PLACES} - set(more.base)
+    assert len(among[0]) == len(PLACES)
+    assert among[1:] == ("error without it minus error with all 11 stations", ())
+    assert more[2] == ("pelvis", "left_ankle", "right_ankle")
+    assert set(more[0]) == {place.name for place in PLACES} - set(more[2])
     assert select_body_maps(()) == []
 
 
@@ -194,7 +193,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
     }
     monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", ("right_ankle",)), unit="deg")
+    chart, missing = draw_body_map(PLACES, values, "worth", ("right_ankle",), unit="deg")
     assert chart is not None
     assert missing == ""
     assert "right ankle (worn)" in chart.svg
@@ -210,18 +209,18 @@ def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
     )
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_body_map(PLACES, BodyMapValues({"head": None}, "worth"), unit="deg") == (
+    assert draw_body_map(PLACES, {"head": None}, "worth", unit="deg") == (
         None,
         "no candidate has a value",
     )
     monkeypatch.setattr(body, "find_spec", lambda name: None)
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -232,13 +231,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, values: object, description: str, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
     values = {"head": 0.0, "left_ankle": 0.5}
     worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert draw_body_map(PLACES, BodyMapValues(values, "worth", worn), unit="deg")[1] == ""
+    assert draw_body_map(PLACES, values, "worth", worn, unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 

@@ -9,9 +9,9 @@ from harness.report.placement.page import placement_page, placement_text
 from harness.report.placement.wording import (
     changes_sentence,
     format_duration,
+    placement_sentence,
     power_sentences,
     ranks_by_condition,
-    sentence,
 )
 from harness.results.placement_findings import (
     BestSet,
@@ -37,17 +37,17 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     tested = replace(best, held_out=2.0, held_out_low=1.8, held_out_high=2.2, held_out_clips=16)
     tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
-    assert sentence(asked) == (
+    assert placement_sentence(asked) == (
         "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of the "
         "54 other pairs that were tried: head + pelvis; sternum + pelvis. Sets were chosen on 8 clips."
     )
     assert placement_text(asked).startswith("Best two stations for walking: both ankles")
-    assert placement_page(asked).headline == sentence(asked)
+    assert placement_page(asked).headline == placement_sentence(asked)
 
 
 def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindings) -> None:
     asked = replace(findings, sizes=(1, 3, 4), behaviours=("walking", "table_tennis"))
-    said = sentence(asked)
+    said = placement_sentence(asked)
     assert said.startswith("Best station for walking and table tennis: ")
     assert "Best three stations for walking and table tennis: both ankles + pelvis, " in said
     assert said.endswith("No set of 4 stations was measured. Sets were chosen on 8 clips.")
@@ -55,22 +55,22 @@ def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindi
 
 def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
     alone = BestSet(findings.best[0].stations, of=11)
-    said = sentence(replace(findings, sizes=(1,), best=(alone,)))
+    said = placement_sentence(replace(findings, sizes=(1,), best=(alone,)))
     assert "on the clips on which it was chosen; no other place is tied with it." in said
-    assert "no other place was tried" in sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
+    assert "no other place was tried" in placement_sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
 
 
 def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFindings) -> None:
     best = findings.best[0]
     others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
     asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=11),))
-    assert sentence(asked).endswith(
+    assert placement_sentence(asked).endswith(
         " 8 units cannot tell it from the other 10 places (13 might). Sets were chosen on 8 clips."
     )
     enough = replace(asked, power=replace(POWER, least_clips=8))
-    assert "tied with 10 of the 10 other places that were tried: " in sentence(enough)
+    assert "tied with 10 of the 10 other places that were tried: " in placement_sentence(enough)
     two = replace(enough, best=(replace(best, ties=others[:1], of=2),))
-    assert "tied with the only other place that was tried: " in sentence(two)
+    assert "tied with the only other place that was tried: " in placement_sentence(two)
 
 
 def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> None:
@@ -150,6 +150,6 @@ def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
     units = [f"performer {k}" for k in range(1, 7)]
     clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
     for sizes in ((), (2,)):
-        assert sentence(replace(made_up(units), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")
-        earlier = sentence(replace(made_up(clips), sizes=sizes))
+        assert placement_sentence(replace(made_up(units), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")
+        earlier = placement_sentence(replace(made_up(clips), sizes=sizes))
         assert earlier.endswith(" Sets were chosen on 6 clips of 3 performers.")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.report.run.worst_window import WorstWindow, find_worst_window, group_overlapping, select_worst
+from harness.report.run.worst_window import WorstWindow, find_worst_window, group_overlapping
 
 RATE_HZ = 50.0
 
@@ -78,6 +78,4 @@ def test_the_worst_of_several_and_what_belongs_together() -> None:
     b = WorstWindow("one", "mpjre_deg", 25, 125, 4.5, 6.48, 2.0)
     c = WorstWindow("one", "jitter_m_s3", 100, 200, 6.0, 7.98, 5.0)
     d = WorstWindow("two", "mpjre_deg", 0, 100, 4.0, 5.98, 9.0)
-    assert select_worst([a, b]) is a
-    assert select_worst([]) is None
     assert group_overlapping([a, b, c, d]) == [(a, b), (c,), (d,)]

@@ -9,7 +9,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.errors import BadInput
 from harness.mocap import synthetic
-from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import read_skeletons
 from harness.results.findings import BarChart, LineChart
 from harness.study.papers.bone_lengths import (
     MODES,

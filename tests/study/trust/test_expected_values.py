@@ -5,7 +5,7 @@ import pytest
 
 from harness.compare.significance import holm
 from harness.core.fields import replace_fields
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import Noise, noise_preset

@@ -22,7 +22,7 @@ from harness.results.digests import read_result_json, write_result_json
 from harness.results.folder_kind import FINDINGS
 from harness.results.lock import folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
-from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
+from harness.stream.recording.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
 from harness.study.trust.arm_results import Arm, TrustTask, read_cell_errors, run_capture
 from harness.study.trust.characterization import preset_components
