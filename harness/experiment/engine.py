@@ -25,15 +25,18 @@ from harness.experiment.cell_watcher import ProgressCount, graceful_stop
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
+    cell_names,
     check_names,
     clear_caches,
     open_scenario_motion,
+    plan_tasks,
     run_task,
+    scenario_label,
+    split_task,
 )
 from harness.experiment.executors import TaskExecutor, process_executor, run_in_process
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
-from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
 from harness.experiment.remote_method import close_methods, describe_options, hash_method, resolve_method
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep

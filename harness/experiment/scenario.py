@@ -377,11 +377,13 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
 def find_scenario(path: Path | str, beside: Path | None = None) -> Path:
     """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile.
 
-    With a folder `beside`, a file there comes first, with or without `.toml` in its name.
+    With a folder `beside`, a file there comes first, then one in the folder of shipped scenarios, both with or without
+    `.toml` in their names.
     """
-    for file in (beside / path, beside / f"{path}.toml") if beside is not None else ():
-        if names_input_file(file):
-            return file
+    for folder in (beside, data_folder("scenarios")) if beside is not None else ():
+        for file in (folder / path, folder / f"{path}.toml"):
+            if names_input_file(file):
+                return file
     return find_config(
         path, "scenario", Path("scenarios"), shipped_scenarios(), "`harness list` names the shipped ones."
     )

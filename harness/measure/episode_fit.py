@@ -12,7 +12,6 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
-from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
 from harness.measure.episode_distributions import episode_share, fit_length, fit_uniform
 from harness.measure.excursions import (
     DEFAULT_RAMP_S,
@@ -20,7 +19,14 @@ from harness.measure.excursions import (
     ExcursionEvent,
     Innovations,
 )
-from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
+from harness.measure.gaps_and_echoes import (
+    EchoBursts,
+    Gaps,
+    echo_limit_m,
+    find_echoes,
+    find_gaps_at_rest,
+    leaked_tilt_rad,
+)
 from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.static_series import StaticSeries
 

@@ -19,8 +19,7 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
 from harness.measure.gauss_markov import ErrorProcess
-from harness.measure.noise_fit import NoiseFit, fit_noise
-from harness.measure.noise_start import start_values
+from harness.measure.noise_fit import NoiseFit, fit_noise, start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
 from harness.measure.timing import TimingAccumulator, TimingMeasurement

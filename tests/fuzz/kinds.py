@@ -18,7 +18,7 @@ from harness.core.files import content_key, to_json_types, write_text
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
-from harness.experiment.planning import cell_names
+from harness.experiment.cells import cell_names
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import find_playback
 from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario

@@ -9,8 +9,7 @@ import pytest
 from harness.core.arrays import Bools
 from harness.errors import BadInput
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.noise_fit import fit_noise
-from harness.measure.noise_start import start_values
+from harness.measure.noise_fit import fit_noise, start_values
 from harness.measure.static_series import StaticSeries, static_series
 from harness.simulate.components.stationary import DriftNoise, WhiteNoise
 from harness.simulate.components.transient import Echo, Excursion

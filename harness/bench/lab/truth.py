@@ -23,7 +23,7 @@ from harness.bench.lab.validated_captures import registration_rows
 from harness.core.progress import ProgressCallback
 from harness.experiment.executors import TaskExecutor
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.study.trust.expected_values import preset_values
+from harness.study.trust.characterization import preset_values
 
 SEEDS = tuple(range(1, 101))
 """Seeds of the captures. Constants of the estimators were chosen on captures with seeds from 1001 on."""

@@ -91,12 +91,10 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
     )
 
 
-def contribution_chart(
-    findings: PlacementFindings, contributions: Sequence[MarginalContribution], number: int
-) -> Chart:
+def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalContribution], number: int) -> Chart:
     """The contribution of each candidate in one mode, the largest first."""
-    rows = sorted((w for w in contributions if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    title = contribution_label(findings, contributions[0])
+    rows = sorted((w for w in shown if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
+    title = contribution_label(findings, shown[0])
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -114,7 +112,7 @@ def contribution_chart(
     gains = [Interval.of(row.difference, None, None, signed=True).number for row in rows]
     values = ", ".join(f"{plain_name(row.candidate)} {gain}" for row, gain in zip(rows, gains, strict=True))
     return draw_chart(
-        f"worth_{number}_{to_file_name(contributions[0].mode)}",
+        f"worth_{number}_{to_file_name(shown[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
         "Blue: sets with the station err less; orange: they err more; grey: neither is significant. Whiskers: 95 % "
         "interval over units.",

@@ -93,9 +93,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     for contribution in findings.contributions:
         ways.setdefault((contribution.mode, contribution.base), []).append(contribution)
     measured = [rows for rows in ways.values() if any(row.difference is not None for row in rows)]
-    contribution_charts = [
-        Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)
-    ]
+    drawings = [Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
     several = len(findings.conditions) > 1
     return Page(
         verb="placement",
@@ -120,7 +118,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
             Section("Published statements", "claims", [claims_table(findings.claims)]),
             Section("Rankings", "rankings", _rankings(findings)),
-            Section("Contribution of each candidate", "worth", [*contribution_charts, _contribution_table(findings)]),
+            Section("Contribution of each candidate", "worth", [*drawings, _contribution_table(findings)]),
             Section("Searches", "paths", [_search(findings, search) for search in findings.searches]),
             Section(
                 "Stability of the ranking",
@@ -138,7 +136,7 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
 def _best_table(findings: PlacementFindings) -> DataTable:
     """The best set of each size."""
     held_out = any(best.held_out is not None for best in findings.best)
-    cross_validated = not held_out and any(best.cross_validated_error is not None for best in findings.best)
+    validated = not held_out and any(best.cross_validated_error is not None for best in findings.best)
     rows = []
     for best in findings.best:
         tried = findings.of(best.stations)
@@ -148,11 +146,10 @@ def _best_table(findings: PlacementFindings) -> DataTable:
                 Stack(set_name(best.stations), "" if best.on_front else "a smaller set is better"),
                 set_error(findings, tried),
                 *([held_out_error(findings, best)] if held_out else []),
-                *([Interval.of(best.cross_validated_error, None, None, findings.unit)] if cross_validated else []),
+                *([Interval.of(best.cross_validated_error, None, None, findings.unit)] if validated else []),
                 f"{tried.rate_hz:g} Hz" if tried else "",
                 Stack(
-                    best.of or "",
-                    f"stays best in {format_share(best.selection_stability)}" if best.selection_stability else "",
+                    best.of or "", f"stays best in {format_share(share)}" if (share := best.selection_stability) else ""
                 ),
                 list_sets(best.ties) if best.ties else "none",
             ]
@@ -160,11 +157,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
     caption = (
         "The best set of each size and its mean error with the 95 % interval over units of statistics. "
         + ("Held out: the error on clips that did not take part in the choice. " if held_out else "")
-        + (
-            "Cross-validated: of each unit, the error of the set that the other units choose. "
-            if cross_validated
-            else ""
-        )
+        + ("Cross-validated: of each unit, the error of the set that the other units choose. " if validated else "")
         + "Best of: the number of sets of this size, and in how many resamples of the units the set stays best. "
         "Ties: other sets of this size that are as good."
     )
@@ -173,7 +166,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
         "best set",
         "error",
         *(["held out"] if held_out else []),
-        *(["cross-validated"] if cross_validated else []),
+        *(["cross-validated"] if validated else []),
         "rate",
         "best of",
         "ties",

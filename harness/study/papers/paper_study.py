@@ -18,7 +18,7 @@ from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.planning import cell_names
+from harness.experiment.cells import cell_names
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
@@ -46,7 +46,7 @@ class PaperStudy:
     failures: Mapping[str, str] = field(default_factory=dict)
     """"run: cell", or the name of a run that was refused as a whole -> traceback or message of its failure."""
     quick: bool = False
-    """Whether this is the quick form (see `quick_form`)."""
+    """Whether this is the quick form (see `shorten_scenario`)."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.

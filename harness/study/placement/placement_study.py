@@ -34,7 +34,7 @@ from harness.results.placement_findings import (
 )
 from harness.score.metrics import DEFINITIONS
 from harness.study.papers.paper_study import open_study
-from harness.study.placement import published_claims, search
+from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
@@ -43,10 +43,13 @@ from harness.study.placement.question import PlacementQuestion, plan_within_budg
 from harness.study.placement.ranking import (
     ConditionCosts,
     Costs,
+    best_alternative,
     best_by_size,
     complete_sets,
+    evaluate_claim,
     rank_agreements,
     rank_by_condition,
+    sets_of_claim,
     summarise_set,
 )
 from harness.study.placement.refinement import refine_set
@@ -225,8 +228,8 @@ class _PlacementRun:
 
     def _best_alternative(self, claim: PublishedClaim) -> StationSet:
         """The best set of a claim's size, other than the claimed one, on the test clips."""
-        _, others, _ = published_claims.sets_of_claim(claim, self.plan.groups)
-        best = published_claims.best_alternative(
+        _, others, _ = sets_of_claim(claim, self.plan.groups)
+        best = best_alternative(
             [names_of_places(stations) for stations in others],
             {names_of_places(stations): self.costs[stations] for stations in others},
         )
@@ -237,7 +240,7 @@ class _PlacementRun:
         by_name = {names_of_places(stations): stations for stations in self.costs}
         tested = [by_name[names] for names in best] + [stations for stations in others if stations]
         for claim in self.study.claim:
-            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
+            claimed, _, full = sets_of_claim(claim, self.plan.groups)
             tested += [claimed, full]
         return list(dict.fromkeys(tested))
 
@@ -273,8 +276,8 @@ class _PlacementRun:
             costs = {names_of_places(stations): costs for stations, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
         for claim, alternative in zip(self.study.claim, alternatives, strict=True):
-            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
-            yield from published_claims.evaluate_claim(
+            claimed, _, full = sets_of_claim(claim, self.plan.groups)
+            yield from evaluate_claim(
                 claim,
                 names_of_places(claimed),
                 names_of_places(alternative),

@@ -16,7 +16,7 @@ from harness.experiment.scenario import Scenario, expand_clips, find_scenario, l
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
 from harness.results.placement_findings import CandidatePlace
-from harness.study.placement import published_claims, search
+from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (
     PlacementStudy,
@@ -24,7 +24,7 @@ from harness.study.placement.config import (
     find_placement_study,
     load_placement_study,
 )
-from harness.study.placement.ranking import Costs
+from harness.study.placement.ranking import Costs, sets_of_claim
 from harness.study.placement.refinement import check_unit_count
 from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetRequest, clips_of_units, link_rate_hz
@@ -81,7 +81,7 @@ class PlacementPlan:
         if study.exhaustive:
             sets += search.exhaustive_sets(study.exhaustive, self.groups)
         for claim in study.claim:
-            claimed, others, full = published_claims.sets_of_claim(claim, self.groups)
+            claimed, others, full = sets_of_claim(claim, self.groups)
             sets += [claimed, *others, full]
         return list(dict.fromkeys(sets))
 

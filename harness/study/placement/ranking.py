@@ -1,29 +1,19 @@
-"""Rankings of sets of stations, with their uncertainty.
-
-Errors are costs: one value for each unit of statistics; lower is better. Sets are compared on the same units and ranked
-by the mean.
-
-The rank of a set is given as a range. The set is compared with each other set by sign flips over units; p is corrected
-for the number of comparisons (Holm 1979). The numbers of significantly better and worse sets bound its rank. This is a
-confidence interval for the rank of each set by itself (Mogstad, Romano, Shaikh and Wilhelm 2024, Inference for ranks
-with applications to mobility across neighbourhoods, Rev. Econ. Stud. 91).
-
-The mean of the best of many sets is biased downwards on the units on which it was chosen: see `cross_validated_cost`.
-Rankings under several conditions are compared by rank correlation and by changed orders.
-"""
+"""Ranking of station sets by errors, and what published claims say of the sets."""
 
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from harness.compare.claims import claim_lower_error
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
 from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.placement_findings import (
     BestSet,
     ChangedOrder,
@@ -35,6 +25,8 @@ from harness.results.placement_findings import (
     StationNames,
     StationSetResult,
 )
+from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.config import PublishedClaim
 
 Costs = Mapping[str, float | None]
 """Unit of statistics -> cost (see `compare.units`); None where it was not measured."""
@@ -248,3 +240,57 @@ def changed_orders(names: Sequence[StationNames], a: Floats, b: Floats, *, paire
             significant = None if p is None else p <= SIGNIFICANCE
             changes.append(ChangedOrder(names[first], names[second], (before, after), significant))
     return sorted(changes, key=lambda c: (not c.significant, c.differences[1] - c.differences[0]))
+
+
+def sets_of_claim(
+    claim: PublishedClaim, units: Sequence[CandidateGroup]
+) -> tuple[StationSet, list[StationSet], StationSet]:
+    """The claimed set, the other sets of the same size, and the set of all of the paper's stations."""
+    where = f"the claim {claim.text!r}"
+    groups = select_groups(claim.among, units, where)
+    claimed, full = station_set(select_groups(claim.set, units, where), units), station_set(groups, units)
+    same_size = [
+        station_set(combination, units)
+        for n in range(1, len(claimed) + 1)
+        for combination in itertools.combinations(groups, n)
+        if sum(map(len, combination)) == len(claimed)
+    ]
+    return claimed, [stations for stations in same_size if stations != claimed], full
+
+
+def best_alternative(others: Sequence[StationNames], costs: Mapping[StationNames, Costs]) -> StationNames:
+    """The set with the least cost; () if none was measured."""
+    complete, _ = complete_sets({names: costs[names] for names in others})
+    return next(iter(sort_by_cost(complete)), ())
+
+
+def evaluate_claim(
+    claim: PublishedClaim,
+    claimed: StationNames,
+    other: StationNames,
+    full: StationNames,
+    costs: Mapping[StationNames, Costs],
+    *,
+    unit: str,
+    basis: str,
+) -> tuple[BenchmarkStatement, BenchmarkStatement]:
+    """Evaluate both claims by costs of the units of the test clips, which `basis` describes in words."""
+    measured = {
+        names: {name: value for name, value in costs.get(names, {}).items() if value is not None}
+        for names in (claimed, other, full)
+    }
+    allowed = {name: (1.0 + claim.margin) * value for name, value in measured[full].items()}
+    best_of_size = f"{claim.text}: no other {len(claimed)} stations err less (against the best, {join_names(other)})"
+    within = f"{claim.text}: {join_names(claimed)} err at most {claim.margin:.0%} more than all {len(full)}"
+    published = f"stated by {claim.source}"
+    why = "; ".join(filter(None, (claim.why_not, basis)))
+    suffices = claim_lower_error(within, measured[claimed], allowed, published=published, unit=unit, why=why)
+    if suffices.verdict != "not run":
+        shared = measured[claimed].keys() & measured[full].keys()
+        mean, mean_of_all = (mean_cost({name: measured[names][name] for name in shared}) for names in (claimed, full))
+        limit = f"limit {(1.0 + claim.margin) * mean_of_all:.2f} {unit}, {1.0 + claim.margin:.0%} of {mean_of_all:.2f}"
+        suffices = replace(suffices, measured=f"{mean:.2f} {unit}; {limit} of all {len(full)}")
+    return (
+        claim_lower_error(best_of_size, measured[claimed], measured[other], published=published, unit=unit, why=why),
+        suffices,
+    )

@@ -19,10 +19,9 @@ from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
-from harness.experiment.cells import open_scenario_motion
+from harness.experiment.cells import cell_names, open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.executors import TaskExecutor
-from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
 from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name

@@ -38,7 +38,7 @@ from harness.stream.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
-from harness.study.trust.expected_values import correct_departures, preset_components, preset_values
+from harness.study.trust.characterization import correct_departures, preset_components, preset_values
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,

@@ -11,7 +11,7 @@ from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STAT
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber
 from harness.bench.lab.truth import KINDS, coverage_rows, fault_row, fault_rows
 from harness.bench.lab.validated_captures import PROMISES, registration_rows
-from harness.study.trust.expected_values import preset_values
+from harness.study.trust.characterization import preset_values
 
 
 def _check(key: str, value: float, station: str = "", *, half: float = 0.0, named: bool = True) -> StoredCheck:

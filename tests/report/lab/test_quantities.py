@@ -9,7 +9,7 @@ from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.timing import TIMING_KEYS
 from harness.measure.unit_report import STATION_FIGURES
 from harness.report.lab.quantities import Quantity, find_quantity
-from harness.study.trust.expected_values import preset_values
+from harness.study.trust.characterization import preset_values
 
 
 def test_every_number_that_is_measured_has_a_name() -> None:

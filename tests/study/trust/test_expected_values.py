@@ -9,7 +9,7 @@ from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.unit_file import UnitFile
 from harness.simulate.noise import Noise, noise_preset
-from harness.study.trust.expected_values import (
+from harness.study.trust.characterization import (
     check_departures,
     flatten_components,
     nest_components,

@@ -24,7 +24,7 @@ from harness.results.trust_findings import Equivalence, PairAgreement, SideDiffe
 from harness.stream.recording.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
 from harness.study.trust.arm_results import Arm, TrustTask, read_cell_errors, run_capture
-from harness.study.trust.expected_values import preset_components
+from harness.study.trust.characterization import preset_components
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import (
     OtherPlan,

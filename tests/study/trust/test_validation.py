@@ -16,7 +16,7 @@ from harness.simulate.simulation import TrackerConfig
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust import validation
-from harness.study.trust.expected_values import preset_components
+from harness.study.trust.characterization import preset_components
 from harness.study.trust.truth_motion import TruthMotion, read_stations
 from harness.study.trust.validation import (
     Validation,
