@@ -1,4 +1,4 @@
-"""The verbs `compare` and `baseline`: tell whether one result is worse than another, and keep results for that."""
+"""The verb `compare`: tell whether one result is worse than another."""
 
 import argparse
 from pathlib import Path
@@ -47,22 +47,4 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     following = () if page else (*this_words(), "--html", "comparison.html")
     return print_result(
         args, record_content(comparison, page=page), *lines, outcome=comparison.outcome, following=following
-    )
-
-
-def add_baseline(verbs: Verbs) -> None:
-    text = "save the results of a finished run as a baseline"
-    verb = add_verb(verbs, "baseline", text, run_baseline)
-    verb.add_argument("what", choices=["save"], help="the only action")
-    verb.add_argument("name", metavar="NAME", help="name of the baseline, written to results/baselines/NAME")
-    verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
-    verb.add_argument("--force", action="store_true", help="replace an existing baseline")
-
-
-def run_baseline(args: argparse.Namespace) -> Outcome:
-    from harness.compare.baseline import write_baseline
-
-    folder = write_baseline(args.run, args.name, force=args.force)
-    return print_result(
-        args, {"baseline": str(folder)}, f"baseline: {folder}", following=["compare", args.name, args.run]
     )

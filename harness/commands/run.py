@@ -1,11 +1,11 @@
-"""The verbs `run` and `demo`: run a scenario, or the main job on synthetic motion, and write its report."""
+"""The verb `run`: run a scenario and write its report."""
 
 import argparse
 import sys
 from pathlib import Path
 
 from harness.commands.flags import Verbs, add_isolation_flags, add_verb, parse_methods, read_isolation
-from harness.commands.output import long_work, print_result, print_status, this_command
+from harness.commands.output import long_work, print_result, this_command
 from harness.core.progress import show_steps
 from harness.errors import Outcome
 
@@ -88,18 +88,3 @@ def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
         return named
     every = (*own, *registry.methods())
     return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))
-
-
-def add_demo(verbs: Verbs) -> None:
-    text = "run the main job on synthetic motion and write its report: nothing to download, a minute"
-    verb = add_verb(verbs, "demo", text, run_demo, "seed", "out", "jobs")
-    add_methods_flag(verb)
-    add_all_flag(verb)
-    verb.set_defaults(scenario="demo", mocap=None, report=True, jobs=2)
-    verb.set_defaults(isolate=False, time_limit=None, memory_limit=None)
-
-
-def run_demo(args: argparse.Namespace) -> Outcome:
-    """Say what comes before the imports, which take a second, and run the demo."""
-    print_status("demo: synthetic motion of twelve performers")
-    return run_scenario(args)

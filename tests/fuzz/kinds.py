@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.body.humanoid import build_body
 from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
-from harness.commands.sweep import _status_lines
+from harness.commands.status import _status_lines
 from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_runs
 from harness.core.calibration import Calibration

@@ -1,6 +1,6 @@
 """Recordings: everything that passed over the line, in both directions, with the host's times.
 
-The file layout is described in `codec/blocks.py`. A recording only grows, by whole blocks. A crash or a damaged disk
+The file layout is described in `blocks.py`. A recording only grows, by whole blocks. A crash or a damaged disk
 costs only the blocks it touches, and these are reported. A recording that was cut off can be continued. Blocks by kind:
 
     recv, sent   bytes from and to the device; an empty recv block: nothing arrived and an overdue frame was closed

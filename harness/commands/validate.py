@@ -1,0 +1,70 @@
+"""The verb `validate`: compare a capture with a reference that was recorded beside it."""
+
+import argparse
+from pathlib import Path
+
+from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.output import print_result, this_command
+from harness.commands.unit_results import add_unit_flags, departure_content, read_expected, write_unit
+from harness.core.progress import ProgressBar
+from harness.errors import BadInput, Outcome
+
+
+def add_validate(verbs: Verbs) -> None:
+    text = "register a capture with a reference, and measure errors, clocks, room and mounts against it"
+    verb = add_verb(verbs, "validate", text, run_validate, "mocap")
+    verb.add_argument("capture", type=Path, help="a recording by `harness record` or `harness characterize`")
+    text = (
+        "the reference: a clip of the capture's scenario or of a library, another capture, a C3D file with three or "
+        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table"
+    )
+    verb.add_argument("--truth", required=True, metavar="CLIP|FILE", help=text)
+    verb.add_argument(
+        "--scenario", metavar="NAME", help="clip: scenario with stations and mounts (default: the capture's)"
+    )
+    verb.add_argument(
+        "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
+    )
+    text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
+    add_unit_flags(verb, text)
+
+
+def run_validate(args: argparse.Namespace) -> Outcome:
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.validation_page import validation_page
+    from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
+
+    expected = read_expected(args)
+    truth = load_truth(args.capture, args.truth, scenario=args.scenario, folder=args.mocap)
+    methods = split_list(args.methods)
+    if methods and truth.playback is None:
+        raise BadInput(
+            f"--methods with {truth.title}.", "Only a clip has a performer's body to score on: leave it out."
+        )
+    with ProgressBar("steps") as progress:
+        found = validate_capture(args.capture, truth, expected=expected, progress=progress)
+        scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
+    report = found.report
+    errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
+    page = validation_page(report, errors, this_command())
+    lines, written = write_unit(args, lambda: session_unit(found, expected, args.out.stem), page)
+    content = {
+        "truth": truth.title,
+        "matched_share": report.matched_share,
+        "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
+        "exchanged": dict(found.exchanged),
+        "departures": departure_content(found.named, "p_holm"),
+        "scores": [
+            {"method": method, "metric": metric, "value": value}
+            for method, values in errors.items()
+            for metric, value in values.items()
+        ],
+        "damage": list(found.reader.damage),
+        **written,
+    }
+    failures = {one.method: one.failure for one in scores if one.failure}
+    lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
+    content |= {"failures": failures} if failures else {}
+    return print_result(
+        args, content, page_text(page), *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS
+    )
