@@ -16,6 +16,7 @@ from harness.bench.lab.validated_captures import planted_truth
 from harness.bench.physics import comparison as physics
 from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
 from harness.cli import main
+from harness.errors import Outcome
 from harness.experiment.playback import prepare_playback
 from harness.measure.unit_report import UnitReport
 from harness.measure.validation_report import ValidationReport
@@ -25,8 +26,10 @@ from harness.report.coverage.page import coverage_page
 from harness.report.kit.page import Page
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.results.benchmark_statement import state_verdict
+from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.results.trust_findings import TrustFindings
 from harness.stream.recording.recording import record_capture
+from harness.study.placement.placement_study import run_placement
 from harness.study.trust.characterization import characterize_capture
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
@@ -177,3 +180,24 @@ def coverages(tmp_path_factory: pytest.TempPathFactory) -> tuple[CoverageContent
         )
     plain, boxing = kept
     return plain, boxing
+
+
+@pytest.fixture(scope="session")
+def placement_study(made_once: Make) -> Path:
+    """The folder of a study in every mode of three places, of which one alone is read; seven short clips."""
+
+    def study(folder: Path) -> None:
+        from tests.study.placement.test_placement_study import ALL_MODES, SEVEN, STUDY, written
+
+        question = STUDY.replace("metric =", "condition_size = 1\nmetric =")
+        path = written(folder, "[ablate]", clips=SEVEN, study=question)
+        run_placement(path, folder / "out")  # of one mode first
+        path.write_text(path.read_text().replace("[ablate]", ALL_MODES))
+        assert run_placement(path, folder / "out")[1] is Outcome.PASS
+
+    return made_once("placement", study) / "out"
+
+
+@pytest.fixture(scope="session")
+def placement(placement_study: Path) -> PlacementFindings:
+    return read_placement(placement_study / "findings.json")

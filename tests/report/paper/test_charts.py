@@ -19,7 +19,7 @@ from harness.report.paper.charts import figure_charts
 from harness.report.paper.figure_table import figure_table
 from harness.report.paper.line_chart import draw_lines
 from harness.results.findings import BarChart, LineChart, PaperExperiment
-from tests.report.fabricate_paper import METHODS, curves, liu, sets
+from tests.report.paper.findings import METHODS, curves, liu, sets
 
 EMPTY = PaperExperiment("empty", "", "", ())
 PLACES = {name: n for n, name in enumerate(("kernel_cca", "dynamic_map", "local_pca", "ik", "a", "b"))}
@@ -136,6 +136,6 @@ def test_the_table_of_a_figure_has_every_number() -> None:
     shown = sets("boxing")
     rows = figure_table(shown).rows
     assert len(rows) == 31
-    for row, group, value in zip(rows, shown.groups, shown.series["kernel_cca"], strict=True):
-        assert value is not None
-        assert row == (group, f"{value:.2f} ({0.9 * value:.2f} to {1.15 * value:.2f})")
+    columns = (shown.groups, shown.series["kernel_cca"], shown.low["kernel_cca"], shown.high["kernel_cca"])
+    for row, group, value, low, high in zip(rows, *columns, strict=True):
+        assert row == (group, f"{value:.2f} ({low:.2f} to {high:.2f})")
