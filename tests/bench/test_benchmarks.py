@@ -11,8 +11,8 @@ from harness.bench.cpu_time import hold_cpu_to_limit
 from harness.bench.startup import DemoTimes, demo_rows
 from harness.cli import main
 from harness.errors import MissingExtra, Outcome, UnknownName
+from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit, state_verdict
-from tests.report.fabricate_physics import made_up
 
 
 @pytest.mark.parametrize(("name", "package"), [("index", "faiss-cpu"), ("ik", "mink"), ("methods", "mink")])
@@ -102,13 +102,18 @@ def test_the_demo_is_held_to_ratios_of_the_same_run() -> None:
     assert rows["demo, cold: report"].measured == "80 s"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["physics", "lab"])
 def test_a_missed_row_of_a_truth_table_ends_with_1(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    what: str,
+    error_models: ErrorModelComparison,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     rows = [state_verdict("rest", "1 to 2 mm", "1.5 mm", True, "1.5 mm (Gilson et al. 2006)"), MISSED]
     monkeypatch.setattr("harness.bench.physics.truth.truth_rows", lambda *_: rows)
-    monkeypatch.setattr("harness.bench.physics.comparison.compare_error_models", lambda *_: made_up().models)
+    monkeypatch.setattr("harness.bench.physics.comparison.compare_error_models", lambda *_: error_models.models)
     monkeypatch.setattr("harness.bench.lab.truth.lab_truth_rows", lambda *_: rows)
     assert main(["bench", what, "--truth", "--seeds", "1", "--out", str(tmp_path)]) == Outcome.REGRESSED.exit_code
     lines = capsys.readouterr().out.splitlines()

@@ -21,8 +21,8 @@ from harness.report.kit.motion_player import NO_ESTIMATE
 from harness.results.storage import read_cells
 from harness.score.pair import compute_poses
 from harness.view.page import ViewedMotion
+from tests.planted import Plan, planted_run
 from tests.report.conftest import renders as renders
-from tests.report.fabricate import Plan, fabricate
 
 CLIP = "boxing_p1_01"
 
@@ -34,7 +34,7 @@ def opened(what: Path | str, methods: list[str] | None = None, **playback: str |
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = Plan(methods={"ik": 2.0, "map": 1.0, "far": 9.0}, duration_s=3.0)
-    return fabricate(tmp_path_factory.mktemp("view") / "run", plan)
+    return planted_run(tmp_path_factory.mktemp("view") / "run", plan)
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ def test_what_cannot_be_shown_is_refused(
 
 def test_a_run_without_estimates_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan = Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0, silent=("ik",))
-    assert main(["view", str(fabricate(tmp_path / "run", plan))]) == 2
+    assert main(["view", str(planted_run(tmp_path / "run", plan))]) == 2
     assert "no frames with an estimate" in capsys.readouterr().err
 
 

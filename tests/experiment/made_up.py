@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -13,8 +14,9 @@ from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.reconstruct.contract import Method
 from harness.results.cell import Cell
+from harness.results.storage import read_cells
 from harness.score.score import Scores
-from tests.report.fabricate import Plan, make_cell
+from tests.planted import Plan, planted_run
 
 FAILING = "ik:previous+ik"
 """Cells of this method fail, while the file `broken` lies where the process works."""
@@ -22,7 +24,10 @@ FAILING = "ik:previous+ik"
 
 @cache
 def template() -> Cell:
-    return make_cell("walking", 1, "ik", 2.0, "pos+ori", Plan(duration_s=1.5), {})
+    with TemporaryDirectory() as folder:
+        plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
+        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
+        return cell
 
 
 def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:

@@ -33,9 +33,9 @@ from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
 from harness.results.reported_metrics import PRIMARY_METRIC
+from tests.planted import Plan as RunPlan
+from tests.planted import planted_run
 from tests.report.drawing import texts_apart
-from tests.report.fabricate import Plan as RunPlan
-from tests.report.fabricate import fabricate
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of
 from tests.report.watching import is_whole_and_quiet
@@ -315,7 +315,7 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The verb reads the cells too: a sweep with a damaged one is refused."""
-    fabricate(tmp_path, RunPlan(behaviours=("walking",), methods={"ik": 3.0, "mean_pose": 9.0}, duration_s=3.0))
+    planted_run(tmp_path, RunPlan(behaviours=("walking",), methods={"ik": 3.0, "mean_pose": 9.0}, duration_s=3.0))
     with CellIndex(tmp_path) as index:
         index.note(kind="sweep", name="made_up", command=COMMAND)
         index.write_digest({})
