@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -10,16 +12,20 @@ import pytest
 import tomli_w
 from scipy.ndimage import gaussian_filter1d
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
 from harness.experiment import cells
+from harness.experiment.cells import PlannedCell
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import Evaluation
 from harness.experiment.method_run import MethodAnswers
 from harness.experiment.observed_take import ObservedTake
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.results.cell import Cell
+from harness.results.storage import read_cells
 from tests.products import run_verb
 
 METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}
@@ -120,7 +126,8 @@ def _answer(method: Method, name: str, take: ObservedTake, plan: Plan) -> Evalua
     if name in plan.sigma_deg:
         over_time = 1.0 + 0.1 * np.sin(np.arange(len(truth)) / 7.0)
         sigma_rad = np.deg2rad(plan.sigma_deg[name]) * over_time[:, None] * np.linspace(0.5, 1.5, 48)
-    status, step_ms = (valid < 1.0).any(axis=1).astype(np.int64), rng.gamma(4.0, 0.15, len(truth))
+    status: Ints = np.where((valid < 1.0).any(axis=1), 1, 0)
+    step_ms = rng.gamma(4.0, 0.15, len(truth))
     nothing, zero = np.full(len(truth), np.nan), np.zeros(len(truth), dtype=np.int64)
     answers = MethodAnswers(qpos, status, zero, step_ms, nothing, nothing, zero, sigma_rad)
     return Evaluation(name, replace(take, loops=(loop,)), answers, lag)
@@ -134,3 +141,89 @@ def _worse_by(take: ObservedTake, plan: Plan) -> int:
             value = value[part] if isinstance(value, Mapping) else getattr(value, part)
         return 1 + list(values).index(value)
     return 1
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What the sweep contains."""
+
+    scenarios: Sequence[str] = ("walking", "boxing")
+    """Behaviours, each a scenario."""
+    clips: int = 7
+    methods: Mapping[str, float] = field(default_factory=lambda: {"ik": 3.0, "local_pca": 1.6, "dynamic_map": 1.4})
+    """Method -> its error [deg]."""
+    vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Key -> values; the n-th makes errors larger by n tenths."""
+    seeds: Sequence[int] = (1,)
+    known: int = 0
+    """Number of performers of each scenario that methods know from other takes."""
+    failing: tuple[str, ...] = ()
+    """Methods whose cells fail."""
+    unmeasured: tuple[str, ...] = ()
+    """Methods whose metrics are None."""
+    lags: Mapping[str, int] = field(default_factory=dict)
+    """Method -> its lag [frames]."""
+
+
+@cache
+def measured_cell() -> Cell:
+    """A cell of the verb `run`."""
+    with TemporaryDirectory() as folder:
+        plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
+        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
+        return cell
+
+
+def planted_sweep(out: Path, plan: SweepPlan = SweepPlan()) -> Path:
+    """The folder of a sweep, without its page, by the verb `sweep`; only the errors of its cells are planted."""
+    template = measured_cell()
+    folder = out.with_name(f"{out.name}_scenarios")
+    folder.mkdir(parents=True)
+    for behaviour in plan.scenarios:
+        like = Plan((behaviour,), plan.methods, takes=plan.clips, duration_s=1.5, known=plan.known)
+        (folder / f"{behaviour}.toml").write_text(tomli_w.dumps(_scenario(like)), encoding="utf-8")
+    content = {
+        "schema": 1,
+        "name": "planted",
+        "scenarios": [f"./{behaviour}.toml" for behaviour in plan.scenarios],
+        "methods": list(plan.methods),
+        "seeds": list(plan.seeds),
+        **({"vary": dict(plan.vary)} if plan.vary else {}),
+    }
+    (folder / "sweep.toml").write_text(tomli_w.dumps(content), encoding="utf-8")
+
+    def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
+        name, clip, seed = planned.method, str(setting.part), planned.scenario.seed
+        if name in plan.failing:
+            raise ValueError(FAILURE)
+        worse = 1.0 + 0.1 * sum(list(plan.vary[varied]).index(value) for varied, value in planned.varied.items())
+        draw = generator(seed, "planted sweep", name, clip, str(planned.varied)).normal()
+        error = plan.methods[name] * worse * float(np.exp(0.2 * draw))
+        metrics = {**template.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 6.0 * error, "mpjre_deg": 1.7 * error}
+        if name in plan.unmeasured:
+            metrics = dict.fromkeys(metrics)
+        lag = {"lag": plan.lags[name]} if name in plan.lags else {}
+        return replace(
+            template,
+            key=key,
+            method=name,
+            clip=clip,
+            behaviour=setting.behaviour,
+            inputs=planned.inputs,
+            seed=seed,
+            noise=planned.scenario.noise,
+            varied=planned.varied,
+            scenario=planned.scenario.name,
+            performer=setting.subject.performer,
+            defined_by=setting.conditions_of(method, planned.inputs) | lag,
+            scores=replace(template.scores, metrics=metrics),
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in set(plan.methods) - set(registry.methods()):
+            patch.setitem(registry._BUILT_IN, name, MeanPose)
+        patch.setattr(cells, "evaluate_cell", judge)
+        patch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
+        code = 4 if plan.failing else 3 if set(plan.methods) <= set(plan.unmeasured) else 0
+        run_verb("sweep", folder / "sweep.toml", "--out", out, "--jobs", "1", code=code)
+    return out

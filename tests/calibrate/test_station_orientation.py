@@ -10,7 +10,8 @@ from harness.core.arrays import Floats
 def off_z(tilt_deg: float, angle_deg: float = 90.0) -> Floats:
     """A rotation vector about an axis that is tilted from z towards x [rad]."""
     tilt = np.deg2rad(tilt_deg)
-    return np.deg2rad(angle_deg) * np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    turn_rad: Floats = np.deg2rad(angle_deg) * np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    return turn_rad
 
 
 @pytest.mark.parametrize(

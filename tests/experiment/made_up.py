@@ -1,9 +1,7 @@
 """Cells that are judged in no time, by made-up errors; everything around them is real."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -14,26 +12,17 @@ from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.reconstruct.contract import Method
 from harness.results.cell import Cell
-from harness.results.storage import read_cells
 from harness.score.score import Scores
-from tests.planted import Plan, planted_run
+from tests.planted import measured_cell
 
 FAILING = "ik:previous+ik"
 """Cells of this method fail, while the file `broken` lies where the process works."""
 
 
-@cache
-def template() -> Cell:
-    with TemporaryDirectory() as folder:
-        plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
-        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
-        return cell
-
-
 def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
     if planned.method == FAILING and Path("broken").exists():
         raise ZeroDivisionError("on purpose")
-    found = template()
+    found = measured_cell()
     error = float(generator(planned.scenario.seed, str(planned)).uniform(1.0, 5.0))
     metrics = {**found.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 5.0 * error, "step_p50_ms": 0.1}
     return replace(

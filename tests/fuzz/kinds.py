@@ -60,9 +60,8 @@ from tests.fuzz.mending import mend_baseline, mend_calibration, mend_findings, m
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
-from tests.planted import Plan, planted_run
+from tests.planted import Plan, SweepPlan, planted_run, planted_sweep
 from tests.reconstruct.database.test_motion_database import make_take
-from tests.report import fabricate_sweep
 from tests.report.paper import findings as paper_findings
 
 OPTIONS = "dynamic_map[neighbours=40|60]+ik, local_pca[neighbours=100], kernel_cca[jump_m=0.5,outputs=angles]+ik"
@@ -239,7 +238,7 @@ def _read_baseline(folder: Path) -> object:
 
 
 def _make_sweep(folder: Path) -> None:
-    fabricate_sweep.fabricate_sweep(folder / "x", fabricate_sweep.Plan(failing=("dynamic_map",), to_come=2))
+    planted_sweep(folder / "x", SweepPlan(clips=2, failing=("dynamic_map",)))
 
 
 def _make_paper(folder: Path) -> None:

@@ -1,8 +1,10 @@
 """Parses a page: its text, its elements, and whether each element is closed."""
 
 import re
+from collections.abc import Iterable
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 
 class Reader(HTMLParser):
@@ -58,3 +60,8 @@ def numbers_in_order(text: str, *numbers: object) -> bool:
             if not place:
                 return False
     return True
+
+
+def emptied(names: Iterable[str], value: object = ()) -> dict[str, Any]:
+    """These fields of a record without content, for `dataclasses.replace`."""
+    return dict.fromkeys(names, value)

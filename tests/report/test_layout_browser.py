@@ -22,9 +22,8 @@ from harness.report.placement import page as placement_page
 from harness.report.run.writer import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from harness.results.trust_findings import TrustFindings
-from tests.planted import Plan, planted_run
+from tests.planted import Plan, planted_run, planted_sweep
 from tests.report.comparison.compared import compared
-from tests.report.fabricate_sweep import fabricate_sweep
 from tests.report.paper.findings import liu, write_study
 from tests.report.sweep.test_page import VARIED
 
@@ -70,7 +69,7 @@ def pages(
         **{kind: write_page(page, folder / f"{kind}.html") for kind, page in shown.items()},
         "run": write_run_page(planted_run(folder / "run", plan), rendered=False),
         "comparison": write_comparison_page(compared({"local_pca": 0.05}, 7), folder / "comparison.html"),
-        "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),
+        "sweep": write_sweep_page(planted_sweep(folder / "sweep", VARIED)),
         "placement": placement,
         "paper": write_paper_page(write_study(folder / "paper", liu())),
         "physics": write_physics_page(folder / "physics.html", error_models),

@@ -13,7 +13,7 @@ from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.lab.trust_page import OUTCOME_TITLES, correlations, count_pairs, trust_page, verdict_sentence
 from harness.results.trust_findings import RankCorrelation, TrustFindings
-from tests.report.reading import count_pictures, numbers_in_order, read, section_ids, text_of
+from tests.report.reading import count_pictures, emptied, numbers_in_order, read, section_ids, text_of
 
 pytestmark = pytest.mark.long
 COMMAND = "harness trust plan.toml walk_00.rec"
@@ -30,7 +30,7 @@ def contradicted(findings: TrustFindings, **changes: Any) -> TrustFindings:
 def empty(trust_findings: TrustFindings) -> TrustFindings:
     """A study in which nothing could be compared."""
     parts = ("captures", "health", "distances", "equivalences", "pairs", "rank_correlations", "notes")
-    return replace(trust_findings, outcome=Outcome.NOT_COMPARABLE, why="no frame", **dict.fromkeys(parts, ()))
+    return replace(trust_findings, outcome=Outcome.NOT_COMPARABLE, why="no frame", **emptied(parts))
 
 
 def written(folder: Path, findings: TrustFindings) -> Path:

@@ -12,6 +12,7 @@ from harness.report.kit.style import COLOURS
 from harness.report.lab.unit_charts import allan_chart
 from harness.report.lab.unit_page import unit_page
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
+from tests.report.reading import emptied
 
 
 def figures_of(report: UnitReport) -> dict[str, Figure]:
@@ -31,7 +32,7 @@ def test_there_is_a_chart_for_everything_that_was_measured(figures: dict[str, Fi
 
 def test_without_measurements_nothing_is_drawn(unit_with_faults: UnitReport) -> None:
     measured = ("checks", "allan_position", "allan_orientation", "spectra", "episodes", "quality", "rigid_pairs")
-    assert figures_of(replace(unit_with_faults, **dict.fromkeys(measured, ()))) == {}
+    assert figures_of(replace(unit_with_faults, **emptied(measured))) == {}
 
 
 def test_departures_are_triangles_right_of_one(figures: dict[str, Figure], unit_with_faults: UnitReport) -> None:

@@ -18,10 +18,10 @@ from harness.report.lab.quantities import quantity
 from harness.report.lab.validation_charts import largest_of_stretches
 from harness.report.lab.validation_page import validation_answer, validation_page
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
-from tests.report.reading import count_pictures, numbers_in_order, section_ids, text_of
+from tests.report.reading import count_pictures, emptied, numbers_in_order, section_ids, text_of
 
 COMMAND = "harness validate walk.rec"
-SCORES = {
+SCORES: dict[str, dict[str, float | None]] = {
     "ik": {"joint_angle_mean_deg": 5.31, "mpjpe_mm": 41.2},
     "local_pca": {"joint_angle_mean_deg": 3.02, "mpjpe_mm": None},
 }
@@ -89,7 +89,7 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path, late_capture: Val
     numbers = {"time_offset_position_s": Interval.missing("The stream has no stamps.")}
     capture = replace(late_capture.capture, stretches=())
     empty = ("poses", "checks", "residuals", "notes")
-    report = replace(late_capture, numbers=numbers, accuracy={}, capture=capture, **dict.fromkeys(empty, ()))
+    report = replace(late_capture, numbers=numbers, accuracy={}, capture=capture, **emptied(empty))
     page = write_page(validation_page(report, {}, COMMAND), tmp_path / "a.html")
     assert section_ids(page) == ["registration", "command"]
     assert "time offset by position not measured time offset by position: The stream has no" in text_of(page)

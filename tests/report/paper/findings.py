@@ -33,7 +33,7 @@ def write_study(folder: Path, findings: PaperFindings) -> Path:
     return folder
 
 
-def drawn_errors(size: float, *names: object, units: int = 8) -> dict[str, float]:
+def drawn_errors(size: float, *names: str | int, units: int = 8) -> dict[str, float]:
     """Unit -> error of about this size [deg]."""
     draws = generator(1, "drawn errors", *names).uniform(size, 1.3 * size, units)
     return {f"performer p{n + 1}": float(error) for n, error in enumerate(draws)}
@@ -109,8 +109,15 @@ def kim() -> PaperFindings:
         PaperExperiment("sets", "Sets of trackers", "15 sets (Fig. 3).", ("All sets were run.",), (few,), (), figures),
         PaperExperiment("sparse", "Sparse databases", "43 frames of walking.", (), figures=(curves(300),)),
     )
-    about = {"paper": "kim2012", "reference": "Kim, Seol, Lee: Realtime performance animation, 2012", "motion": "cmu"}
-    return replace(liu(), **about, command="harness paper kim2012", experiments=experiments, tables=())
+    return replace(
+        liu(),
+        paper="kim2012",
+        reference="Kim, Seol, Lee: Realtime performance animation, 2012",
+        motion="cmu",
+        command="harness paper kim2012",
+        experiments=experiments,
+        tables=(),
+    )
 
 
 @cache

@@ -15,6 +15,7 @@ from harness.report.physics.charts import (
 )
 from harness.report.physics.error_comparison import ErrorModelComparison
 from tests.report.drawing import drawn_figures, points, texts_apart
+from tests.report.reading import emptied
 
 pytestmark = pytest.mark.long
 CHARTS = (spectrum_chart, excursions_chart, gaps_chart, quality_chart)
@@ -111,7 +112,7 @@ def test_bars_have_the_share_of_each_class(figures: dict[str, Figure], error_mod
 
 
 def test_a_model_without_episodes_has_a_word_in_place_of_curves(error_models: ErrorModelComparison) -> None:
-    none = dict.fromkeys(("excursion_s", "excursion_peak_m", "gap_s"), np.zeros(0))
+    none = emptied(("excursion_s", "excursion_peak_m", "gap_s"), np.zeros(0))
     bare = replace(error_models, models=(replace(error_models.models[0], **none),))
     figures = figures_of(bare)
     assert [text.get_text() for axes in figures["excursions"].axes for text in axes.texts] == ["none", "none"]

@@ -11,7 +11,7 @@ from harness.errors import BadInput, ShapeError
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.page import write_physics_page
 from harness.report.physics.truth_table import result_sentence
-from tests.report.reading import count_pictures, numbers_in_order, text_of
+from tests.report.reading import count_pictures, emptied, numbers_in_order, text_of
 
 pytestmark = pytest.mark.long
 
@@ -73,7 +73,7 @@ def test_the_summary_has_rates_per_minute_and_station(page: Path, error_models: 
 
 
 def test_a_model_without_episodes_has_charts_and_dashes(tmp_path: Path, error_models: ErrorModelComparison) -> None:
-    none = dict.fromkeys(("excursion_s", "excursion_peak_m", "gap_s"), np.zeros(0))
+    none = emptied(("excursion_s", "excursion_peak_m", "gap_s"), np.zeros(0))
     model = replace(error_models.models[0], truncated=0, label="clean", **none)
     text = text_of(write_physics_page(tmp_path / "page.html", replace(error_models, models=(model,), rows=())))
     assert "median duration of a gap [s] –" in text
@@ -93,4 +93,4 @@ def test_records_that_do_not_fit_are_refused(tmp_path: Path, error_models: Error
         write_physics_page(tmp_path / "page.html", replace(error_models, models=()))
     for name in ("quality_share", "excursion_peak_m", "density_m2_hz", "error_m"):
         with pytest.raises(ShapeError, match=name):
-            replace(error_models.models[0], **{name: np.zeros(97)})
+            replace(error_models.models[0], **emptied([name], np.zeros(97)))

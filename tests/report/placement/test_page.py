@@ -26,7 +26,7 @@ from harness.results.placement_findings import (
     write_placement,
 )
 from harness.study.placement.config import load_placement_study
-from tests.report.reading import text_of
+from tests.report.reading import emptied, text_of
 
 NO_PICTURE = "the renderer was ended by SIGABRT"
 PLACES = [place for group in load_placement_study("walking").groups() for place in group]
@@ -52,7 +52,7 @@ def study_of(
     ]
     whole = replace(like, tried=tuple(tried), best=tuple(BestSet(t.stations) for t in tried), better=better)
     parts = ("rankings", "searches", "worth", "compared", "conditions", "agreements")
-    return replace(whole, unit="deg", **dict.fromkeys(parts, ()))
+    return replace(whole, unit="deg", **emptied(parts))
 
 
 def _mean(values: list[float | None]) -> float | None:
@@ -112,8 +112,8 @@ def test_the_text_opens_on_the_answer_and_has_every_table(placement: PlacementFi
     for ranking in placement.rankings:
         if len(ranking.rows) > 1:
             assert f"\n{ranking.mode}: " in text
-            for row in ranking.rows[1:]:
-                assert str(Interval.of(row.difference, row.low, row.high, signed=True)) in text
+            for ranked in ranking.rows[1:]:
+                assert str(Interval.of(ranked.difference, ranked.low, ranked.high, signed=True)) in text
     for pair in placement.agreements:
         assert str(Interval.of(pair.tau, pair.low, pair.high)) in text
     for claim in placement.claims:

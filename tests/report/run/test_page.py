@@ -190,7 +190,7 @@ def test_hostile_names_stay_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     out = planted_run(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0, "mean_pose": 3.0}))
     run = read_run(out)
     rows = {name: [rename(row) for row in run.summary[name]] for name in ("behaviours", "cells", "methods")}
-    traces = [replace(trace, clip=HOSTILE, behaviour=HOSTILE) for trace in run.traces]
+    traces = tuple(replace(trace, clip=HOSTILE, behaviour=HOSTILE) for trace in run.traces)
     monkeypatch.setattr(
         writer,
         "read_run",
