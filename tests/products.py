@@ -190,10 +190,7 @@ def placement_study(made_once: Make) -> Path:
         from tests.study.placement.test_placement_study import ALL_MODES, SEVEN, STUDY, written
 
         question = STUDY.replace("metric =", "condition_size = 1\nmetric =")
-        path = written(folder, "[ablate]", clips=SEVEN, study=question)
-        run_placement(path, folder / "out")  # of one mode first
-        path.write_text(path.read_text().replace("[ablate]", ALL_MODES))
-        assert run_placement(path, folder / "out")[1] is Outcome.PASS
+        assert run_placement(written(folder, ALL_MODES, clips=SEVEN, study=question), folder / "out")[1] is Outcome.PASS
 
     return made_once("placement", study) / "out"
 

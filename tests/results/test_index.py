@@ -23,7 +23,7 @@ from tests.planted import Plan, planted_run
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Eight cells: two behaviours, two methods, two values."""
-    plan = Plan(methods={"ik": 1.5, "mean_pose": 14.0}, duration_s=2.0, vary={"noise": ["clean", "all"]})
+    plan = Plan(methods={"ik": 1.5, "mean_pose": 14.0}, duration_s=2.0, vary={"noise": ["clean", "noise"]})
     return planted_run(tmp_path_factory.mktemp("index") / "run", plan)
 
 

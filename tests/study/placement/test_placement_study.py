@@ -97,11 +97,15 @@ changes = { noise = "default" }
 
 
 @pytest.fixture(scope="module")
-def done(placement_study: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, PlacementFindings]:
-    """A study with every mode but `refine`: its file, its folder and its findings."""
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, PlacementFindings]:
+    """A study with every mode but `refine`."""
     folder = tmp_path_factory.mktemp("study")
-    shutil.copytree(placement_study.parent, folder, dirs_exist_ok=True)
-    return folder / "which.toml", folder / "out", read_placement(folder / "out" / FINDINGS)
+    path = written(folder, "[ablate]", clips=SEVEN, study=STUDY.replace("metric =", "condition_size = 1\nmetric ="))
+    run_placement(path, folder / "out")  # of one mode first
+    path.write_text(path.read_text().replace("[ablate]", ALL_MODES))
+    findings, outcome = run_placement(path, folder / "out")
+    assert outcome is Outcome.PASS
+    return path, folder / "out", findings
 
 
 def test_every_mode_finds_the_one_station_that_is_read(done: tuple[Path, Path, PlacementFindings]) -> None:
