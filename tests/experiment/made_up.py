@@ -43,6 +43,7 @@ def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: st
 @pytest.fixture
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where tests work; what is judged there is made up, and its page without charts, which others look at."""
+    measured_cell()  # by the real evaluation
     monkeypatch.setattr(cells, "evaluate_cell", judge)
     monkeypatch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
     monkeypatch.chdir(tmp_path)

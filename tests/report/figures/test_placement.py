@@ -29,12 +29,12 @@ def test_the_best_of_each_size_is_named_with_its_interval_and_ties(
         names = [" ".join(text.get_text().split()) for text in axes.texts]
         assert names == [set_name(best.stations) for best in placement.best]
         intervals = [(t.low, t.high) for best in placement.best if (t := placement.of(best.stations))]
-        np.testing.assert_allclose(spans(axes.collections, 1), intervals)
+        np.testing.assert_allclose(np.array(spans(axes.collections, 1)), np.array(intervals, dtype=float))
         ties = [np.size(line.get_ydata()) for line in axes.lines if line.get_label() == "tied with the best"]
         assert ties == [len(best.ties) for best in placement.best]
         labels = [text.get_text() for text in legend.get_texts()]
         assert labels == ["every set", "tied with the best", "best of its size"]
-        assert (axes.get_xlabel(), axes.get_ylabel()) == ("stations", "root angle [deg]")
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("stations", "root orientation error [deg]")
         texts_apart(figure)
 
 
