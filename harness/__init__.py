@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from harness.experiment.scenario import load_scenario
     from harness.mocap.clip_file import read_clip
     from harness.reconstruct.registry import methods
-    from harness.results.loaded_run import load_run as load
+    from harness.results.reader import load_run as load
     from harness.score.score import score_estimate
     from harness.stream.driver.is900 import Is900
     from harness.stream.emulator.emulator import Emulator
@@ -41,7 +41,7 @@ else:
         "Is900": "harness.stream.driver.is900",
         "__version__": "harness.core.package_data",
         "compare_runs": "harness.compare.comparison",
-        "load": "harness.results.loaded_run",
+        "load": "harness.results.reader",
         "load_scenario": "harness.experiment.scenario",
         "methods": "harness.reconstruct.registry",
         "read_clip": "harness.mocap.clip_file",

@@ -38,7 +38,7 @@ def _run_command_line() -> int:
     try:
         from harness.cli import main as run
     except Exception as error:  # a broken installation
-        from harness.commands.ending import describe_ending, print_last
+        from harness.commands.output import describe_ending, print_last
 
         outcome, _ = describe_ending(sys.argv[1:], error)
         return print_last(f"{outcome.word}\n", outcome)
@@ -51,7 +51,7 @@ def _end_in_time(code: int) -> None:
 
 
 if __name__ == "__main__":
-    from harness.core.python_process import leave_working_folder_out
+    from harness.core.working_folder import leave_working_folder_out
 
     leave_working_folder_out(working_folder)
     sys.exit(main())

@@ -10,39 +10,31 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from harness.commands.baseline import add_baseline
 from harness.commands.bench import add_bench
 from harness.commands.calibrate import add_calibrate
-from harness.commands.characterize import add_characterize
-from harness.commands.check import add_check
-from harness.commands.compare import add_compare
-from harness.commands.demo import add_demo
-from harness.commands.doctor import add_doctor
+from harness.commands.characterize import add_characterize, add_validate
+from harness.commands.check import add_check, add_doctor
+from harness.commands.compare import add_baseline, add_compare
 from harness.commands.emulate import add_emulate
-from harness.commands.ending import describe_ending, print_last
 from harness.commands.export import add_export
-from harness.commands.inspect import add_inspect
 from harness.commands.list import add_list
 from harness.commands.live import add_live
-from harness.commands.mocap import add_mocap
+from harness.commands.mocap import add_inspect, add_mocap
+from harness.commands.output import describe_ending, print_last
 from harness.commands.paper import add_paper
 from harness.commands.placement import add_placement
-from harness.commands.plot import add_plot
+from harness.commands.plot import add_plot, add_table
 from harness.commands.record import add_record
 from harness.commands.replay import add_replay
 from harness.commands.report import add_report
-from harness.commands.run import add_run
-from harness.commands.status import add_status
-from harness.commands.sweep import add_sweep
-from harness.commands.table import add_table
+from harness.commands.run import add_demo, add_run
+from harness.commands.sweep import add_status, add_sweep
 from harness.commands.trust import add_trust
-from harness.commands.validate import add_validate
 from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
-from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
-from harness.core.python_process import THREAD_VARIABLES, safe_import_path
-from harness.core.working_folder import serve_folder
+from harness.core.ranges import check_command_line, check_words
+from harness.core.working_folder import THREAD_VARIABLES, safe_import_path, serve_folder
 from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {

@@ -156,9 +156,7 @@ def prepared_work(folder: Path, *, device: bool = False) -> Iterator[Work]:
     (folder / "placement.toml").write_text(PLACEMENT, encoding="utf-8")
     (folder / "outside.py").write_text(OUTSIDE, encoding="utf-8")
     work = Work(folder)
-    with _environment() as environment:
-        made = subprocess.run(work.command("run", "made"), cwd=folder, env=environment, capture_output=True, text=True)
-        assert made.returncode == 0, made.stderr
+    finish(work, "run", "made")
     if not device:
         yield work
         return
@@ -295,9 +293,7 @@ def duration_s(work: Work, kind: str, out: str) -> float:
     if kind in _LONGEST_S:
         return _LONGEST_S[kind]
     start_s = time.monotonic()
-    with _environment() as environment:
-        done = subprocess.run(work.command(kind, out), cwd=work.folder, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    finish(work, kind, out)
     return time.monotonic() - start_s
 
 

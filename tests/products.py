@@ -13,7 +13,7 @@ from filelock import FileLock
 
 from harness.bench.lab.captures import planted_capture
 from harness.bench.lab.validated_captures import planted_truth
-from harness.bench.physics import comparison as physics
+from harness.bench.physics import error_statistics
 from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
 from harness.cli import main
 from harness.errors import Outcome
@@ -107,7 +107,7 @@ def unit_with_faults(rig_capture: Path) -> UnitReport:
 def _validated(made_once: Make, kind: str) -> ValidationReport:
     folder = made_once(kind, lambda to: planted_capture(kind, FAULTS_SEED, to, seconds=FAULTS_S))
     path = folder / f"{kind}_{FAULTS_SEED}.rec"
-    return validate_capture(path, planted_truth(kind, FAULTS_SEED)).report(path)
+    return validate_capture(path, planted_truth(kind, FAULTS_SEED)).report
 
 
 @pytest.fixture(scope="session")
@@ -157,8 +157,8 @@ def error_models() -> ErrorModelComparison:
         state_verdict("four speeds", "RMS rises at each step", "", None),
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(physics, "_SECONDS", 30.0)
-        models = physics.compare_error_models([1])
+        patch.setattr(error_statistics, "_SECONDS", 30.0)
+        models = error_statistics.compare_error_models([1])
     return ErrorModelComparison(models, rows, "harness bench physics --truth", LIMIT_M, MERGE_S, SEGMENT_S)
 
 

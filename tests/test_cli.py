@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from harness.cli import build_parser, main
-from harness.commands.common import repeat_flags
+from harness.commands.flags import repeat_flags
 from harness.commands.run import _named_methods
 from harness.reconstruct import registry
+from tests.command import Command
 from tests.short_demo import short_demo
 
 
@@ -24,11 +25,8 @@ def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["--help"])
-    assert ended.value.code == 0
-    text = capsys.readouterr().out
+def test_help_names_every_verb(command: Command) -> None:
+    text = command("--help").out
     verbs = "demo run list inspect mocap export report plot table check bench doctor"
     verbs += " paper compare baseline sweep status placement"
     for verb in verbs.split():
@@ -133,7 +131,7 @@ def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
     "verb", ["emulate demo --pty link", "live --port none --scenario demo", "record sim:demo a.rec", "run demo"]
 )
 def test_ctrl_c_while_a_verb_starts_is_an_interrupt_also_where_it_is_the_normal_end(
-    verb: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    verb: str, monkeypatch: pytest.MonkeyPatch, command: Command, tmp_path: Path
 ) -> None:
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
@@ -141,8 +139,7 @@ def test_ctrl_c_while_a_verb_starts_is_an_interrupt_also_where_it_is_the_normal_
     monkeypatch.chdir(tmp_path)
     for where in ("harness.experiment.playback.prepare_playback", "harness.experiment.engine.run"):
         monkeypatch.setattr(where, interrupted)
-    assert main(verb.split()) == 130
-    said = capsys.readouterr()
+    said = command(*verb.split(), code=130)
     assert "stopped" in said.out + said.err
 
 

@@ -12,12 +12,14 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
 from harness.cli import main
-from harness.commands import ending
+from harness.commands import output
 from harness.errors import Outcome
+from tests.command import Command
 from tests.interrupts import heeding_interrupts
 from tests.planted import Plan, planted_run
 from tests.short_demo import short_demo
@@ -64,6 +66,23 @@ def assert_failed(ended: subprocess.CompletedProcess[str], cause: str) -> str:
     assert found, line
     assert "Traceback (most recent call last)" in Path(found.group(1)).read_text()
     return line
+
+
+def failing(fault: BaseException) -> Callable[..., NoReturn]:
+    """A function that raises this."""
+
+    def fail(*given: object, **named: object) -> NoReturn:
+        raise fault
+
+    return fail
+
+
+def start(verb: str, before: str, cwd: Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """The program's own entry, after some lines of code that change what it meets."""
+    code = f"import sys\nimport harness.__main__ as program\n{before}\nsys.argv = ['harness', {verb!r}]\n"
+    return subprocess.run(
+        [sys.executable, "-c", f"{code}sys.exit(program.main())"], cwd=cwd, capture_output=True, text=True, **options
+    )
 
 
 def test_the_word_and_the_code_of_a_fault_are_no_verdict() -> None:
@@ -132,22 +151,20 @@ def test_a_full_disk_ends_a_run_which_goes_on_later(jobs: str, tmp_path: Path) -
 
 
 def test_a_folder_that_cannot_be_written_is_a_fault_and_a_file_in_its_place_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     short_demo(tmp_path / "short.toml")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
     words = ["run", "short.toml", "--methods", "mean_pose", "--no-report", "--out"]
-    assert main([*words, "file"]) == 2
-    assert main([*words, "file/below"]) == 2
-    capsys.readouterr()
+    command(*words, "file", code=2)
+    command(*words, "file/below", code=2)
 
     def refuse(path: Path, *given: object, **named: object) -> None:
         raise OSError(30, "Read-only file system", str(path))
 
     monkeypatch.setattr(Path, "mkdir", refuse)
-    assert main([*words, "new"]) == 5
-    said = capsys.readouterr()
+    said = command(*words, "new", code=5)
     assert said.out == "failed\n"
     assert "Read-only file system (new)" in said.err
     assert "Name a place that can be written" in said.err
@@ -177,17 +194,12 @@ def test_a_folder_that_vanishes_is_named(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_defect_of_the_program_is_a_fault(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    def fail(**options: object) -> None:
-        raise TypeError("two\nlines " + 1000 * "x")
-
-    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
+def test_a_defect_of_the_program_is_a_fault(monkeypatch: pytest.MonkeyPatch, command: Command, tmp_path: Path) -> None:
+    fault = TypeError("two\nlines " + 1000 * "x")
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", failing(fault))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    assert main(["list", "--json"]) == 5
-    said = capsys.readouterr()
+    said = command("list", "--json", code=5)
     assert json.loads(said.out)["outcome"] == "failed"
     assert said.err.count("\n") == 1
     assert "a defect of the program (TypeError: two lines xxx" in said.err
@@ -197,38 +209,21 @@ def test_a_defect_of_the_program_is_a_fault(
     assert "TypeError: two\nlines" in saved.read_text()
 
 
-def test_a_part_that_asks_to_exit_does_not_choose_the_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("fault", "broken", "told"),
+    [
+        (SystemExit(1), "", "asked to exit with 1"),
+        (BrokenPipeError(32, "Broken pipe"), "", "Broken pipe"),  # inside the program: no reader who left
+        (OSError(28, "No space left on device"), "mkstemp", "(the traceback could not be saved (No space left"),
+    ],
+)
+def test_a_fault_inside_the_program_chooses_neither_code_nor_silence(
+    fault: BaseException, broken: str, told: str, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
-    def leave(**options: object) -> None:
-        sys.exit(1)
-
-    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", leave)
-    assert main(["list"]) == 5
-    assert "asked to exit with 1" in capsys.readouterr().err
-
-
-def test_a_traceback_that_cannot_be_saved_is_said(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def fail(*given: object, **named: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
-    monkeypatch.setattr(tempfile, "mkstemp", fail)
-    assert main(["list"]) == 5
-    assert "(the traceback could not be saved (No space left on device))" in capsys.readouterr().err
-
-
-def test_a_broken_pipe_inside_the_program_is_no_reader_who_left(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def fail(**options: object) -> None:
-        raise BrokenPipeError(32, "Broken pipe")
-
-    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
-    assert main(["list"]) == 5
-    assert "Broken pipe" in capsys.readouterr().err
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", failing(fault))
+    if broken:
+        monkeypatch.setattr(tempfile, broken, failing(fault))
+    assert told in command("list", code=5).err
 
 
 def test_a_full_disk_ends_a_recording_and_keeps_what_came_before(tmp_path: Path) -> None:
@@ -240,24 +235,20 @@ def test_a_full_disk_ends_a_recording_and_keeps_what_came_before(tmp_path: Path)
 
 
 def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     from harness.compare import baseline
 
     planted_run(tmp_path / "run", PLAN)
     monkeypatch.chdir(tmp_path)
-    assert main(["baseline", "save", "one", "run"]) == 0
+    command("baseline", "save", "one", "run")
     folder = tmp_path / "results" / "baselines"
     before = {path.name: path.read_bytes() for path in (folder / "one").iterdir()}
 
-    def fail(*given: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(baseline, "move_into_place", fail)
-    assert main(["baseline", "save", "one", "run", "--force"]) == 5
+    monkeypatch.setattr(baseline, "move_into_place", failing(OSError(28, "No space left on device")))
+    assert "Free some disk space" in command("baseline", "save", "one", "run", "--force", code=5).err
     assert {path.name: path.read_bytes() for path in (folder / "one").iterdir()} == before
     assert [path.name for path in folder.iterdir()] == ["one"]
-    assert "Free some disk space" in capsys.readouterr().err
 
 
 def test_a_folder_that_is_read_only_can_be_looked_at(tmp_path: Path) -> None:
@@ -277,57 +268,32 @@ def test_a_folder_that_is_read_only_can_be_looked_at(tmp_path: Path) -> None:
 
 
 def test_data_are_printed_whole(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ending.print_data("a\n")
+    assert output.print_data("a\n")
     assert capsys.readouterr().out == "a\n"
 
 
 def test_a_thread_that_hangs_does_not_keep_the_program(tmp_path: Path) -> None:
     """Signals are ignored after the last line, so nothing else could end it."""
-    code = (
-        "import sys, threading, time\n"
-        "import harness.__main__ as program\n"
-        "program.END_S = 0.5\n"
-        "threading.Thread(target=time.sleep, args=(600.0,)).start()\n"
-        "sys.argv = ['harness', 'lst']\n"
-        "sys.exit(program.main())\n"
-    )
-    ended = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120.0)
+    hang = "import threading, time\nprogram.END_S = 0.5\nthreading.Thread(target=time.sleep, args=(600.0,)).start()"
+    ended = start("lst", hang, tmp_path, timeout=120.0)
     assert (ended.returncode, ended.stdout) == (2, "refused\n")
 
 
 def test_a_broken_installation_is_a_fault(tmp_path: Path) -> None:
-    code = (
-        "import sys\n"
-        "import harness.__main__ as program\n"
-        "sys.modules['harness.cli'] = None\n"
-        "sys.argv = ['harness', 'list']\n"
-        "sys.exit(program.main())\n"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={**os.environ, "TMPDIR": str(tmp_path)},
-        capture_output=True,
-        text=True,
-    )
+    ended = start("list", "sys.modules['harness.cli'] = None", tmp_path, env={**os.environ, "TMPDIR": str(tmp_path)})
     assert_failed(ended, "a defect of the program (ModuleNotFoundError")
     assert ended.stdout == "failed\n"
 
 
 def test_ctrl_c_while_the_program_loads_prints_nothing(tmp_path: Path) -> None:
     """It was a traceback of the imports until the signals were handled."""
-    code = (
-        "import os, signal, sys\n"
-        "import harness.__main__ as program\n"
+    stop = (
+        "import os, signal\n"
         "class Interrupted:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
         "        if name == 'harness.core.interrupts':\n"
         "            os.kill(os.getpid(), signal.SIGINT)\n"
-        "sys.meta_path.insert(0, Interrupted())\n"
-        "sys.argv = ['harness', 'list']\n"
-        "sys.exit(program.main())\n"
+        "sys.meta_path.insert(0, Interrupted())"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, preexec_fn=heeding_interrupts
-    )
+    ended = start("list", stop, tmp_path, preexec_fn=heeding_interrupts)
     assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")

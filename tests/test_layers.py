@@ -45,7 +45,7 @@ USES_MUJOCO = {"body", "simulate", "bench"}
 RENAMES_FILES = {
     "core/files.py": "the atomic writers",
     "compare/baseline.py": "puts an old baseline aside before a new one takes its place",
-    "live/incremental_file.py": "appends to a file, which takes its place with the first frame",
+    "live/file_outputs.py": "appends to a file, which takes its place with the first frame",
     "stream/recording/recording.py": "appends to a recording",
 }
 """Files that may call os.replace, os.rename or os.fsync, and why."""

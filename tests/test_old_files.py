@@ -20,12 +20,13 @@ from harness.measure.unit_file import read_unit_file
 from harness.results.findings import read_findings
 from harness.results.placement_findings import read_placement
 from harness.results.reader import load_results
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.study.papers.paper_study import open_study
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
+from tests.command import Command
 
 ARCHIVE = Path(__file__).parent / "old_files" / "23b301b7.tar.xz"
 PLAN_DIGEST = "269190c444c3be8bc1188b42a66241bbcbd133ec0ded2d66d79586bcfb948b14"
@@ -63,14 +64,12 @@ def test_the_frames_of_a_run(old: Path) -> None:
     assert main(["status", "run"]) == Outcome.PASS.exit_code
 
 
-def test_a_run_is_printed_and_compared_as_it_was(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_is_printed_and_compared_as_it_was(old: Path, command: Command) -> None:
     baselines = old / "results" / "baselines"
     baselines.mkdir(parents=True)
     shutil.copytree("baseline", baselines / "old_run")
-    assert main(["compare", "old_run", "run"]) == Outcome.PASS.exit_code
-    capsys.readouterr()
-    assert main(["table", "run", "--format", "csv"]) == Outcome.PASS.exit_code
-    printed = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    command("compare", "old_run", "run")
+    printed = list(csv.DictReader(command("table", "run", "--format", "csv").lines))
     with open("table.csv", encoding="utf-8", newline="") as file:
         stored = list(csv.DictReader(file))
     assert (
@@ -190,8 +189,10 @@ def test_a_paper(old: Path) -> None:
 
 
 def test_a_placement_study(old: Path) -> None:
-    best = read_placement(Path("placement/findings.json")).best[0]
-    assert (best.stations, best.ties) == (("pelvis",), (("hand",),))
+    findings = read_placement(Path("placement/findings.json"))
+    best = findings.best[0]
+    assert (best.stations, best.ties, best.selection_stability) == (("pelvis",), (("hand",),), 1.0)
+    assert findings.contributions  # its key was called worth
     assert main(["status", "placement"]) == Outcome.PASS.exit_code
 
 

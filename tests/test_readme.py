@@ -58,6 +58,14 @@ def test_the_documented_method_runs_beside_the_others(tmp_path: Path, monkeypatc
     assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
+
+
+@pytest.mark.long
+def test_the_documented_method_passes_the_contract(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the very command."""
+    (tmp_path / "upright.py").write_text(re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)[0])
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
     assert main(shlex.split(next(c for c in commands(OWN_METHOD) if c.startswith("check ")))) == 0
 
 
@@ -214,10 +222,8 @@ def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
 def test_the_results_format_names_every_column(tmp_path: Path) -> None:
     text = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("results-format.md", "metrics.md"))
     out = tmp_path / "run"
-    assert (
-        main(["run", str(short_demo(tmp_path / "demo")), "--methods", "mean_pose", "--no-report", "--out", str(out)])
-        == 0
-    )
+    scenario = str(short_demo(tmp_path / "demo"))
+    assert main(["run", scenario, "--methods", "mean_pose", "--no-report", "--out", str(out)]) == 0
     header = (out / "summary.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
     (cell, *_) = (out / "cells").iterdir()
     with np.load(cell / "frames.npz") as arrays:

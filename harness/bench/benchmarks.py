@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
 from harness.bench.lab.speed import bench_lab
+from harness.bench.methods import bench_methods
 from harness.bench.neighbour_search import bench_index
 from harness.bench.performers import NoLibrary, bench_performers
 from harness.bench.physics.speed import bench_physics
@@ -17,29 +18,10 @@ from harness.errors import BadInput, MissingExtra, UnknownName
 from harness.results.benchmark_statement import BenchmarkStatement
 
 
-def _index(seed: int, large: bool, runs: int) -> list[BenchmarkStatement]:
-    if find_spec("faiss") is None:
-        raise MissingExtra("The reference for the search of neighbours", "faiss-cpu", "bench")
-    return bench_index(seed)
-
-
 def _ik(seed: int, large: bool, runs: int) -> list[BenchmarkStatement]:
-    _require_mink()
-    from harness.bench.ik import bench_ik
+    from harness.bench.ik import bench_ik  # it imports mink
 
     return bench_ik(seed)
-
-
-def _methods(seed: int, large: bool, runs: int) -> list[BenchmarkStatement]:
-    _require_mink()
-    from harness.bench.methods import bench_methods
-
-    return bench_methods(seed, large=large)
-
-
-def _require_mink() -> None:
-    if find_spec("mink") is None:
-        raise MissingExtra("The reference for inverse kinematics", "mink", "bench")
 
 
 BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkStatement]]] = {
@@ -49,14 +31,18 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkStatement]]] = {
     "lab": lambda seed, large, runs: bench_lab(seed),
     "wire": lambda seed, large, runs: bench_wire(seed, large=large, runs=runs),
     "ik": _ik,
-    "index": _index,
-    "methods": _methods,
+    "index": lambda seed, large, runs: bench_index(seed),
+    "methods": lambda seed, large, runs: bench_methods(seed, large=large),
     "outliers": lambda seed, large, runs: bench_rejected_readings(seed),
     "gate": lambda seed, large, runs: bench_regression_gate(seed),
     "sweep": lambda seed, large, runs: bench_sweep(seed),
     "performers": lambda seed, large, runs: bench_performers(seed),
 }
-
+_REFERENCES = {
+    "index": ("faiss", "The reference for the search of neighbours", "faiss-cpu"),
+    **dict.fromkeys(("ik", "methods"), ("mink", "The reference for inverse kinematics", "mink")),
+}
+"""Benchmark -> the module of its reference, what it is, and its package."""
 
 ALONE = ("accuracy", "ranking")
 """Benchmarks that run alone, with options of their own."""
@@ -91,6 +77,8 @@ def run_benchmarks(
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
+            if name in _REFERENCES and find_spec(_REFERENCES[name][0]) is None:
+                raise MissingExtra(*_REFERENCES[name][1:], "bench")
             rows += BENCHMARKS[name](seed, large, runs)
         except (MissingExtra, NoLibrary) as missing:
             if names:

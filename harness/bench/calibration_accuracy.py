@@ -4,20 +4,19 @@ Errors against the truth stand next to the Cramér-Rao bound and to the errors o
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from harness.bench.common import MOUNTS
 from harness.body.humanoid import build_body
-from harness.body.mounts import DEFAULT_MOUNTS, Mount
 from harness.calibrate.hold import UnusableHold
 from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
 from harness.calibrate.poses import POSES, configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats
-from harness.core.humanoid24 import standard_skeleton
+from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressCallback
 from harness.core.seeds import generator
@@ -25,50 +24,32 @@ from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.library import LibraryFolders
-from harness.mocap.skeletons import read_skeletons
-from harness.mocap.sources import POPULATION_SIZE
+from harness.mocap.sources import POPULATION_SIZE, read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.simulate import noise as noises
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.held_poses import hold_poses, hold_times_s
-from harness.simulate.mounting import perturb_mounts
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
-"""Stations of the first paper (Liu et al. 2011)."""
 HOLD_S, MOVE_S, HOLD_MARGIN_S = 3.0, 1.5, 0.2
 """Duration of a hold, of the move to the next, and of the margin that is left out at both ends of a hold [s]."""
 MOUNT_OFFSET_SD_M = 0.01
 """Standard deviation of the mounts' offset on each axis [m]. The orientation of a tracker is arbitrary."""
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationErrors:
-    """Calibration errors of one performer; N bones, S stations."""
+CalibrationErrors = Mapping[str, Floats]
+"""Errors of the calibration of one performer with N bones and S stations, by name:
 
-    length_m: Floats
-    """(N,) errors of bone lengths [m]."""
-    length_sd_m: Floats
-    """(N,) Cramér-Rao bound of the bone lengths [m]."""
-    from_prior: Bools
-    """(N,) whether the length comes from the prior instead of the trackers."""
-    mean_m: Floats
-    """(N,) errors of the mean skeleton of other people [m]."""
-    mount_m: Floats
-    """(S,) errors of mounts in the frames of the bones that carry the trackers [m]."""
-    elbow_m: Floats
-    """(S,) the same errors, for trackers on wrists measured from the elbow [m].
-
-    The joint between radius and wrist turns about their common line. No tracker observes its place on that line.
-    """
-    mount_sd_m: Floats
-    """(S,) Cramér-Rao bound of `mount_m` [m]."""
-    turn_rad: Floats
-    """(S,) errors of the mounts' orientation [rad]."""
-    turn_sd_rad: Floats
-    """(S,) Cramér-Rao bound of `turn_rad` [rad]."""
-    miss_rad: float
-    """Estimated standard deviation of the angles by which poses were missed [rad]."""
+- length_m (N,): errors of bone lengths; length_sd_m: their Cramér-Rao bound; mean_m: errors of the mean skeleton of
+  other people [m];
+- from_prior (N,): whether the length comes from the prior instead of the trackers;
+- mount_m (S,): errors of mounts in the frames of the bones that carry the trackers; mount_sd_m: their bound [m];
+- elbow_m (S,): the same errors, for trackers on wrists measured from the elbow [m]. The joint between radius and wrist
+  turns about their common line. No tracker observes its place on that line;
+- turn_rad (S,): errors of the mounts' orientation; turn_sd_rad: their bound [rad];
+- miss_rad (): estimated standard deviation of the angles by which poses were missed [rad].
+"""
 
 
 @dataclass(frozen=True)
@@ -122,26 +103,16 @@ class CalibrationAccuracy:
         """
         if not self.done:
             return []
-        off, bound, mean, prior, mount, mount_sd, elbow, turn, turn_sd = (
-            np.array([getattr(errors, field) for errors in self.done])
-            for field in (
-                *("length_m", "length_sd_m", "mean_m", "from_prior"),
-                *("mount_m", "mount_sd_m", "elbow_m", "turn_rad", "turn_sd_rad"),
-            )
-        )
-        whole = np.ones(off.shape, dtype=bool)
-        kinds = ("bone lengths", whole), ("determined by trackers", ~prior), ("from the prior", prior)
-        lengths = [
-            _error_statistics(what, "mm", *(1e3 * x[kept] for x in (off, bound, mean)))
-            for what, kept in kinds
-            if kept.any()
-        ]
-        none = np.full(mount.shape, np.nan)
+        of = {name: np.array([errors[name] for errors in self.done]) for name in self.done[0]}
+        lengths = [1e3 * of[name] for name in ("length_m", "length_sd_m", "mean_m")]
+        prior, none = of["from_prior"], np.full(of["mount_m"].shape, np.nan)
+        kinds = ("bone lengths", prior | ~prior), ("determined by trackers", ~prior), ("from the prior", prior)
+        turned = np.rad2deg(of["turn_rad"]), np.rad2deg(of["turn_sd_rad"])
         return [
-            *lengths,
-            _error_statistics("mounts", "mm", 1e3 * mount, 1e3 * mount_sd, none),
-            _error_statistics("mounts, wrists from the elbow", "mm", 1e3 * elbow, none, none),
-            _error_statistics("mounts turned", "deg", np.rad2deg(turn), np.rad2deg(turn_sd), none),
+            *(_error_statistics(what, "mm", *(x[kept] for x in lengths)) for what, kept in kinds if kept.any()),
+            _error_statistics("mounts", "mm", 1e3 * of["mount_m"], 1e3 * of["mount_sd_m"], none),
+            _error_statistics("mounts, wrists from the elbow", "mm", 1e3 * of["elbow_m"], none, none),
+            _error_statistics("mounts turned", "deg", *turned, none),
         ]
 
     def as_dict(self) -> dict[str, object]:
@@ -152,7 +123,7 @@ class CalibrationAccuracy:
             "bones_of": self.source,
             "noise": self.noise,
             "miss_deg": float(np.rad2deg(self.miss_rad)),
-            "miss_found_deg": [float(np.rad2deg(errors.miss_rad)) for errors in self.done],
+            "miss_found_deg": [float(np.rad2deg(errors["miss_rad"])) for errors in self.done],
             "seconds": list(self.seconds),
             "errors": {spread.what: spread.as_dict() for spread in self.spreads()},
         }
@@ -162,7 +133,7 @@ class CalibrationAccuracy:
         lines = [f"{len(self.seconds)} performers, bones learnt from {self.source}"]
         lines += [f"noise {self.noise!r}, poses missed by {np.rad2deg(self.miss_rad):.2f} deg"]
         if self.done:
-            found = np.rad2deg([errors.miss_rad for errors in self.done])
+            found = np.rad2deg([errors["miss_rad"] for errors in self.done])
             lines[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
         table = Table(TABLE_HEADER, [spread.row() for spread in self.spreads()])
         return [
@@ -179,25 +150,19 @@ def measure_calibration_accuracy(
     noise: str = "default",
     seed: int = 1,
     folder: LibraryFolders | None = None,
-    own_directions: bool = True,
-    beside_m: float = MOUNT_OFFSET_SD_M,
-    stations: Sequence[str] = STATIONS,
     progress: ProgressCallback = lambda name, done, planned: None,
 ) -> CalibrationAccuracy:
     """Measure calibration errors of `count` performers, each with a prior on bone lengths from other people.
 
-    Performers are drawn from the built-in population, or are the subjects of the ASF files below `folder`. Without
-    `own_directions` their bones keep their lengths but point as the standard skeleton's. BadInput, BadFile,
-    UnknownName.
+    Performers are drawn from the built-in population, or are the subjects of the ASF files below `folder`. BadInput,
+    BadFile, UnknownName.
     """
     done, refused, seconds = [], {}, []
-    for number, (name, skeleton, space) in enumerate(people := _performers(count, folder), 1):
-        own = skeleton if own_directions else _with_standard_directions(skeleton)
-        mounts = [DEFAULT_MOUNTS[station] for station in stations]
-        session = _session(f"{number} {name}", own, mounts, noise, seed, beside_m)
+    for number, (name, own, space) in enumerate(people := _performers(count, folder), 1):
+        session = _session(f"{number} {name}", own, noise, seed)
         frames, began_s = simulate_pose_holds(session, miss_rad), time.process_time()
         try:
-            done.append(_calibration_errors(calibrate_poses(frames, space, mounts), session))
+            done.append(_calibration_errors(calibrate_poses(frames, space, MOUNTS), session))
         except UnusableHold as error:
             refused[session.name] = str(error)
         seconds.append(time.process_time() - began_s)
@@ -238,12 +203,10 @@ def _bone_space_without(known: Mapping[str, Skeleton], name: str) -> SkeletonPri
     return fit_skeleton_prior(others, source=f"the {len(others)} other people of the library")
 
 
-def _session(
-    name: str, own: Skeleton, mounts: Sequence[Mount], noise: str, seed: int, beside_m: float
-) -> TrackerSession:
-    worn = perturb_mounts(mounts, beside_m=beside_m, turned_rad=np.pi, seed=seed, session=name)
+def _session(name: str, own: Skeleton, noise: str, seed: int) -> TrackerSession:
+    worn = perturb_mounts(MOUNTS, beside_m=MOUNT_OFFSET_SD_M, turned_rad=np.pi, seed=seed, session=name)
     tracker = TrackerConfig(slot_s=0.0) if noise == "clean" else TrackerConfig()
-    return TrackerSession(name, seed, build_body(own), tuple(mounts), worn, tracker, noises.noise_preset(noise))
+    return TrackerSession(name, seed, build_body(own), MOUNTS, worn, tracker, noises.noise_preset(noise))
 
 
 def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> CalibrationErrors:
@@ -254,24 +217,18 @@ def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> Cali
         if bone in ("lwrist", "rwrist"):
             radius = own.index(f"{bone[0]}radius")
             elbow_m[row] += found.skeleton.bone_m[radius] - own.bone_m[radius]
-    return CalibrationErrors(
-        length_m=found.skeleton.length_m - own.length_m,
-        length_sd_m=found.length_sd_m,
-        from_prior=found.from_prior,
-        mean_m=found.mean_m - own.length_m,
-        mount_m=np.linalg.norm(off_m, axis=1),
-        elbow_m=np.linalg.norm(elbow_m, axis=1),
-        mount_sd_m=found.mount_sd_m,
-        turn_rad=rotations.angle_between_rad(known.bone_from_station, true.bone_from_station),
-        turn_sd_rad=found.mount_sd_rad,
-        miss_rad=found.hinge_error_rad,
-    )
-
-
-def _with_standard_directions(skeleton: Skeleton) -> Skeleton:
-    """A skeleton with the same bone lengths and the standard skeleton's bone directions."""
-    standard = standard_skeleton()
-    return skeleton.with_bones(standard.bone_m * (skeleton.length_m / standard.length_m)[:, None])
+    return {
+        "length_m": found.skeleton.length_m - own.length_m,
+        "length_sd_m": found.length_sd_m,
+        "from_prior": found.from_prior,
+        "mean_m": found.mean_m - own.length_m,
+        "mount_m": np.linalg.norm(off_m, axis=1),
+        "elbow_m": np.linalg.norm(elbow_m, axis=1),
+        "mount_sd_m": found.mount_sd_m,
+        "turn_rad": rotations.angle_between_rad(known.bone_from_station, true.bone_from_station),
+        "turn_sd_rad": found.mount_sd_rad,
+        "miss_rad": np.asarray(found.hinge_error_rad),
+    }
 
 
 def _error_statistics(what: str, unit: str, off: Floats, bound: Floats, mean: Floats) -> ErrorStatistics:

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body import humanoid, mounts
+from harness.bench.common import MOUNTS, world_calibration
+from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
@@ -26,8 +27,8 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
-from harness.core.plain_import import plain_import
 from harness.core.seeds import generator
+from harness.core.working_folder import plain_import
 from harness.experiment.round_robin_timing import MethodTimings, TimedStep, take_turns
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import Ik
@@ -40,7 +41,6 @@ from harness.stream.frame import TrackerFrame
 with plain_import():
     import mink
 
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 RATE_HZ = 40.0
 NOISE_M, NOISE_RAD = 0.75e-3, float(np.deg2rad(0.05))
 """Standard deviation of white noise per record, as in noise preset `default`."""
@@ -97,18 +97,8 @@ def make_case(seed: int, frames: int) -> IKBenchmarkCase:
     """Make a synthetic walk and noisy readings of it in the world frame."""
     performer = synthetic.performer_names()[0]
     clip = synthetic.generate("walking", performer, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
-    stations = tuple(mounts.DEFAULT_MOUNTS[station] for station in STATIONS)
-    body = humanoid.build_body(clip.skeleton, stations)
-    on_bones = [mounts.locate_mount(body.skeleton, mount) for mount in stations]
-    calibration = Calibration(
-        "exact",
-        STATIONS,
-        tuple(mount.bone for mount in stations),
-        np.array([mount_m for mount_m, _ in on_bones]),
-        np.array([bone_from_station for _, bone_from_station in on_bones]),
-        rotations.IDENTITY,
-        np.zeros(3),
-    )
+    body = humanoid.build_body(clip.skeleton, MOUNTS)
+    calibration = world_calibration(body)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)[:frames]
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
     rng, kinematics = generator(seed, "bench", "ik"), Kinematics(body)
@@ -124,19 +114,10 @@ def _noisy_frame(
     kinematics.set(qpos)
     bones = [kinematics.body.skeleton.index(bone) for bone in calibration.bones]
     position_m, orientation = kinematics.station_poses(bones, calibration.mount_m, calibration.bone_from_station)
+    read_m = position_m + rng.normal(0.0, NOISE_M, position_m.shape)
+    turned = rotations.multiply(orientation, rotations.exp(rng.normal(0.0, NOISE_RAD, position_m.shape)))
     valid = np.ones(len(bones), bool)
-    return TrackerFrame(
-        received_s=time_s,
-        measured_s=np.full(len(bones), time_s),
-        position_m=position_m + rng.normal(0.0, NOISE_M, position_m.shape),
-        tracker_from_station=rotations.multiply(
-            orientation, rotations.exp(rng.normal(0.0, NOISE_RAD, position_m.shape))
-        ),
-        position_valid=valid,
-        orientation_valid=valid,
-        quality=np.ones(len(bones)),
-        suspect=~valid,
-    )
+    return TrackerFrame(time_s, np.full(len(bones), time_s), read_m, turned, valid, valid, np.ones(len(bones)), ~valid)
 
 
 def registered_ik(case: IKBenchmarkCase) -> TimedStep:

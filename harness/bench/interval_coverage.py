@@ -8,6 +8,7 @@ with a level that is expanded for few clips (Hesterberg 2015).
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special, stats
@@ -76,8 +77,7 @@ WORLDS = (
 """The differences are exponential, Student's t with 3 degrees of freedom, log-normal or zero, and whole numbers."""
 
 
-@dataclass(frozen=True)
-class Coverage:
+class Coverage(NamedTuple):
     """Shares of the studies of one world and number of units."""
 
     answered: float

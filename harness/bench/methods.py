@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.bench import neighbour_search
+from harness.bench.common import in_world
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
 from harness.bench.peak_memory import NO_METHOD, measure_peak_bytes
 from harness.body import humanoid
@@ -218,8 +219,7 @@ def _mink_contender(clip: BenchmarkClip) -> TimedStep:
 
     calibration = clip.simulation.calibration
     body = humanoid.build_body(trackers=mounts_of(load_scenario(benchmark_clips.DEFAULT_SCENARIO)))
-    in_world = replace(calibration, world_from_tracker=rotations.IDENTITY, tracker_origin_m=np.zeros(3))
-    solve = mink_solver(body, in_world)
+    solve = mink_solver(body, in_world(calibration))
 
     def timed_step(frame: TrackerFrame, previous_truth: Floats) -> tuple[Floats, float]:
         return solve(_to_world(frame, calibration), previous_truth)

@@ -9,16 +9,14 @@ equally. Exact search is the reference for recall; faiss's inverted file is meas
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from harness.body import humanoid, mounts
+from harness.bench.common import STATIONS, world_calibration
+from harness.body import humanoid
 from harness.body.humanoid import Body
-from harness.core import rotations
 from harness.core.arrays import Ints, Singles
-from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.experiment import benchmark_clips
@@ -32,7 +30,6 @@ from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 SIZES = (6_600, 66_000)
 QUERIES_PER_TURN, TURNS_PER_CLIP = 40, 2
 """Consecutive queries of a turn, and turns in each of five held-out takes."""
@@ -80,7 +77,7 @@ def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMo
 
 def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """The readings of six stations: `kernel_cca`, `weighted_blend`."""
-    calibration, queries = _exact_calibration(body), list[Singles]()
+    calibration, queries = world_calibration(body), list[Singles]()
     examples = ExampleFeatures(body, database, calibration, FeatureWeights(), "flat", NEIGHBOURS)
     for take in held_out:
         vectors = ExampleFeatures(
@@ -95,7 +92,7 @@ def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[Bod
 
 def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """The last poses and the readings of six stations: `local_pca`."""
-    method, calibration = LocalPca(), _exact_calibration(body)
+    method, calibration = LocalPca(), world_calibration(body)
 
     def vectors(source: MotionDatabase) -> Vectors:
         return method.fit_database(body, source, generator(0, "bench")).station_features(calibration)[1]
@@ -107,7 +104,7 @@ def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Seq
 def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """Features of poses and readings: `dynamic_map`."""
     method = DynamicMap()
-    regression = method.fit_database(body, database, generator(0, "bench")).regression(_exact_calibration(body))
+    regression = method.fit_database(body, database, generator(0, "bench")).regression(world_calibration(body))
     vectors = regression.search(np.ones(regression.size, bool), method.index, method.neighbours).vectors
     queries = [
         replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, with_successor=True))
@@ -125,25 +122,13 @@ def _single_motion_database(body: Body, take: BodyMotion) -> MotionDatabase:
     return MotionDatabase.build(body, [take])
 
 
-def _exact_calibration(body: Body) -> Calibration:
-    mount_poses = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in STATIONS]
-    return Calibration(
-        "exact",
-        STATIONS,
-        tuple(mounts.DEFAULT_MOUNTS[station].bone for station in STATIONS),
-        np.array([mount_m for mount_m, _ in mount_poses]),
-        np.array([bone_from_station for _, bone_from_station in mount_poses]),
-        rotations.IDENTITY,
-        np.zeros(3),
-    )
-
-
 def _compare_indexes(search: SearchProblem) -> list[BenchmarkStatement]:
     """Compare all indexes; exact search is the reference for recall and speed."""
     indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
     begin: dict[str, Callable[[], Lookup]] = {name: index.begin_search for name, index in indexes.items()}
     if len(search.vectors) > FLAT_MAX_VECTORS:
-        begin["faiss"] = partial(_stateless_lookup, FaissInvertedFile(search.vectors, search.count))
+        faiss = FaissInvertedFile(search.vectors, search.count)
+        begin["faiss"] = lambda: faiss  # an index without state is its own session
     seconds: dict[str, list[float]] = {name: [] for name in begin}
     hits: dict[str, list[float]] = {name: [] for name in begin}
     for queries in search.queries:
@@ -192,8 +177,3 @@ class FaissInvertedFile:
         """Rows and squared distances of the nearest vectors."""
         squared, rows = self._file.search(query[None], count)
         return rows[0], squared[0]
-
-
-def _stateless_lookup(index: Lookup) -> Lookup:
-    """An index without state is its own session."""
-    return index

@@ -10,10 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from harness.bench.common import MOUNTS, STATIONS, pose_all
 from harness.bench.cpu_time import time_cpu
-from harness.body import mounts, retargeting
-from harness.body.kinematics import Kinematics
-from harness.core.arrays import Floats
+from harness.body import retargeting
 from harness.mocap import synthetic
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.simulate import noise
@@ -23,17 +22,15 @@ from harness.stream.codec.reader import CaptureStream
 
 MAX_RATIO = 13.0
 """Most CPU time of a frame, relative to MuJoCo's kinematics of one pose: as strict as 20,000 frames/s was."""
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
 
 def bench_stream(seed: int = 1, repeats: int = 7) -> list[BenchmarkStatement]:
     """Shortest times of `repeats` turns; each turn is one take of 20 s for each part."""
     clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=seed)
     body, take = retargeting.retarget_to_own_body(clip)
-    stations = [mounts.DEFAULT_MOUNTS[station] for station in STATIONS]
 
     def simulate(preset: str) -> Simulation:
-        return simulate_tracker(body, take, stations, TrackerConfig(), noise.noise_preset(preset), seed=seed)
+        return simulate_tracker(body, take, MOUNTS, TrackerConfig(), noise.noise_preset(preset), seed=seed)
 
     simulation = simulate("default")
     parts: tuple[Callable[[], object], ...] = (
@@ -41,39 +38,24 @@ def bench_stream(seed: int = 1, repeats: int = 7) -> list[BenchmarkStatement]:
         lambda: simulate("clean"),
         lambda: list(CaptureStream(simulation.wire_format, simulation.wire)),
         lambda: _decode_capture(simulation),
-        lambda: _pose_all(Kinematics(body), simulation.truth_qpos),
+        lambda: pose_all(body, simulation.truth_qpos),
     )
     seconds = np.array([[time_cpu(part) for part in parts] for _ in range(repeats)])
     total_s, clean_s, frames_s, records_s, poses_s = np.min(seconds, axis=0).tolist()
     frames = len(simulation.frames)
+    rows = [
+        ("replay + noise + codec, six trackers", frames / total_s, f"without noise {frames / clean_s:.0f} frames/s"),
+        ("bytes into frames", frames / frames_s, f"{frames_s / total_s:.0%} of the total time"),
+    ]
+    records, ratio = frames * len(STATIONS) / records_s, total_s / poses_s
+    poses = f"{frames / poses_s:.0f} poses/s"
     return [
-        hold_to_limit(
-            "replay + noise + codec, six trackers",
-            frames / total_s,
-            "frames/s",
-            reference=f"without noise {frames / clean_s:.0f} frames/s",
-        ),
-        hold_to_limit(
-            "bytes into frames", frames / frames_s, "frames/s", reference=f"{frames_s / total_s:.0%} of the total time"
-        ),
-        hold_to_limit(
-            "bytes into records", frames * len(STATIONS) / records_s, "records/s", reference="the same bytes"
-        ),
-        hold_to_limit(
-            "a frame / bare kinematics of a pose",
-            total_s / poses_s,
-            "x",
-            most=MAX_RATIO,
-            reference=f"{frames / poses_s:.0f} poses/s",
-        ),
+        *(hold_to_limit(name, rate, "frames/s", reference=reference) for name, rate, reference in rows),
+        hold_to_limit("bytes into records", records, "records/s", reference="the same bytes"),
+        hold_to_limit("a frame / bare kinematics of a pose", ratio, "x", most=MAX_RATIO, reference=poses),
     ]
 
 
 def _decode_capture(simulation: Simulation) -> None:
     wire_format = simulation.wire_format
     Decoder(dict.fromkeys(wire_format.characters, wire_format.items)).feed(simulation.wire.data)
-
-
-def _pose_all(kinematics: Kinematics, poses: Floats) -> None:
-    for qpos in poses:
-        kinematics.set(qpos)

@@ -17,16 +17,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
-from harness.bench.wire_cases import CASES, CLIP, SCENARIO, WireCase
+from harness.bench.wire_device import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
 from harness.experiment.playback import prepare_playback
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
-from harness.stream.codec import ascii_records
 from harness.stream.codec.decoder import Decoder
 from harness.stream.codec.items import STATION_CHARACTERS, record_type
 from harness.stream.codec.reader import FrameReader
-from harness.stream.codec.records import RecordFormat
+from harness.stream.codec.records import RecordFormat, format_records
 
 METHOD = "expert_map"
 SECONDS, LONG_S = 15.0, 600.0
@@ -72,7 +71,7 @@ def _decoding_rows(seed: int, repeats: int) -> list[BenchmarkStatement]:
     wire, items = playback.wire_format, playback.wire_format.items
     binary = playback.wire.data * 10
     table = np.frombuffer(binary, record_type(items))
-    text = ascii_records.format_records(items, table)
+    text = format_records(items, table)
     records = [playback.wire.data[at : at + table.itemsize] for at in range(0, len(playback.wire.data), table.itemsize)]
     lists = dict.fromkeys(wire.characters, items)
 

@@ -1,4 +1,4 @@
-"""An emulator in a process of its own that records when each record was due and when it was written.
+"""The lines of `harness bench wire`, and an emulator in a process of its own that notes when records are due and sent.
 
     python -m harness.bench.wire_device FILE SEED STATIONS RATE pty|tcp paced|unpaced PORT
 
@@ -8,14 +8,42 @@ share [s].
 """
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
 
 import numpy as np
 
-from harness.bench.wire_cases import CLIP, SCENARIO
 from harness.experiment.playback import prepare_playback
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, describe_list
 from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
+
+SCENARIO, CLIP = "demo", "boxing_p1_01"
+
+
+@dataclass(frozen=True)
+class WireCase:
+    """Number of stations and rate on one kind of line."""
+
+    stations: int
+    rate_hz: float
+    items: tuple[int, ...]
+    kind: str
+    """"pty" or "tcp"; a pty is paced at 115200 baud, TCP is not."""
+
+    @property
+    def name(self) -> str:
+        """The name in the table."""
+        line = "pty at 115200" if self.kind == "pty" else "TCP, unpaced"
+        return f"{self.rate_hz:g} Hz x {self.stations}, {describe_list(self.items)}, {line}"
+
+
+CASES = (
+    WireCase(4, 75.0, STANDARD_LIST, "pty"),
+    WireCase(6, 50.0, STANDARD_LIST, "pty"),
+    WireCase(4, 120.0, SHORT_LIST, "pty"),
+    WireCase(4, 120.0, STANDARD_LIST, "tcp"),
+)
 
 
 def main(file: str, seed: str, stations: str, rate_hz: str, kind: str, pace: str, port: str) -> None:
@@ -37,7 +65,7 @@ def main(file: str, seed: str, stations: str, rate_hz: str, kind: str, pace: str
         written_s=[sent.written_s for sent in same_length],
         unread=[sent.unread for sent in same_length],
         data=np.frombuffer(b"".join(sent.data for sent in same_length), np.uint8),
-        dropped=device.server.emulator.line.dropped,
+        dropped=device.emulator.line.dropped,
     )
 
 

@@ -8,14 +8,13 @@ choice, set by eye for a person with the mean CMU skeleton; they scale with the 
 and feet extend beyond their bones, whose far ends are joints (the ball of the foot, the knuckles).
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from harness.core import humanoid24, rotations
-from harness.core.arrays import Floats, freeze
-from harness.core.skeleton import Skeleton
+from harness.core.arrays import Floats
+from harness.core.skeleton import BodyGeom, Skeleton
 
 _STANDARD_MASS_KG = 74.2
 """BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.755 m."""
@@ -43,27 +42,6 @@ _TRUNK: tuple[tuple[str, str, float, float, tuple[float, float], tuple[float, fl
     ("head", "head", 0.0550, 0.75, (0.022, 0.0), (0.098, 0.077, 0.118)),
 )
 _HAND_SHARE, _FOOT_SHARE = 0.0061, 0.0137
-
-
-@dataclass(frozen=True, eq=False)
-class BodyGeom:
-    """One geom of the body, in the frame of its bone."""
-
-    bone: str
-    """Name of the bone, or "root"."""
-    name: str
-    kind: str
-    """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
-    centre_m: Floats
-    """(3,) [m]."""
-    bone_from_shape: Floats
-    """(4,) unit quaternion."""
-    size_m: Floats
-    """(3,) [m]; see `kind`."""
-    mass_kg: float
-
-    def __post_init__(self) -> None:
-        freeze(self, centre_m=(3,), bone_from_shape=(4,), size_m=(3,))
 
 
 def body_scale(skeleton: Skeleton) -> float:

@@ -11,8 +11,8 @@ from harness.body import anatomy, mounts
 from harness.core import humanoid24
 from harness.core.arrays import Floats, Ints, immutable
 from harness.core.package_data import data_folder
-from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.core.working_folder import plain_import
 from harness.errors import BadInput
 
 with plain_import():

@@ -8,8 +8,8 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.plain_import import plain_import
 from harness.core.skeleton import Pose, Skeleton, forward_kinematics
+from harness.core.working_folder import plain_import
 
 with plain_import():
     import mujoco

@@ -7,7 +7,7 @@ bone's direction: +90 deg faces down on a left arm, up on a right arm, right on 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -17,8 +17,8 @@ import numpy as np
 from harness.body import anatomy
 from harness.core import rotations
 from harness.core.arrays import Floats, immutable
-from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton
+from harness.core.working_folder import plain_import
 from harness.errors import BadInput
 
 with plain_import():
@@ -98,6 +98,12 @@ def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     offset_m = rotations.rotate(nominal, np.array(mount.offset_m))
     rotation = rotations.multiply(nominal, rotations.exp(np.array(mount.rotation_rad)))
     return immutable(axis_m + (skin_m + mount.stand_off_m) * outward + offset_m), immutable(rotation)
+
+
+def locate_mounts(skeleton: Skeleton, mounts: Sequence[Mount]) -> tuple[list[int], Floats, Floats]:
+    """Bones (S,) of stations, and their origins (S, 3) [m] and orientations (S, 4) in the frames of these."""
+    origins_m, turns = zip(*(locate_mount(skeleton, mount) for mount in mounts), strict=True)
+    return [skeleton.index(mount.bone) for mount in mounts], np.array(origins_m), np.array(turns)
 
 
 def _zero_direction(along: Floats) -> Floats:

@@ -11,8 +11,8 @@ import numpy as np
 from harness.body.anatomy import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.plain_import import plain_import
 from harness.core.skeleton import Skeleton
+from harness.core.working_folder import plain_import
 
 with plain_import():
     import pyvista as pv

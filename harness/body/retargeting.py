@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body import bone_directions, ground, humanoid
+from harness.body import ground, humanoid
 from harness.body.humanoid import Body
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Bools, Floats
 from harness.core.motion import BodyMotion, Clip
-from harness.core.skeleton import Pose, Skeleton
+from harness.core.skeleton import Pose, Skeleton, are_gimbal, equivalent_euler_angles, hinge_angles
 
 _LEGS = ("lfemur", "ltibia", "rfemur", "rtibia")
 
@@ -62,7 +62,7 @@ def retarget_to_common_body(clip: Clip, target: Skeleton) -> tuple[BodyMotion, R
     world_from_root = clip.world_from_root
     goal = _RetargetGoal.create(target, source, source_angles_rad, clip)
     qpos = humanoid24.pack(clip.root_m, world_from_root, source_angles_rad)
-    angles_rad = bone_directions.match_bone_directions(source, qpos, target)
+    angles_rad = match_bone_directions(source, qpos, target)
     world_from_bone = skeleton.world_rotations(target, world_from_root, angles_rad)
     pose = skeleton.pose_from_rotations(target, goal.root_m, world_from_bone)
     root_m = goal.root_m + _best_offset_m(goal.joints_m - pose.end_m, world_from_root)
@@ -181,3 +181,56 @@ def _leg_m(skeleton: Skeleton) -> float:
 
 def _body_motion(clip: Clip, qpos: Floats) -> BodyMotion:
     return BodyMotion(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz, qpos)
+
+
+def match_bone_directions(source: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
+    """Hinge angles (T, 48) with which the bones of `target` point as those of `source` do at `qpos` (T, 55) [rad].
+
+    Bones with the same direction in both rest poses keep their angles. A bone with three hinges is oriented exactly. A
+    bone with fewer hinges is oriented as closely as they allow, within the joint limits unless the source angle is
+    outside. Of equivalent angles, the one nearest to the source angle is chosen.
+    """
+    _, world_from_root, angles_rad = humanoid24.unpack(qpos)
+    source_rotation = skeleton.forward_kinematics(source, *humanoid24.unpack(qpos)).world_from_bone
+    root, limits_rad = rotations.to_matrix(world_from_root), humanoid24.limits_rad()
+    out, target_rotation = np.array(angles_rad), np.empty_like(source_rotation)
+    for bone, parent in enumerate(target.parents):
+        above = root if parent < 0 else target_rotation[:, parent]
+        dofs = target.dof_of_bone[bone]
+        start, axes = angles_rad[:, dofs], target.axes[dofs]
+        if len(axes):
+            rotation = source_rotation[:, bone] @ _shortest_rotation(target.bone_m[bone], source.bone_m[bone])
+            local = np.swapaxes(above, 1, 2) @ rotation
+            fitted = _nearest_euler_angles(axes, hinge_angles(axes, rotations.from_matrix(local)), start)
+            if len(axes) < 3:
+                low, high = limits_rad[dofs].T
+                fitted = np.clip(fitted, np.minimum(low, start), np.maximum(high, start))
+            out[:, dofs] = fitted
+        target_rotation[:, bone] = above @ skeleton.local_rotation(target, bone, out)
+    return out
+
+
+def _shortest_rotation(a: Floats, b: Floats) -> Floats:
+    """Shortest rotation (3, 3) of direction a to b, which are not opposite; the identity for a zero vector."""
+    lengths = np.sqrt((a @ a) * (b @ b))
+    if lengths == 0.0:
+        return np.eye(3)
+    half = np.concatenate([[1.0 + a @ b / lengths], np.cross(a, b) / lengths])
+    return rotations.to_matrix(half / np.sqrt(half @ half))
+
+
+def _nearest_euler_angles(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
+    """Angles (T, N) of the same rotations that are nearest to `near_rad` [rad]."""
+    first = _nearest_turn(angle_rad, near_rad)
+    if not are_gimbal(axes):
+        return first
+    second = _nearest_turn(equivalent_euler_angles(angle_rad), near_rad)
+    closer = np.sum((first - near_rad) ** 2, axis=1) <= np.sum((second - near_rad) ** 2, axis=1)
+    out: Floats = np.where(closer[:, None], first, second)
+    return out
+
+
+def _nearest_turn(angle_rad: Floats, near_rad: Floats) -> Floats:
+    """Angles with whole turns added, so that they lie within half a turn of `near_rad` [rad]."""
+    out: Floats = angle_rad - 2 * np.pi * np.round((angle_rad - near_rad) / (2 * np.pi))
+    return out

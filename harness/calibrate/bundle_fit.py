@@ -1,4 +1,4 @@
-"""Maximum a posteriori bones, mounts and poses of an eight-pose calibration.
+"""Maximum a posteriori bones, mounts and poses of an eight-pose calibration, and their Cramér-Rao bounds.
 
 Two scales are estimated rather than set: how far hinges miss the poses, and how far trackers sit from their nominal
 mounts. Both maximise the evidence of the readings (empirical Bayes; the fixed point of MacKay 1992, "Bayesian
@@ -38,7 +38,6 @@ class BundleFit:
     """(P,) error of the hinges in each pose, standard deviation [rad]."""
     heading_sd_rad: float
     """Standard deviation of the performer's heading in the first pose [rad]."""
-    rounds: int
 
 
 def fit_bundle(bundle: BundleAdjustment, position_sd_m: float, orientation_sd_rad: float) -> BundleFit:
@@ -63,11 +62,10 @@ def fit_bundle(bundle: BundleAdjustment, position_sd_m: float, orientation_sd_ra
             break
     normal = bundle.normal_equations(at, scales, weight)
     covariance, pose_variance = normal.variances()
-    pose_error_rad, heading_sd_rad = (
-        _pose_error_rad(bundle, at, scales, pose_variance),
-        float(np.sqrt(pose_variance[0, 5])),
-    )
-    return BundleFit(at, scales, weight, normal, covariance, pose_error_rad, heading_sd_rad, rounds)
+    squared_error = np.sum(bundle.pose_errors(at)[:, 2:] ** 2, axis=1)
+    pose_error_rad: Floats = np.sqrt(squared_error / _effective_hinges(scales, pose_variance))
+    heading_sd_rad = float(np.sqrt(pose_variance[0, 5]))
+    return BundleFit(at, scales, weight, normal, covariance, pose_error_rad, heading_sd_rad)
 
 
 def levenberg_marquardt_step(
@@ -104,13 +102,6 @@ def _likeliest_scales(
     )
 
 
-def _pose_error_rad(
-    bundle: BundleAdjustment, at: CalibrationSolution, scales: ResidualScales, pose_variance: Floats
-) -> Floats:
-    squared_error = bundle.pose_errors(at)[:, 2:] ** 2
-    return np.asarray(np.sqrt(np.sum(squared_error, axis=1) / _effective_hinges(scales, pose_variance)))
-
-
 def _effective_hinges(scales: ResidualScales, pose_variance: Floats) -> Floats:
     """(P,) effective number of hinges that the readings determine in each pose, from variances (P, 6 + H)."""
     return np.asarray(np.maximum(np.sum(1.0 - pose_variance[:, 6:] / scales.pose_error_rad**2, axis=1), 1.0))
@@ -124,3 +115,84 @@ def _weights(bundle: BundleAdjustment, at: CalibrationSolution, scales: Residual
     )
     counts = (T_DEGREES_OF_FREEDOM + 3.0) / (T_DEGREES_OF_FREEDOM + np.sum(off**2, axis=3))
     return np.asarray(np.minimum(counts, 1.0))
+
+
+_UNINFORMATIVE, _ROUNDING = 1e-4, 1e-10
+"""A combination of unknowns counts as undetermined if the readings' information is below this share of the prior's,
+or below this share of the largest eigenvalue (rounding)."""
+_UNKNOWN_MOUNT_SPREAD = 100.0
+"""Mount spread that stands for an uninformative prior of the mounts."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationUncertainty:
+    """Standard deviations and bounds of N bone lengths and S mounts."""
+
+    length_sd_m: Floats
+    """(N,) standard deviation of the lengths [m]: the Cramér-Rao bound with the prior of people's bones."""
+    length_bound_m: Floats
+    """(N,) the bound of unbiased estimators, without the prior [m]; infinite where the readings do not depend on it."""
+    variance_reduction: Floats
+    """(N,) share by which readings reduce the variance among people, without a prior of the mounts."""
+    mount_sd_m: Floats
+    """(S,) standard deviation of the mounts' positions, all axes together [m]."""
+    mount_sd_rad: Floats
+    """(S,) standard deviation of the mounts' orientations, all axes together [rad]."""
+    mount_bound_m: Floats
+    """(S,) bound of the positions without priors of bones and mounts [m]."""
+    mount_bound_rad: Floats
+    """(S,) bound of the orientations without these priors [rad]."""
+    condition: float
+    """Condition number of the whitened normal matrix."""
+
+
+def estimate_uncertainty(bundle: BundleAdjustment, fit: BundleFit) -> CalibrationUncertainty:
+    """Bounds from the normal equations at the solution, with pose errors marginalised."""
+    shared, at, scales = bundle.shared, fit.solution, fit.scales
+    _, slope = shared.prior_residuals(at, scales.mount_spread, scales.skin_offset_m)
+    information = fit.normal.information()
+    readings = information - slope.T @ slope
+    _, weak_slope = shared.prior_residuals(at, _UNKNOWN_MOUNT_SPREAD, scales.skin_offset_m)
+    lengths = shared.length_jacobian(at)
+    prior_m2 = np.diag(shared.space.covariance_m2)
+    scale = _prior_sd(slope)
+    sd, alone = fit.covariance, _inverse(readings, scale)
+    without_mounts = lengths @ np.linalg.inv(readings + weak_slope.T @ weak_slope) @ lengths.T
+    return CalibrationUncertainty(
+        length_sd_m=np.sqrt(np.diag(lengths @ sd @ lengths.T)),
+        length_bound_m=np.sqrt(_variance(lengths, alone, scale)),
+        variance_reduction=1.0 - np.diag(without_mounts) / prior_m2,
+        mount_sd_m=_total_sd(np.diag(sd)[shared.mount]),
+        mount_sd_rad=_total_sd(np.diag(sd)[shared.turn]),
+        mount_bound_m=_total_sd(_variance(np.eye(shared.count)[shared.mount], alone, scale)),
+        mount_bound_rad=_total_sd(_variance(np.eye(shared.count)[shared.turn], alone, scale)),
+        condition=float(np.linalg.cond(information * np.outer(scale, scale))),
+    )
+
+
+def _prior_sd(slope: Floats) -> Floats:
+    """(X,) prior standard deviation of each unknown, in its unit; 1 where there is no prior."""
+    information = np.sum(slope**2, axis=0)
+    return np.where(information > 0.0, 1.0 / np.sqrt(np.maximum(information, 1e-300)), 1.0)
+
+
+def _inverse(information: Floats, scale: Floats) -> tuple[Floats, Floats]:
+    """Pseudo-inverse (X, X) of an information matrix, and K undetermined directions (X, K)."""
+    value, vector = np.linalg.eigh(information * np.outer(scale, scale))
+    determined = value > max(_UNINFORMATIVE, _ROUNDING * float(value[-1]))
+    vector = vector * scale[:, None]
+    return (vector[:, determined] / value[determined]) @ vector[:, determined].T, vector[:, ~determined]
+
+
+def _variance(rows: Floats, alone: tuple[Floats, Floats], scale: Floats) -> Floats:
+    """(R,) variance of combinations (R, X); infinite for one with an undetermined part."""
+    covariance, undetermined = alone
+    variance: Floats = np.sum((rows @ covariance) * rows, axis=1)
+    part = np.sum((rows @ undetermined) ** 2, axis=1) / np.sum((rows * scale) ** 2, axis=1)
+    return np.where(part > 1e-4, np.inf, variance)
+
+
+def _total_sd(variance: Floats) -> Floats:
+    """(S,) root of the summed variances of three axes (3 S,)."""
+    out: Floats = np.sqrt(np.sum(variance.reshape(-1, 3), axis=1))
+    return out

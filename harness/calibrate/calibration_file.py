@@ -2,7 +2,7 @@
 
 Keys hold metres and unit quaternions (w, x, y, z). There is a table for each station, in the order of the stream's
 rows. The table `[diagnostics]` is information for people. The first line is a digest of all others
-(`core.toml_digest`).
+(`core.toml_file`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,11 +14,10 @@ import numpy as np
 
 from harness.core.calibration import Calibration
 from harness.core.fields import build
+from harness.core.files import write_output
 from harness.core.humanoid24 import BONES, standard_skeleton
-from harness.core.output_file import write_output
 from harness.core.skeleton import Skeleton
-from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
-from harness.core.toml_text import format_toml
+from harness.core.toml_file import EARLIER_SCHEMA, SCHEMA, format_toml, insert_toml_digest, read_digested_toml
 from harness.errors import BadFile, BadInput, HarnessError
 
 EXPECTED = "a calibration"

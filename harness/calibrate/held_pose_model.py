@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mount
+from harness.body.mounts import Mount, locate_mounts
 from harness.core import rotations
 from harness.core.arrays import Floats
 
@@ -49,11 +49,9 @@ class HeldPoseModel:
 
     def __init__(self, body: Body, mounts: Sequence[Mount], pose: Floats) -> None:
         kinematics = Kinematics(body)
-        bones = [body.skeleton.index(mount.bone) for mount in mounts]
-        placed = [locate_mount(body.skeleton, mount) for mount in mounts]
-        self.mount_m = np.array([mount_m for mount_m, _ in placed])
+        bones, self.mount_m, turn = locate_mounts(body.skeleton, mounts)
         kinematics.set(pose)
-        self.place_m, _ = kinematics.station_poses(bones, self.mount_m, np.array([turn for _, turn in placed]))
+        self.place_m, _ = kinematics.station_poses(bones, self.mount_m, turn)
         """(S, 3) nominal positions of the stations in the world [m]."""
         self.world_from_bone: Floats = kinematics.bone_poses()[1][bones]
         """(S, 4) orientations of the bones that carry the stations."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from harness.body.humanoid import Body, tpose
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mount
+from harness.body.mounts import Mount, locate_mounts
 from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.hold import measure_hold
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
@@ -67,12 +67,9 @@ def calibrate_kim2012(frames: Sequence[TrackerFrame], body: Body, mounts: Sequen
     """
     names, skeleton, kinematics = [mount.station for mount in mounts], body.skeleton, Kinematics(body)
     hold = measure_hold(frames, names)
-    placed = [locate_mount(skeleton, mount) for mount in mounts]
-    mount_m, bone_from_station = (np.array(part) for part in zip(*placed, strict=True))
+    bones, mount_m, bone_from_station = locate_mounts(skeleton, mounts)
     kinematics.set(tpose(skeleton))
-    joint_m, world_from_joint = kinematics.station_poses(
-        [skeleton.index(mount.bone) for mount in mounts], mount_m, bone_from_station
-    )
+    joint_m, world_from_joint = kinematics.station_poses(bones, mount_m, bone_from_station)
     level_m = rotations.rotate(LEVEL_FROM_TRACKER, hold.position_m)
     heading = rotations.about_z(heading_between_rad(level_m, joint_m))
     maps = SensorMaps(

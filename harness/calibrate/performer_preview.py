@@ -12,7 +12,7 @@ import numpy as np
 from harness.body import ground, kinematics
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mount
+from harness.body.mounts import Mount, locate_mounts
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame
@@ -43,10 +43,7 @@ class PerformerPreview:
         """`poses` (55,) are the wanted configurations, and those of the classifier."""
         self._body, self._poses, self._classifier = body, poses, classifier
         self._kinematics = Kinematics(body)
-        self._bones = [body.skeleton.index(mount.bone) for mount in mounts]
-        placed = [locate_mount(body.skeleton, mount) for mount in mounts]
-        self._mount_m = np.array([at_m for at_m, _ in placed])
-        self._turn = np.array([turned for _, turned in placed])
+        self._bones, self._mount_m, self._turn = locate_mounts(body.skeleton, mounts)
         self._last_m: Floats | None = None
 
     def estimate(self, pose: int, frame: TrackerFrame) -> PerformerPose | None:

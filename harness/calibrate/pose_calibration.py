@@ -15,14 +15,13 @@ import numpy as np
 
 from harness.body import ground, kinematics
 from harness.body.mounts import Mount
-from harness.calibrate import pose_checks, station_orientation
+from harness.calibrate import pose_checks
 from harness.calibrate.bundle_adjustment import BundleAdjustment
-from harness.calibrate.bundle_fit import BundleFit, fit_bundle
+from harness.calibrate.bundle_fit import BundleFit, CalibrationUncertainty, estimate_uncertainty, fit_bundle
 from harness.calibrate.hold import HoldReadings, measure_hold
 from harness.calibrate.poses import POSES, pose_angles_rad
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
-from harness.calibrate.uncertainty import CalibrationUncertainty, estimate_uncertainty
 from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Bools, Floats, freeze
@@ -40,8 +39,8 @@ _SD_PER_QUARTILE = 1.0 / 2.027
 
 
 @dataclass(frozen=True, eq=False)
-class PoseCalibration:
-    """Result of an eight-pose calibration; N bones, S stations, P poses."""
+class PoseCalibration(CalibrationUncertainty):
+    """Result of an eight-pose calibration with its uncertainty; N bones, S stations, P poses."""
 
     calibration: Calibration
     """Mounts and room, of kind `poses`."""
@@ -49,22 +48,8 @@ class PoseCalibration:
     """The performer's skeleton, with the standard body's hinges."""
     mean_m: Floats
     """(N,) bone lengths of the mean skeleton [m]."""
-    length_sd_m: Floats
-    """(N,) standard deviation of the lengths [m]: the Cramér-Rao bound with the prior of people's bones."""
-    length_bound_m: Floats
-    """(N,) the bound of unbiased estimators, without the prior [m]; infinite where the readings do not depend on it."""
-    variance_reduction: Floats
-    """(N,) share by which readings reduce the variance among people, with the prior of the mounts left out."""
     from_prior: Bools
-    """(N,) True where that share is below `LEAST_VARIANCE_REDUCTION`."""
-    mount_sd_m: Floats
-    """(S,) standard deviation of the mounts' positions, all axes together [m]."""
-    mount_sd_rad: Floats
-    """(S,) standard deviation of the mounts' orientations, all axes together [rad]."""
-    mount_bound_m: Floats
-    """(S,) bound of the positions without priors of bones and mounts [m]."""
-    mount_bound_rad: Floats
-    """(S,) bound of the orientations without these priors [rad]."""
+    """(N,) True where `variance_reduction` is below `LEAST_VARIANCE_REDUCTION`."""
     residual_m: Floats
     """(S,) root mean square position residual over the poses [m]."""
     residual_rad: Floats
@@ -77,8 +62,6 @@ class PoseCalibration:
     """(P, S) distance of each station from its place in each pose as shown [m]."""
     mount_spread: float
     """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
-    condition: float
-    """Condition number of the whitened normal matrix."""
     hints: tuple[str, ...]
     """Sentences about straps that are put on in an unusual orientation."""
     seconds: float
@@ -161,25 +144,18 @@ def _assemble(
     calibration = calibration_of("poses", at, skeleton, mounts)
     off_m, off_rad = bundle.residuals(bundle.forward_kinematics(at))
     return PoseCalibration(
+        **vars(uncertainty),
         calibration=calibration,
         skeleton=skeleton,
         mean_m=bundle.shared.space.mean_m,
-        length_sd_m=uncertainty.length_sd_m,
-        length_bound_m=uncertainty.length_bound_m,
-        variance_reduction=uncertainty.variance_reduction,
         from_prior=uncertainty.variance_reduction < LEAST_VARIANCE_REDUCTION,
-        mount_sd_m=uncertainty.mount_sd_m,
-        mount_sd_rad=uncertainty.mount_sd_rad,
-        mount_bound_m=uncertainty.mount_bound_m,
-        mount_bound_rad=uncertainty.mount_bound_rad,
         residual_m=np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=0)),
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
         hinge_error_rad=fit.scales.pose_error_rad,
         pose_error_rad=fit.pose_error_rad,
         pose_distance_m=pose_checks.pose_distances_m(bundle, fit),
         mount_spread=fit.scales.mount_spread,
-        condition=uncertainty.condition,
-        hints=station_orientation.strap_hints(skeleton, mounts, calibration.bone_from_station),
+        hints=pose_checks.strap_hints(skeleton, mounts, calibration.bone_from_station),
         seconds=seconds,
     )
 

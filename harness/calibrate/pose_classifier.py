@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mount
+from harness.body.mounts import Mount, locate_mounts
 from harness.calibrate.hold import HoldReadings
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations
@@ -33,20 +33,15 @@ class PoseClassifier:
 
     def __init__(self, body: Body, mounts: Sequence[Mount], poses: Sequence[Floats]) -> None:
         kinematics = Kinematics(body)
-        bones = [body.skeleton.index(mount.bone) for mount in mounts]
-        placed = [locate_mount(body.skeleton, mount) for mount in mounts]
-        mount_m, turn = np.array([at_m for at_m, _ in placed]), np.array([turned for _, turned in placed])
-        poses_of_stations, middles = [], []
-        for pose in poses:
+        bones, mount_m, turn = locate_mounts(body.skeleton, mounts)
+        place_m, turned = np.empty((len(poses), len(mounts), 3)), np.empty((len(poses), len(mounts), 4))
+        for number, pose in enumerate(poses):
             kinematics.set(pose)
-            place_m, turned = kinematics.station_poses(bones, mount_m, turn)
-            middles.append(place_m.mean(axis=0))
-            poses_of_stations.append((place_m - place_m.mean(axis=0), np.array(turned)))
-        self._middle_m = np.array(middles)
+            place_m[number], turned[number] = kinematics.station_poses(bones, mount_m, turn)
+        self._middle_m: Floats = place_m.mean(axis=1)
         """(N, 3) mean of the stations' positions in each pose [m]."""
-        self._place_m = np.array([place_m for place_m, _ in poses_of_stations])
+        self._place_m: Floats = place_m - self._middle_m[:, None]
         """(N, S, 3) station positions about their mean [m]."""
-        turned = np.array([turned for _, turned in poses_of_stations])
         self._turned = rotations.multiply(turned, rotations.inverse(turned[0]))
         """(N, S, 4) rotation of each station since the first pose, world axes."""
 

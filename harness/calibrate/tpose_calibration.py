@@ -69,11 +69,7 @@ def calibrate_tpose(
     model = HeldPoseModel(body, mounts, tpose(body.skeleton) if pose is None else pose)
     level_m = rotations.rotate(LEVEL_FROM_TRACKER, hold.position_m)
     fit = model.fit(level_m)
-    if model.heading_sd_rad > HEADING_SD_RAD:
-        raise UnusableHold(
-            f"Stations {', '.join(names)} do not determine which way the performer faces in T-pose.",
-            "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
-        )
+    require_heading(model.heading_sd_rad, mounts)
     _require_no_exchange(model, level_m, fit, mounts)
     _require_pose(fit, names, body)
     beside_m, turned = model.decompose_residual(fit.residual_m)
@@ -110,32 +106,41 @@ class TPoseCollector:
 
 def _require_no_exchange(model: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:
     """UnusableHold when exchanging two stations, or all left and right ones, makes a far likelier T-pose."""
-    rows_as_worn = list(range(len(mounts)))
-    exchanges = [[pair] for pair in combinations(rows_as_worn, 2)] + [_left_right_pairs(mounts)]
-    best, which = fit.chi_square, exchanges[-1]
-    for exchange in exchanges:
-        rows = list(rows_as_worn)
-        for a, b in exchange:
+    fits = [(model.fit(level_m[rows]).chi_square, pairs) for rows, pairs in possible_exchanges(mounts)]
+    best, pairs = min(fits, key=lambda each: each[0])
+    if best <= _chi_square_limit(len(mounts)) and fit.chi_square - best >= 2.0 * np.log(EXCHANGE_ODDS):
+        raise exchange_error(mounts, pairs, "T-pose")
+
+
+def possible_exchanges(mounts: Sequence[Mount]) -> list[tuple[list[int], list[tuple[int, int]]]]:
+    """Orders of the stations with two of them exchanged, or all left and right ones, and the pairs that change."""
+    bones = [mount.bone for mount in mounts]
+    sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
+    exchanges = []
+    for pairs in [*([pair] for pair in combinations(range(len(mounts)), 2)), sides]:
+        rows = list(range(len(mounts)))
+        for a, b in pairs:
             rows[a], rows[b] = b, a
-        if (cost := model.fit(level_m[rows]).chi_square) < best:
-            best, which = cost, exchange
-    if best > _chi_square_limit(len(mounts)) or fit.chi_square - best < 2.0 * np.log(EXCHANGE_ODDS):
-        return
-    pairs = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
-    raise UnusableHold(
-        f"Stations look exchanged: {pairs}.",
-        "Check which tracker is worn where, or name the stations the other way round; then hold the T-pose again.",
+        exchanges.append((rows, pairs))
+    return exchanges
+
+
+def exchange_error(mounts: Sequence[Mount], pairs: Sequence[tuple[int, int]], held: str) -> UnusableHold:
+    """The error for stations that are worn at each other's places; `held` is what to hold again."""
+    names = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in pairs)
+    return UnusableHold(
+        f"Stations look exchanged: {names}.",
+        f"Check which tracker is worn where, or name the stations the other way round; then hold the {held} again.",
     )
 
 
-def _left_right_pairs(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
-    """Pairs of stations on the same bone of the left and of the right side."""
-    bones = [mount.bone for mount in mounts]
-    return [
-        (bones.index(bone), bones.index(f"r{bone[1:]}"))
-        for bone in bones
-        if bone.startswith("l") and f"r{bone[1:]}" in bones
-    ]
+def require_heading(heading_sd_rad: float, mounts: Sequence[Mount]) -> None:
+    """UnusableHold when the stations do not tell which way the performer faces."""
+    if heading_sd_rad > HEADING_SD_RAD:
+        raise UnusableHold(
+            f"Stations {', '.join(mount.station for mount in mounts)} do not determine which way the performer faces.",
+            "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
+        )
 
 
 def _require_pose(fit: HeldPoseFit, names: Sequence[str], body: Body) -> None:

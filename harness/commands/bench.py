@@ -1,21 +1,13 @@
 """The verb `bench`: measure speed, accuracy against stored errors, or the physics against published figures."""
 
 import argparse
-import sys
-from collections.abc import Mapping, Sequence
-from contextlib import redirect_stdout
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import (
-    Verbs,
-    add_verb,
-    positive_int,
-    print_result,
-    process_count,
-    progress_note,
-    this_command,
-)
+from harness.commands.flags import Verbs, add_verb, positive_int, process_count, refuse_flags_of_others
+from harness.commands.output import long_work, print_result, this_command
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
@@ -28,7 +20,15 @@ RANKING = "ranking"
 """Name of the comparison of rankings on built-in and on real motion, which runs alone."""
 LAB = "lab"
 """Name of the benchmark of characterize, validate and trust."""
-_ACCURACY_FLAGS = ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick")
+SPEED = "speed"
+_FLAGS_BY_USE = {
+    SPEED: ("seed", "large", "runs"),
+    ACCURACY: ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick"),
+    RANKING: ("quick", "jobs", "out", "mocap"),
+    "physics --truth": ("seeds", "out"),
+    "lab --truth": ("seeds", "out", "jobs"),
+}
+"""What is measured -> flags that apply to it."""
 
 
 def add_bench(verbs: Verbs) -> None:
@@ -64,17 +64,31 @@ def add_bench(verbs: Verbs) -> None:
 
 
 def run_bench(args: argparse.Namespace) -> Outcome:
+    words = args.what
+    use = next((word for word in words if word in (ACCURACY, RANKING)), SPEED)
     if args.truth:
-        return _bench_lab_truth(args) if args.what == [LAB] else _bench_truth(args)
-    if ACCURACY in args.what:
-        return _bench_accuracy(args)
-    if RANKING in args.what:
-        return _bench_ranking(args)
-    if given := [name for name in _ACCURACY_FLAGS if getattr(args, name) is not None]:
-        raise BadInput(f"--{given[0]} is for accuracy alone.", "Name it: harness bench accuracy.")
-    if args.runs and args.what and "wire" not in args.what:
+        if words not in (["physics"], [LAB]):
+            raise BadInput("--truth is for physics or lab alone.", "Run: harness bench physics --truth.")
+        use = f"{words[0]} --truth"
+    elif use is not SPEED and words != [use]:
+        raise BadInput(f"{use} runs alone.", "Leave the other words out.")
+    refuse_flags_of_others(args, _FLAGS_BY_USE, use)
+    if args.runs and words and "wire" not in words:
         raise BadInput("--runs is for wire alone.", "Name it: harness bench wire --runs 10.")
-    return _bench_speed(args)
+    return {
+        SPEED: _bench_speed,
+        ACCURACY: _bench_accuracy,
+        RANKING: _bench_ranking,
+        "physics --truth": _bench_physics_truth,
+        "lab --truth": _bench_lab_truth,
+    }[use](args)
+
+
+def _first_seeds(args: argparse.Namespace, seeds: tuple[int, ...]) -> tuple[int, ...]:
+    """As many of the seeds as `--seeds` says, by default all."""
+    if args.seeds and args.seeds > len(seeds):
+        raise BadInput(f"--seeds {args.seeds}: there are {len(seeds)} seeds.", "Name fewer.")
+    return seeds[: args.seeds]
 
 
 def _bench_speed(args: argparse.Namespace) -> Outcome:
@@ -108,17 +122,14 @@ def _print_statements(
     return print_result(args, content, *table, *lines, count_missed(rows), outcome=outcome)
 
 
-def _bench_truth(args: argparse.Namespace) -> Outcome:
+def _bench_physics_truth(args: argparse.Namespace) -> Outcome:
     """Print the truth table of the physics and write its page."""
-    from harness.bench.physics.comparison import compare_error_models
-    from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
+    from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S, compare_error_models
     from harness.bench.physics.truth import SEEDS, truth_rows
     from harness.report.physics.error_comparison import ErrorModelComparison
     from harness.report.physics.page import write_physics_page
 
-    if args.what != ["physics"]:
-        raise BadInput("--truth is for physics or lab alone.", "Run: harness bench physics --truth.")
-    seeds, out = _truth_flags(args, SEEDS, "seeds", "out"), args.out or Path("results") / "physics"
+    seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / "physics"
     with ProgressBar("rows") as progress:
         rows = truth_rows(seeds, progress)
         models = compare_error_models(seeds, progress)
@@ -133,22 +144,10 @@ def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
     from harness.bench.lab.truth import SEEDS, lab_truth_rows
     from harness.experiment.executors import process_executor
 
-    seeds, out = _truth_flags(args, SEEDS, "seeds", "out", "jobs"), args.out or Path("results") / LAB
-    with progress_note(out), ProgressBar("captures") as progress, process_executor(args.jobs or 1) as executor:
+    seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / LAB
+    with long_work(out, "captures") as progress, process_executor(args.jobs or 1) as executor:
         rows = lab_truth_rows(seeds, out, executor, progress)
     return _print_statements(args, rows, {"seeds": len(seeds), "captures": str(out / "captures")})
-
-
-def _truth_flags(args: argparse.Namespace, seeds: tuple[int, ...], *allowed: str) -> tuple[int, ...]:
-    """The seeds that a truth table is asked for; BadInput for flags that it does not have."""
-    given = [name for name in _ACCURACY_FLAGS if name not in allowed and getattr(args, name) is not None]
-    if args.large or args.runs or args.seed is not None or given:
-        flags = {"seeds": "--seeds N", "out": "--out FOLDER", "jobs": "--jobs N"}
-        listed = " and ".join(flags[name] for name in allowed)
-        raise BadInput(f"--truth of {args.what[0]} takes {listed} alone.", "Leave the other flags out.")
-    if args.seeds and args.seeds > len(seeds):
-        raise BadInput(f"--seeds {args.seeds}: there are {len(seeds)} seeds.", "Name fewer.")
-    return seeds[: args.seeds]
 
 
 def _bench_accuracy(args: argparse.Namespace) -> Outcome:
@@ -156,37 +155,14 @@ def _bench_accuracy(args: argparse.Namespace) -> Outcome:
     from harness.bench.accuracy.conditions import DEFAULT_METHOD, SEEDS
     from harness.bench.accuracy.measurement import clean_commit, measure_accuracy
     from harness.bench.accuracy.text import format_report, report_content
-    from harness.experiment.executors import process_executor
 
-    if args.what != [ACCURACY] or args.large or args.runs or args.seed is not None:
-        raise BadInput(
-            "accuracy runs alone, without --large, --runs and --seed.", "Give --seeds N for the first N seeds."
-        )
     if args.quick and (args.save or args.seeds):
         raise BadInput("--quick has one seed and few clips.", "Leave out --save and --seeds, or leave out --quick.")
-    jobs, seeds, out = args.jobs or 1, SEEDS[: args.seeds], args.out or Path("results") / ACCURACY
-    if args.seeds and args.seeds > len(SEEDS):
-        raise BadInput(f"--seeds {args.seeds}: there are {len(SEEDS)} seeds.", "Name fewer.")
+    seeds = _first_seeds(args, SEEDS)
     commit = clean_commit() if args.save else ""
     stored, method = read_errors(args.baseline or DEFAULT_BASELINE), args.method or DEFAULT_METHOD
-    with (
-        progress_note(out),
-        ProgressBar("cells") as bar,
-        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
-        process_executor(jobs) as executor,
-    ):
-        report = measure_accuracy(
-            method,
-            stored,
-            out,
-            seeds=seeds,
-            quick=bool(args.quick),
-            folder=args.mocap,
-            executor=executor,
-            workers=jobs,
-            command=this_command(),
-            progress=bar,
-        )
+    with _cells(args, ACCURACY) as options:
+        report = measure_accuracy(method, stored, seeds=seeds, quick=bool(args.quick), **options)
     if args.save and not report.failures:
         write_errors(args.save, StoredErrors(method, commit, seeds, report.by_method[method]))
     return print_result(args, report_content(report), format_report(report), outcome=report.outcome)
@@ -195,25 +171,24 @@ def _bench_accuracy(args: argparse.Namespace) -> Outcome:
 def _bench_ranking(args: argparse.Namespace) -> Outcome:
     from harness.bench.ranking.measurement import measure_rankings, plan_rankings
     from harness.bench.ranking.text import format_rankings, rankings_content
+
+    with _cells(args, RANKING) as options:
+        report = measure_rankings(plan_rankings(quick=bool(args.quick)), **options)
+    return print_result(args, rankings_content(report), format_rankings(report), outcome=report.outcome)
+
+
+@contextmanager
+def _cells(args: argparse.Namespace, name: str) -> Iterator[dict[str, Any]]:
+    """Options with which a benchmark runs the cells of scenarios in its folder."""
     from harness.experiment.executors import process_executor
 
-    others = (args.seed, args.method, args.seeds, args.baseline, args.save, args.runs)
-    if args.what != [RANKING] or args.large or any(value is not None for value in others):
-        raise BadInput("ranking takes --quick, --jobs, --out and --mocap alone.", "Leave the other words out.")
-    jobs, out = args.jobs or 1, args.out or Path("results") / RANKING
-    with (
-        progress_note(out),
-        ProgressBar("cells") as bar,
-        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
-        process_executor(jobs) as executor,
-    ):
-        report = measure_rankings(
-            plan_rankings(quick=bool(args.quick)),
-            out,
-            folder=args.mocap,
-            executor=executor,
-            workers=jobs,
-            command=this_command(),
-            progress=bar,
-        )
-    return print_result(args, rankings_content(report), format_rankings(report), outcome=report.outcome)
+    jobs, out = args.jobs or 1, args.out or Path("results") / name
+    with long_work(out, "cells") as bar, process_executor(jobs) as executor:
+        yield {
+            "out": out,
+            "folder": args.mocap,
+            "executor": executor,
+            "workers": jobs,
+            "command": this_command(),
+            "progress": bar,
+        }

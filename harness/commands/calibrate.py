@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import (
+from harness.commands.flags import (
     DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
@@ -16,12 +16,11 @@ from harness.commands.common import (
     line_options,
     parse_names,
     parse_stations,
-    positive_float,
     positive_int,
-    print_result,
-    print_status,
+    refuse_flags_of_others,
     repeat_flags,
 )
+from harness.commands.output import print_result, print_status
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -42,7 +41,7 @@ _FLAGS_BY_SOURCE = {
 
 def add_calibrate(verbs: Verbs) -> None:
     text = "estimate mounts and bone lengths from eight held poses, or mounts from a T-pose"
-    verb = add_verb(verbs, "calibrate", text, run_calibrate, "seed", "mocap")
+    verb = add_verb(verbs, "calibrate", text, run_calibrate, "seed", "mocap", "force")
     text = "recording of a performer who holds the poses (see `harness record`)"
     verb.add_argument("recording", nargs="?", type=Path, metavar="RECORDING", help=text)
     verb.add_argument(
@@ -59,9 +58,6 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument("--kind", choices=["poses", "tpose"], help=text)
     verb.add_argument("--clip", help="with tpose: clip of the performer (default: the scenario's first)")
     verb.add_argument("--out", type=Path, metavar="FILE", help="calibration file to write, in TOML")
-    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
-    text = "frames per second, for a device that does not report its rate"
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
     text = "show the poses in a window, or as PNG files in the folder --pictures"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
@@ -78,12 +74,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
     if len(given) != 1:
         problem = "No source of poses" if not given else f"{len(given)} sources: {', '.join(given)}"
         raise BadInput(f"{problem}.", "Give one: RECORDING, --port PORT, --simulate N or --sheet DIR.")
-    for name in sorted(
-        {name for names in _FLAGS_BY_SOURCE.values() for name in names} - set(_FLAGS_BY_SOURCE[given[0]])
-    ):
-        if getattr(args, name) is not None:
-            users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
-            raise BadInput(f"--{name.replace('_', '-')} with {given[0]}.", f"It applies to {users}: leave it out.")
+    refuse_flags_of_others(args, _FLAGS_BY_SOURCE, given[0])
     action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
     try:
         return action(args)
@@ -96,7 +87,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
 def _draw_sheet(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.poses import POSES
     from harness.core.humanoid24 import standard_skeleton
-    from harness.live.pose_sheet import draw_poses
+    from harness.live.viewer import draw_poses
 
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
@@ -125,7 +116,7 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
 
 def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import EXPECTED, write_calibration
-    from harness.core.output_file import require_writable
+    from harness.core.files import require_writable
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write, such as --out me.toml.")

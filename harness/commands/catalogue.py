@@ -8,13 +8,13 @@ from harness.body.humanoid import build_body
 from harness.body.places import NAMED_PLACES
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
-from harness.core.training_data import declared_training_data, training_note
-from harness.experiment.planning import cell_names
+from harness.core.split import declared_training_data, training_note
+from harness.experiment.cells import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic
 from harness.reconstruct import registry
-from harness.report.figures.kinds import KINDS
+from harness.report.figures.writer import KINDS
 from harness.score.metrics import DEFINITIONS
 from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS

@@ -1,11 +1,11 @@
-"""The verb `characterize`: measure the errors, clock and line of a device without a reference."""
+"""The verbs `characterize` and `validate`: measure a device without a reference, and against one."""
 
 import argparse
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import (
+from harness.commands.flags import (
     LINE_FLAGS,
     Verbs,
     add_line_flags,
@@ -13,6 +13,10 @@ from harness.commands.common import (
     line_options,
     parse_device_names,
     positive_float,
+    refuse_flags,
+    split_list,
+)
+from harness.commands.output import (
     print_caveat,
     print_result,
     print_status,
@@ -25,6 +29,11 @@ from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from harness.measure.departures import Departure
+    from harness.measure.unit_file import UnitFile
+    from harness.report.kit.page import Page
     from harness.stream.recording.guided_capture import Stretch
 
 _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
@@ -36,63 +45,86 @@ def add_characterize(verbs: Verbs) -> None:
     text = "measure the errors, clock and line of a device at rest, and write them as a unit file for scenarios"
     verb = add_verb(verbs, "characterize", text, run_characterize)
     verb.add_argument("source", help="a recording, or a port as for `harness record`: a guided capture is then made")
-    verb.add_argument("--out", type=Path, metavar="FILE", help="unit file to write; the page is written beside it")
-    verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
-    text = "earlier unit file to compare with (default: the noise preset `default`)"
-    verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
+    add_unit_flags(verb, "unit file to write; the page is written beside it")
     text = "two stations on one bar: they show errors in motion without a reference"
     verb.add_argument("--rigid", metavar="A,B", help=text)
     text = f"port: minutes at rest (default {_DEFAULT_STATIC_MIN:g})"
     verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
     verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
     verb.add_argument("--stations", metavar="A,B|A=3,B=1", help="port: names of the stations, as for `harness record`")
-    text = "port: frames per second, for a device that does not report its rate"
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
-    add_line_flags(verb)
+    add_line_flags(verb, "port: frames per second, for a device that does not report its rate")
 
 
-def run_characterize(args: argparse.Namespace) -> Outcome:
-    from harness.core.output_file import require_writable
-    from harness.measure.unit_file import UNIT_FILE, read_unit_file, write_unit_file
-    from harness.report.kit.page_html import write_page
-    from harness.report.kit.page_text import page_text
-    from harness.report.lab.unit_page import unit_page
-    from harness.study.trust.characterization import characterize_capture
+def add_unit_flags(verb: argparse.ArgumentParser, out: str) -> None:
+    """Add `--out` with this help, `--force` and `--expect`; `read_expected` and `write_unit` read them."""
+    verb.add_argument("--out", type=Path, metavar="FILE", help=out)
+    verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
+    text = "earlier unit file to compare with (default: the noise preset `default`)"
+    verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
+
+
+def read_expected(args: argparse.Namespace) -> "UnitFile | None":
+    """The unit file of `--expect`; None without one. Also checks that the one of `--out` can be written."""
+    from harness.core.files import require_writable
+    from harness.measure.unit_file import UNIT_FILE, read_unit_file
 
     if args.out is not None:
         require_writable(args.out, UNIT_FILE, force=args.force)
     expected = None if args.expect is None else read_unit_file(args.expect)
     print_caveat(args.expect, expected.caveat if expected else "")
-    pair = _parse_pair(args.rigid)
+    return expected
+
+
+def write_unit(
+    args: argparse.Namespace, make: "Callable[[], UnitFile]", page: "Page"
+) -> tuple[list[str], dict[str, str]]:
+    """Write the unit file of `--out` and its page: lines that say so, and content; nothing without `--out`."""
+    from harness.measure.unit_file import write_unit_file
+    from harness.report.kit.page_html import write_page
+
+    if args.out is None:
+        return [], {}
+    write_unit_file(args.out, make(), force=args.force)
+    with show_steps("parts of the report"):
+        report = write_page(page, args.out.with_suffix(".html"))
+    lines = [f"unit file: {args.out}", f"report: {report}"]
+    return lines, {"unit_file": str(args.out), "page": str(report)}
+
+
+def departure_content(checks: "Iterable[Departure]", *p_values: str) -> list[dict[str, Any]]:
+    """Departures from what was expected, as content, with these p values."""
+    return [
+        {
+            "key": check.key,
+            "station": check.station,
+            "measured": check.measured.as_dict(),
+            "expected": check.expected.as_dict(),
+            **{name: getattr(check, name) for name in p_values},
+        }
+        for check in checks
+    ]
+
+
+def run_characterize(args: argparse.Namespace) -> Outcome:
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.unit_page import unit_page
+    from harness.study.trust.characterization import characterize_capture
+
+    expected, pair = read_expected(args), _parse_pair(args.rigid)
     capture = _capture_of(args)
     with ProgressBar("parts") as progress:
         found = characterize_capture(capture, expected=expected, rigid=pair, progress=progress)
     page = unit_page(found.report, this_command(), args.out.name if args.out else "")
-    lines = [page_text(page)]
+    lines, written = write_unit(args, lambda: found.unit, page)
     content = {
         "unit": found.unit.name,
         "parameters": {key: number.as_dict() for key, number in found.profile.parameters.items()},
         "timing": {key: number.as_dict() for key, number in found.profile.timing.all_stations.items()},
-        "departures": [
-            {
-                "key": check.key,
-                "station": check.station,
-                "measured": check.measured.as_dict(),
-                "expected": check.expected.as_dict(),
-                "p": check.p,
-                "p_holm": check.p_holm,
-            }
-            for check in found.named
-        ],
+        "departures": departure_content(found.named, "p", "p_holm"),
         "damage": list(found.profile.damage),
+        **written,
     }
-    if args.out is not None:
-        write_unit_file(args.out, found.unit, force=args.force)
-        with show_steps("parts of the report"):
-            report = write_page(page, args.out.with_suffix(".html"))
-        lines += [f"unit file: {args.out}", f"report: {report}"]
-        content |= {"unit_file": str(args.out), "page": str(report)}
-    return print_result(args, content, *lines)
+    return print_result(args, content, page_text(page), *lines)
 
 
 def _parse_pair(text: str | None) -> tuple[str, str] | None:
@@ -113,11 +145,7 @@ def _is_port(source: str) -> bool:
 def _capture_of(args: argparse.Namespace) -> Path:
     """The recording to measure; of a port it is made first."""
     if not _is_port(args.source):
-        for name in _PORT_FLAGS:
-            if getattr(args, name) is not None:
-                raise BadInput(
-                    f"--{name.replace('_', '-')} with the recording {args.source}.", "It is for a port: leave it out."
-                )
+        refuse_flags(args, _PORT_FLAGS, f"with the recording {args.source}", "It is for a port: leave it out.")
         return Path(args.source)
     if args.out is None:
         raise BadInput("A port without --out.", "Name the unit file: --out unit.toml.")
@@ -126,7 +154,7 @@ def _capture_of(args: argparse.Namespace) -> Path:
 
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
-    from harness.measure.recording_time import events_for_precision
+    from harness.measure.episode_distributions import events_for_precision
     from harness.stream.driver import DriverConfig
     from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
 
@@ -137,7 +165,8 @@ def _record_stretches(args: argparse.Namespace) -> Path:
         f"event a minute each. This capture rests for {minutes:g} minutes. Stop with Ctrl-C; the same command goes on."
     )
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **_line_options(args))
+    args.port = args.source
+    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     with recording_note(path, ", and the same command resumes."):
         capture_stretches(
             args.source,
@@ -145,18 +174,13 @@ def _record_stretches(args: argparse.Namespace) -> Path:
             path,
             _stretches(60.0 * minutes),
             {"source": "port", "port": args.source, "purpose": "characterize", "harness": VERSION},
-            ready=_always_ready if args.yes or not sys.stdin.isatty() else _wait_for_enter,
+            ready=(lambda: True) if args.yes or not sys.stdin.isatty() else _wait_for_enter,
             log=print_status,
             progress=show_progress,
         )
     if "static" not in finished_stretches(path):
         raise BadFile(path, "no finished static stretch", "a capture", "Give the same command to go on with it.")
     return path
-
-
-def _line_options(args: argparse.Namespace) -> dict[str, Any]:
-    args.port = args.source
-    return line_options(args)
 
 
 def _stretches(static_s: float) -> "tuple[Stretch, ...]":
@@ -170,10 +194,66 @@ def _stretches(static_s: float) -> "tuple[Stretch, ...]":
     )
 
 
-def _always_ready() -> bool:
-    return True
-
-
 def _wait_for_enter() -> bool:
     print_status("Press Enter when ready.")
     return bool(sys.stdin.readline())
+
+
+def add_validate(verbs: Verbs) -> None:
+    text = "register a capture with a reference, and measure errors, clocks, room and mounts against it"
+    verb = add_verb(verbs, "validate", text, run_validate, "mocap")
+    verb.add_argument("capture", type=Path, help="a recording by `harness record` or `harness characterize`")
+    text = (
+        "the reference: a clip of the capture's scenario or of a library, another capture, a C3D file with three or "
+        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table"
+    )
+    verb.add_argument("--truth", required=True, metavar="CLIP|FILE", help=text)
+    verb.add_argument(
+        "--scenario", metavar="NAME", help="clip: scenario with stations and mounts (default: the capture's)"
+    )
+    verb.add_argument(
+        "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
+    )
+    text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
+    add_unit_flags(verb, text)
+
+
+def run_validate(args: argparse.Namespace) -> Outcome:
+    from harness.report.kit.page_text import page_text
+    from harness.report.lab.validation_page import validation_page
+    from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
+
+    expected = read_expected(args)
+    truth = load_truth(args.capture, args.truth, scenario=args.scenario, folder=args.mocap)
+    methods = split_list(args.methods)
+    if methods and truth.playback is None:
+        raise BadInput(
+            f"--methods with {truth.title}.", "Only a clip has a performer's body to score on: leave it out."
+        )
+    with ProgressBar("steps") as progress:
+        found = validate_capture(args.capture, truth, expected=expected, progress=progress)
+        scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
+    report = found.report
+    errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
+    page = validation_page(report, errors, this_command())
+    lines, written = write_unit(args, lambda: session_unit(found, expected, args.out.stem), page)
+    content = {
+        "truth": truth.title,
+        "matched_share": report.matched_share,
+        "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
+        "exchanged": dict(found.exchanged),
+        "departures": departure_content(found.named, "p_holm"),
+        "scores": [
+            {"method": method, "metric": metric, "value": value}
+            for method, values in errors.items()
+            for metric, value in values.items()
+        ],
+        "damage": list(found.reader.damage),
+        **written,
+    }
+    failures = {one.method: one.failure for one in scores if one.failure}
+    lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
+    content |= {"failures": failures} if failures else {}
+    return print_result(
+        args, content, page_text(page), *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS
+    )

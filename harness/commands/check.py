@@ -1,12 +1,14 @@
-"""The verb `check`: test methods against the contract."""
+"""The verbs `check` and `doctor`: test methods against the contract, and this installation."""
 
 import argparse
 import sys
 from contextlib import redirect_stdout
 from typing import TYPE_CHECKING
 
-from harness.commands.common import Verbs, add_verb, print_result
-from harness.core.progress import ProgressBar
+from harness.commands.flags import Verbs, add_verb
+from harness.commands.output import print_result
+from harness.core.cache_folder import remove_cache
+from harness.core.progress import ProgressBar, show_steps
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ def run_check(args: argparse.Namespace) -> Outcome:
     for name, findings in found.items():
         lines += [name, *(f"  {'ok  ' if f.ok else 'FAIL'}  {f.rule}: {f.seen}" for f in findings)]
     broken = any(not finding.ok for findings in found.values() for finding in findings)
-    content = {"methods": {name: [finding.as_dict() for finding in findings] for name, findings in found.items()}}
+    content = {"methods": {name: [finding._asdict() for finding in findings] for name, findings in found.items()}}
     own = [name for name in names if ":" in name]
     following = (
         ["run", "demo", "--methods", ",".join(["ik", *own]), "--out", "results/mine"] if own else ["run", "gate"]
@@ -48,3 +50,30 @@ def run_check(args: argparse.Namespace) -> Outcome:
     if broken:
         return print_result(args, content, *lines, outcome=Outcome.REGRESSED)
     return print_result(args, content, *lines, following=following)
+
+
+def add_doctor(verbs: Verbs) -> None:
+    verb = add_verb(
+        verbs,
+        "doctor",
+        "check this installation: compiler, scores, streams, results, optional parts, the library of real motion",
+        run_doctor,
+        "mocap",
+    )
+    text = "remove the machine code that numba has compiled for the harness, and do nothing else"
+    verb.add_argument("--clean", action="store_true", help=text)
+
+
+def run_doctor(args: argparse.Namespace) -> Outcome:
+    if args.clean:
+        size_bytes = remove_cache()
+        return print_result(args, {"removed_bytes": size_bytes}, f"removed {size_bytes / 1e6:.1f} MB of machine code")
+    from harness.testing.doctor import check_installation
+
+    with show_steps("checks"):
+        checks = check_installation(args.mocap)
+    lines = [f"{'ok  ' if check.ok else 'FAIL'}  {check.name}: {check.detail}" for check in checks]
+    outcome = Outcome.PASS if all(check.ok for check in checks) else Outcome.REGRESSED
+    return print_result(
+        args, {"checks": [check._asdict() for check in checks]}, *lines, outcome=outcome, following=["demo"]
+    )

@@ -1,9 +1,10 @@
-"""The verb `compare`: tell whether one result is worse than another."""
+"""The verbs `compare` and `baseline`: tell whether one result is worse than another, and keep results for that."""
 
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, this_words
+from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.output import print_result, record_content, this_words
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
@@ -25,16 +26,12 @@ def add_compare(verbs: Verbs) -> None:
 
 
 def run_compare(args: argparse.Namespace) -> Outcome:
-    from dataclasses import asdict
-
     from harness.compare.comparison import compare_runs
-    from harness.core.files import to_json_types
-    from harness.core.options import split_outside_brackets
     from harness.report.comparison.page import comparison_text, write_comparison_page
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
-    methods = split_outside_brackets(args.methods, ",") if args.methods else []
+    methods = split_list(args.methods)
     if len(methods) > 2:
         raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
     comparison = compare_runs(
@@ -46,7 +43,26 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     )
     with show_steps("parts of the report"):
         page = write_comparison_page(comparison, args.html) if args.html else None
-    content = {**to_json_types(asdict(comparison)), "page": page and str(page)}
     lines = [comparison_text(comparison), *([f"page: {page}"] if page else [])]
     following = () if page else (*this_words(), "--html", "comparison.html")
-    return print_result(args, content, *lines, outcome=comparison.outcome, following=following)
+    return print_result(
+        args, record_content(comparison, page=page), *lines, outcome=comparison.outcome, following=following
+    )
+
+
+def add_baseline(verbs: Verbs) -> None:
+    text = "save the results of a finished run as a baseline"
+    verb = add_verb(verbs, "baseline", text, run_baseline)
+    verb.add_argument("what", choices=["save"], help="the only action")
+    verb.add_argument("name", metavar="NAME", help="name of the baseline, written to results/baselines/NAME")
+    verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
+    verb.add_argument("--force", action="store_true", help="replace an existing baseline")
+
+
+def run_baseline(args: argparse.Namespace) -> Outcome:
+    from harness.compare.baseline import write_baseline
+
+    folder = write_baseline(args.run, args.name, force=args.force)
+    return print_result(
+        args, {"baseline": str(folder)}, f"baseline: {folder}", following=["compare", args.name, args.run]
+    )

@@ -6,19 +6,19 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import (
+from harness.commands.flags import (
     DEFAULT_STATION_COUNT,
     Verbs,
     add_verb,
+    open_playback,
     parse_characters,
     parse_items,
     parse_stations,
     positive_float,
     positive_int,
-    print_result,
-    print_status,
     repeat_flags,
 )
+from harness.commands.output import print_result, print_status
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 
@@ -67,34 +67,24 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.playback import prepare_playback
+    from harness.stream.codec.capacity import check_emulated_capacity, check_range
     from harness.stream.codec.items import missing_items
-    from harness.stream.emulator.capacity import check_capacity, check_range
     from harness.stream.emulator.server import open_port, play_samples
-    from harness.stream.emulator.udp_port import LOOPBACK, parse_udp_address
+    from harness.stream.emulator.udp_broadcast import LOOPBACK, parse_udp_address
 
     if args.pty and args.anywhere and not args.udp:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
     udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
     if args.tcp and args.check_baud:
         raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
-    playback = prepare_playback(
-        args.scenario,
-        clip=args.clip,
-        stations=parse_stations(args, device=True),
-        rate_hz=args.rate,
-        noise=args.noise,
-        seed=args.seed,
-        folder=args.mocap,
-        posing=args.poses,
-    )
+    playback = open_playback(args, parse_stations(args, device=True), posing=args.poses)
     scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
     items = args.items or tracker.items
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or tracker.overload):
-        check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
+        check_emulated_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
     with ExitStack() as opened:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)

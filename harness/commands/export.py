@@ -3,7 +3,9 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.flags import Verbs, add_verb
+from harness.commands.output import print_result
+from harness.core.options import split_outside_brackets
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -13,14 +15,13 @@ _FORMATS = ("bvh", "trc", "mot", "sto", "csv", "tum", "glb")
 
 def add_export(verbs: Verbs) -> None:
     verb = add_verb(
-        verbs, "export", "write the true and estimated motion of a run for other programs", run_export, "out"
+        verbs, "export", "write the true and estimated motion of a run for other programs", run_export, "out", "force"
     )
     verb.add_argument("run", type=Path, help="folder written by `harness run`")
     verb.add_argument("--format", required=True, choices=_FORMATS, help="format of the files")
     text = "only these {}: names or patterns such as {}; may be repeated (default: all)"
     verb.add_argument("--clip", action="append", default=[], metavar="A,B", help=text.format("clips", "walking_*"))
     verb.add_argument("--method", action="append", default=[], metavar="A,B", help=text.format("methods", "ik*"))
-    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
 
 
 def run_export(args: argparse.Namespace) -> Outcome:
@@ -40,8 +41,6 @@ def run_export(args: argparse.Namespace) -> Outcome:
 
 def _entries(flag: str, texts: list[str]) -> list[str]:
     """The entries of lists that are separated by commas outside brackets; BadInput for an empty entry."""
-    from harness.core.options import split_outside_brackets
-
     entries = [entry for text in texts for entry in split_outside_brackets(text, ",")]
     if not all(entries):
         raise BadInput(f"--{flag} {','.join(texts)!r} names no {flag}.", "Separate names by commas: A,B.")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.commands.common import print_result, repeat_flags, this_command
+from harness.commands.flags import refuse_flags, repeat_flags
+from harness.commands.output import print_result, this_command
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.report.coverage.content import (
     CoverageContent,
@@ -16,7 +17,7 @@ from harness.report.coverage.content import (
     StationRow,
 )
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
-from harness.simulate.physics.coverage import PlaceCoverage, grid_m, place_coverage, plan_axes_m
+from harness.simulate.physics.coverage import EmitterCoverage, emitter_coverage, grid_m, plan_axes_m
 
 if TYPE_CHECKING:
     from harness.body.mounts import Mount
@@ -32,11 +33,9 @@ DEFAULT_STATIONS = "liu2011"
 
 def inspect_constellation(args: argparse.Namespace) -> Outcome:
     """Print the coverage of the emitters in a file, and write its page."""
-    if args.unit is not None:
-        raise BadInput(f"--unit with {args.file.name}.", "An MCF file is in metres.")
-    for name in ("stations", "rate"):
-        if getattr(args, name) is not None and args.clip is None:
-            raise BadInput(f"--{name} without --clip.", "It is for the performer that --clip names.")
+    refuse_flags(args, ["unit"], f"with {args.file.name}", "An MCF file is in metres.")
+    if args.clip is None:
+        refuse_flags(args, ["stations", "rate"], "without --clip", "It is for the performer that --clip names.")
     page = args.out or Path("results") / "coverage" / f"{args.file.stem}.html"
     if args.out is not None and args.out.exists() and not args.force:
         raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")
@@ -65,9 +64,9 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
 def _load(path: Path) -> Constellation:
     """The constellation in a file; a bare name that no file has is a shipped one."""
     from harness.core.input_file import names_input_file
-    from harness.core.names import check_words
+    from harness.core.ranges import check_words
     from harness.simulate.physics.constellation import shipped_constellation
-    from harness.simulate.physics.mcf_file import read_mcf
+    from harness.simulate.physics.emitters import read_mcf
 
     check_words(path)
     if path.parent == Path() and not names_input_file(path):
@@ -86,7 +85,7 @@ def _content(args: argparse.Namespace, constellation: Constellation) -> Coverage
     x_m, y_m = plan_axes_m(constellation)
     views = []
     for height_m in HEIGHTS_M:
-        found = place_coverage(constellation, grid_m(x_m, y_m, np.array([floor_m - height_m])))
+        found = emitter_coverage(constellation, grid_m(x_m, y_m, np.array([floor_m - height_m])))
         shape = len(x_m), len(y_m)
         views.append(PlanView(height_m, x_m, y_m, found.heard.reshape(shape), found.dilution.reshape(shape)))
     stations = _station_rows(args, constellation) if args.clip is not None else ("", ())
@@ -113,7 +112,7 @@ def _place_rows(constellation: Constellation, floor_m: float) -> list[CoverageRo
     def row(place: str, heights_m: object) -> CoverageRow:
         depths_m = floor_m - np.asarray(heights_m, dtype=float)
         grid = grid_m(middle_m[0] + across_m, middle_m[1] + across_m, depths_m)
-        found: PlaceCoverage = place_coverage(constellation, grid)
+        found: EmitterCoverage = emitter_coverage(constellation, grid)
         return CoverageRow(place, found.share, found.fixed_share, found.median_heard, found.median_dilution)
 
     whole = row(f"0 to {SIDE_M:g} m", np.linspace(0.0, SIDE_M, _POINTS))
@@ -125,7 +124,7 @@ def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tup
     from harness.body.retargeting import retarget_to_own_body
     from harness.commands.viewed_motion import open_clip
     from harness.simulate.link import TrackerConfig
-    from harness.simulate.physics.station_coverage import station_coverage
+    from harness.simulate.physics.coverage import station_coverage
     from harness.simulate.simulation import exact_calibration
 
     mounts = _mounts(args.stations or DEFAULT_STATIONS)

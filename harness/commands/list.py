@@ -2,7 +2,8 @@
 
 import argparse
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.flags import Verbs, add_verb
+from harness.commands.output import print_result
 from harness.errors import Outcome, UnknownName
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import (
+from harness.commands.flags import (
     DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
@@ -16,14 +16,12 @@ from harness.commands.common import (
     add_verb,
     is_whole_number,
     line_options,
+    open_playback,
     parse_stations,
     positive_float,
-    print_caveat,
-    print_result,
-    print_status,
     repeat_flags,
-    show_progress,
 )
+from harness.commands.output import print_caveat, print_result, print_status, show_progress
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
@@ -34,8 +32,8 @@ if TYPE_CHECKING:
     from harness.experiment.playback import Playback
     from harness.live.pose import Output
     from harness.stream.driver import Tracker
-    from harness.stream.event_counter import EventCounter
-    from harness.stream.recording.recording_switch import RecordingSwitch
+    from harness.stream.line_events import EventCounter
+    from harness.stream.recording.recorder import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -45,7 +43,7 @@ _RATE_TOLERANCE = 0.02
 
 def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time, to a viewer, VMC, LSL or BVH, until Ctrl-C"
-    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap")
+    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap", "force")
     verb.add_argument(
         "--port",
         required=True,
@@ -59,8 +57,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--clip", help=text)
     verb.add_argument("--stations", metavar="N|A,B|A=3,B=1", help=DEVICE_STATIONS_HELP)
     text = "frames per second of the tracker and of the examples (default: the scenario's)"
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
-    add_line_flags(verb)
+    add_line_flags(verb, text)
     text = (
         "exact: the scenario's mounts and body; tpose: mounts from a T-pose in the first seconds; poses: mounts and "
         "bone lengths from eight poses, held first; FILE: written by `harness calibrate` (default exact)"
@@ -78,7 +75,6 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--anywhere", action="store_true", help="announce the streams of --lsl to other computers too")
     verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion to a BVH file")
     verb.add_argument("--poses", type=Path, metavar="FILE", help="write a CSV table of poses and frame times")
-    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
     verb.add_argument("--seconds", type=positive_float, metavar="S", help="stop after S seconds")
     text = "allowed latency from the last byte of a frame to its pose (default: one period of the tracker)"
     verb.add_argument("--deadline", type=positive_float, metavar="MS", help=text)
@@ -96,16 +92,14 @@ def run_live(args: argparse.Namespace) -> Outcome:
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
     from harness.experiment.isolation import DEFAULT_ISOLATION
-    from harness.experiment.playback import prepare_playback
     from harness.experiment.remote_method import resolve_method
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
-    from harness.stream.event_counter import EventCounter
-    from harness.stream.recording.recording_switch import RecordingSwitch
+    from harness.stream.line_events import EventCounter
+    from harness.stream.recording.recorder import RecordingSwitch
 
-    options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
-    playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
+    playback = open_playback(args, parse_stations(args, device=True))
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
@@ -194,9 +188,8 @@ def _open_outputs(
     args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch", opened: ExitStack
 ) -> "list[Output]":
     """Open the requested outputs; `opened` closes them again, also when a later one is refused."""
-    from harness.live.bvh import BvhOutput
+    from harness.live.file_outputs import BvhOutput, PoseTableOutput
     from harness.live.lsl import LslOutput
-    from harness.live.pose_table import PoseTableOutput
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
 

@@ -1,21 +1,11 @@
 """The verb `paper`: rerun the experiments of a paper."""
 
 import argparse
-import sys
-from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import (
-    Verbs,
-    add_mocap_flag,
-    add_verb,
-    print_result,
-    process_count,
-    progress_note,
-    this_command,
-    this_words,
-)
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.flags import Verbs, add_mocap_flag, add_verb, process_count
+from harness.commands.output import long_work, print_result, record_content, this_command, this_words
+from harness.core.progress import show_steps
 from harness.errors import Outcome
 
 
@@ -35,9 +25,6 @@ def add_paper(verbs: Verbs) -> None:
 
 
 def run_paper(args: argparse.Namespace) -> Outcome:
-    from dataclasses import asdict
-
-    from harness.core.files import to_json_types
     from harness.report.paper.page import paper_text, write_paper_page
     from harness.study.papers.paper import load_paper, reproduce
 
@@ -45,11 +32,7 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     paper = paper.only(args.only) if args.only else paper
     form = ("_cmu" if args.mocap else "") + ("_quick" if args.quick else "")
     out = args.out or Path("results") / (args.paper + form)
-    with (
-        progress_note(out),
-        ProgressBar("steps") as bar,
-        redirect_stdout(sys.stderr),
-    ):  # a method may print; stdout is for data
+    with long_work(out, "steps") as bar:
         findings, outcome = reproduce(
             paper,
             out,
@@ -62,7 +45,7 @@ def run_paper(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_paper_page(out)
-    content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
+    content = record_content(findings, out=out, report=page)
     following = [] if outcome is Outcome.PASS else [*this_words()]
     lines = (paper_text(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
     return print_result(args, content, *lines, outcome=outcome, following=following)

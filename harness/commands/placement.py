@@ -2,25 +2,12 @@
 
 import argparse
 import re
-import sys
-from contextlib import redirect_stdout
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from harness.commands.common import (
-    Verbs,
-    add_verb,
-    positive_float,
-    positive_int,
-    print_result,
-    print_status,
-    process_count,
-    progress_note,
-    this_command,
-    this_words,
-)
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.flags import Verbs, add_verb, positive_float, positive_int, process_count, refuse_flags
+from harness.commands.output import long_work, print_result, print_status, record_content, this_command, this_words
+from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -71,31 +58,19 @@ def parse_sizes(text: str) -> tuple[int, int]:
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
-    from dataclasses import asdict
-
-    from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import sentence
+    from harness.report.placement.wording import placement_sentence
     from harness.results.folder_kind import FINDINGS
     from harness.study.placement import placement_study
 
     question = _read_question(args)
     name = question.name if question else Path(args.study).stem.removeprefix("placement_")
     out = args.out or Path("results") / f"placement_{name}"
-    study: Any = (
-        partial(placement_study.answer_question, question)
-        if question
-        else partial(placement_study.run_placement, args.study)
-    )
-    with (
-        progress_note(out),
-        ProgressBar("cells") as bar,
-        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
-        process_executor(args.jobs) as each,
-    ):
+    with long_work(out, "cells") as bar, process_executor(args.jobs) as each:
         findings: PlacementFindings
-        findings, outcome = study(
+        findings, outcome = placement_study.run_placement(
+            question or args.study,
             out,
             folder=args.mocap,
             executor=each,
@@ -106,8 +81,8 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_placement_page(out)
-    answer = sentence(findings)
-    content = {"answer": answer, **to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
+    answer = placement_sentence(findings)
+    content = {"answer": answer, **record_content(findings, out=out, report=page)}
     lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()
     return print_result(args, content, *lines, outcome=outcome, following=following)
@@ -117,14 +92,11 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     """The question on the command line; None for a study. BadInput for both and for neither."""
     from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_MINUTES, PlacementQuestion
 
-    given = [name for name in _QUESTION_FLAGS if getattr(args, name) is not None]
     if args.study is not None:
-        if given:
-            raise BadInput(
-                f"The study {args.study} with --{given[0]}.", "A study has its own: name a study or ask a question."
-            )
+        advice = "A study has its own: name a study or ask a question."
+        refuse_flags(args, _QUESTION_FLAGS, f"with the study {args.study}", advice)
         return None
-    if not given:
+    if all(getattr(args, name) is None for name in _QUESTION_FLAGS):
         raise BadInput("Neither a study nor a question.", f"Type: {_EXAMPLE}; or: harness placement walking")
     fewest, most = args.stations or (3, 3)
     return PlacementQuestion(

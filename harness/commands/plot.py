@@ -1,10 +1,11 @@
-"""The verb `plot`: draw a figure for a paper from a run or a placement study."""
+"""The verbs `plot` and `table`: a figure or a table for a paper, from a run or a placement study."""
 
 import argparse
 import textwrap
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, repeat_flags
+from harness.commands.flags import Verbs, add_verb, positive_int, repeat_flags, split_list
+from harness.commands.output import print_result
 from harness.errors import Outcome
 
 _CAPTION_WIDTH = 100
@@ -33,13 +34,12 @@ def add_plot(verbs: Verbs) -> None:
 
 
 def run_plot(args: argparse.Namespace) -> Outcome:
-    from harness.core.options import split_outside_brackets
-    from harness.report.figures.selection import FigureSelection
+    from harness.report.figures.print_figure import FigureSelection
     from harness.report.figures.writer import write_figure
 
     selection = FigureSelection(
         metric=args.metric or FigureSelection.metric,
-        methods=tuple(split_outside_brackets(args.methods, ",")) if args.methods else (),
+        methods=tuple(split_list(args.methods)),
         condition=args.condition,
         clip=args.clip,
         control=args.control,
@@ -54,3 +54,42 @@ def run_plot(args: argparse.Namespace) -> Outcome:
     size = f"{figure.width_mm:.0f} x {figure.height_mm:.0f} mm"
     caption = textwrap.fill(f"caption: {figure.caption}", _CAPTION_WIDTH)
     return print_result(args, content, f"figure: {figure.path} ({size})", caption, following=following)
+
+
+def add_table(verbs: Verbs) -> None:
+    text = "print the results of a run as a table for a paper: means with intervals, in LaTeX, Markdown or CSV"
+    verb = add_verb(verbs, "table", text, run_table_verb)
+    verb.set_defaults(prints_file=True)
+    verb.add_argument("run", type=Path, help="folder written by `harness run`")
+    text = "latex (with booktabs), markdown or csv (default markdown)"
+    verb.add_argument("--format", default="markdown", metavar="FORMAT", help=text)
+    text = "metrics of the columns (default joint_angle_mean_deg,mpjpe_mm; see `harness list`)"
+    verb.add_argument("--metrics", metavar="M,N", help=text)
+    verb.add_argument("--methods", metavar="A,B", help="methods to show (default: all); only these are ranked")
+    verb.add_argument("--condition", default="", metavar="NAME", help="condition to show, such as noise=clean")
+    verb.add_argument("--by-behaviour", action="store_true", help="a row for each behaviour instead of all together")
+    verb.add_argument("--out", type=Path, metavar="FILE", help="file to write instead of printing")
+    verb.add_argument("--force", action="store_true", help="replace a file that exists")
+
+
+def run_table_verb(args: argparse.Namespace) -> Outcome:
+    from dataclasses import asdict
+
+    from harness.report.figures.table import DEFAULT_METRICS
+    from harness.report.figures.writer import write_results_table
+
+    written = write_results_table(
+        args.run,
+        args.format,
+        metrics=args.metrics.split(",") if args.metrics else DEFAULT_METRICS,
+        methods=split_list(args.methods),
+        condition=args.condition,
+        by_behaviour=args.by_behaviour,
+        out=args.out,
+        force=args.force,
+    )
+    content = {**asdict(written.table), "file": args.out and str(args.out)}
+    line = written.text.removesuffix("\n") if args.out is None else f"table: {args.out}"
+    metric = ["--metric", args.metrics.split(",")[0]] if args.metrics else []
+    flags = repeat_flags(args, "methods", "condition")
+    return print_result(args, content, line, following=["plot", args.run, "--kind", "ranking", *metric, *flags])

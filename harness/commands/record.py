@@ -6,21 +6,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import (
+from harness.commands.flags import (
     LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
     is_whole_number,
     line_options,
+    open_playback,
     parse_device_names,
     parse_names,
-    positive_float,
-    print_result,
-    print_status,
-    recording_note,
-    show_progress,
+    refuse_flags,
 )
+from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
@@ -43,8 +41,6 @@ def add_record(verbs: Verbs) -> None:
         "with sim: names or number of the scenario's stations"
     )
     verb.add_argument("--stations", metavar="A,B|A=3,B=1", help=text)
-    text = "frames per second, for a device that does not report its rate"
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
     verb.add_argument("--seconds", type=float, metavar="N", help="stop after N seconds")
     text = (
@@ -76,29 +72,21 @@ def _record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in (*LINE_FLAGS, "send", "serve"):
-            if getattr(args, name) is not None:
-                raise BadInput(
-                    f"--{name.replace('_', '-')} with {args.port}.",
-                    "It is for a device; a simulated line takes it from the scenario.",
-                )
+        advice = "It is for a device; a simulated line takes it from the scenario."
+        refuse_flags(args, (*LINE_FLAGS, "send", "serve"), f"with {args.port}", advice)
         return _record_simulation(args, args.port.removeprefix(SIMULATION_PREFIX))
-    for name in ("clip", "noise", "poses", "seed"):
-        if getattr(args, name) is not None:
-            raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out.")
+    advice = f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out."
+    refuse_flags(args, ("clip", "noise", "poses", "seed"), f"with {args.port}", advice)
     if args.allow_writes and args.send is None:
         raise BadInput("--allow-writes without --send.", "It is for commands that --send names: leave it out.")
     if args.plan is not None and args.send is not None:
         raise BadInput("--plan with --send.", "A plan is for a recording of motion: leave one of them out.")
-    if args.serve is not None:
-        return _record_served(args)
-    return _record_port(args) if args.send is None else _record_commands(args)
+    return _record_line(args)
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
-    from harness.experiment.playback import prepare_playback
-    from harness.mocap.synthetic.rig import stretch_marks
-    from harness.stream.emulator.faulty_capture import add_byte_faults, unapplied_kinds
+    from harness.mocap.synthetic.takes import stretch_marks
+    from harness.stream.emulator.faults import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
@@ -106,16 +94,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     stations = args.stations
     if stations is not None:
         stations = int(stations) if is_whole_number(stations) else parse_names(stations)
-    playback = prepare_playback(
-        scenario,
-        clip=args.clip,
-        stations=stations,
-        rate_hz=args.rate,
-        noise=args.noise,
-        seed=args.seed,
-        folder=args.mocap,
-        posing=bool(args.poses),
-    )
+    playback = open_playback(args, stations, scenario, posing=bool(args.poses))
     played, simulation = playback.scenario, playback.simulation
     note = {
         "source": "simulation",
@@ -148,66 +127,46 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     return {PLAN: plan_digest(args.plan)}
 
 
-def _record_port(args: argparse.Namespace) -> Outcome:
+def _record_line(args: argparse.Namespace) -> Outcome:
+    """Record a device that is set up here, that another program uses, or that is sent commands."""
     from harness.stream.driver import DriverConfig
+    from harness.stream.recording.command_recording import check_commands, format_exchanges, record_commands
+    from harness.stream.recording.line_server import serve_line
     from harness.stream.recording.recorder import record_port
     from harness.stream.recording.recording import RecordingWriter
 
+    settings = [name for name in LINE_FLAGS if name != "baud"]
+    if args.serve is not None:
+        advice = "The other program configures the device: leave it out."
+        refuse_flags(args, ("send", *settings), "with --serve", advice)
+    if args.send is not None:
+        advice = "--send sets nothing but what it names: leave it out."
+        refuse_flags(args, ("stations", *settings), "with --send", advice)
+    if args.port.startswith("udp:"):
+        advice = "UDP carries no commands: name the serial line."
+        refuse_flags(args, ("serve", "send"), f"with {args.port}", advice)
+    if args.send is not None:
+        check_commands(args.send, args.allow_writes)
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
-    note = {"source": "port", "port": args.port, "harness": VERSION, **_plan_note(args)}
+    source = "served" if args.serve is not None else "port" if args.send is None else "commands"
+    note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
+    options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}
     with RecordingWriter(args.file, note) as writer:
-        line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
+        if args.serve is not None:
+            counts = serve_line(args.port, args.serve, config, writer, **options)
+        elif args.send is not None:
+            exchanges = record_commands(args.port, args.send, config, writer, **options)
+        else:
+            line = record_port(args.port, config, writer, **options)
+    if args.serve is not None:
+        unread, lost = counts["unread"], counts["undelivered"]
+        text = [f"{unread} bytes were not read by a program"] if unread else []
+        text += [f"{lost} bytes of a program found no device"] if lost else []
+        return _print_recording(args, writer, more=counts, lines=text)
+    if args.send is not None:
+        return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
     return _print_recording(args, writer, line)
-
-
-def _record_served(args: argparse.Namespace) -> Outcome:
-    from harness.stream.driver import DriverConfig
-    from harness.stream.recording.line_server import serve_line
-    from harness.stream.recording.recording import RecordingWriter
-
-    for name in ("send", *LINE_FLAGS):
-        if name != "baud" and getattr(args, name) is not None:
-            raise BadInput(
-                f"--{name.replace('_', '-')} with --serve.", "The other program configures the device: leave it out."
-            )
-    if args.port.startswith("udp:"):
-        raise BadInput(f"--serve with {args.port}.", "UDP carries no commands: name the serial line.")
-    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
-    note = {"source": "served", "port": args.port, "harness": VERSION, **_plan_note(args)}
-    with RecordingWriter(args.file, note) as writer:
-        counts = serve_line(
-            args.port, args.serve, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
-        )
-    text = [f"{counts['unread']} bytes were not read by a program"] if counts["unread"] else []
-    if counts["undelivered"]:
-        text.append(f"{counts['undelivered']} bytes of a program found no device")
-    return _print_recording(args, writer, more=counts, lines=text)
-
-
-def _record_commands(args: argparse.Namespace) -> Outcome:
-    from harness.stream.driver import DriverConfig
-    from harness.stream.recording.command_recording import check_commands, record_commands
-    from harness.stream.recording.exchange_text import format_exchanges
-    from harness.stream.recording.recording import RecordingWriter
-
-    for name in ("stations", *LINE_FLAGS):
-        if name != "baud" and getattr(args, name) is not None:
-            raise BadInput(
-                f"--{name.replace('_', '-')} with --send.", "--send sets nothing but what it names: leave it out."
-            )
-    if args.port.startswith("udp:"):
-        raise BadInput(f"--send with {args.port}.", "UDP carries no commands: name the serial line.")
-    check_commands(args.send, args.allow_writes)
-    config = DriverConfig(rate_hz=args.rate, **line_options(args))
-    note = {"source": "commands", "port": args.port, "harness": VERSION}
-    with RecordingWriter(args.file, note) as writer:
-        exchanges = record_commands(
-            args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
-        )
-    content = [exchange.as_dict() for exchange in exchanges]
-    return _print_recording(args, writer, more={"exchanges": content}, lines=format_exchanges(content))
 
 
 def _print_recording(

@@ -7,16 +7,8 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.common import (
-    Verbs,
-    add_verb,
-    parse_names,
-    print_caveat,
-    print_result,
-    print_status,
-    repeat_flags,
-)
-from harness.commands.ending import print_data
+from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, repeat_flags
+from harness.commands.output import print_caveat, print_data, print_result, print_status
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -65,16 +57,15 @@ def run_replay(args: argparse.Namespace) -> Outcome:
 
 def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
     """Print the commands of a recording that has no frames."""
-    from harness.stream.recording.exchange_text import format_exchanges
+    from harness.stream.recording.command_recording import format_exchanges
 
     content = {"frames": 0, "lost": recording.damage, "answers": recording.answers}
     return print_result(args, content, *format_exchanges(recording.answers))
 
 
 def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness.stream.recording.exchange_text import format_exchanges
-    from harness.stream.recording.frame_table import FRAME_COLUMNS, format_csv_row, frame_rows
-    from harness.stream.recording.summary import StreamSummary
+    from harness.stream.recording.command_recording import format_exchanges
+    from harness.stream.station_counts import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:
@@ -117,7 +108,6 @@ def _format_counts(stream: "RecordingStream") -> str:
 
 def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
-    from harness.core.options import expand_alternatives, split_outside_brackets
     from harness.experiment.evaluation import check_methods, evaluate_each, format_score_table
     from harness.experiment.recorded_take import find_playback, has_station_names, recorded_take
 
@@ -135,11 +125,7 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
         print_caveat(args.calibration, kept.caveat)
         named = args.stations is not None or has_station_names(stream, playback.scenario)
         playback = playback.with_calibration(kept, named=named, say=print_status)
-    methods = playback.scenario.methods
-    if args.methods is not None:
-        methods = tuple(
-            name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)
-        )
+    methods = playback.scenario.methods if args.methods is None else parse_methods(args.methods)
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         check_methods(methods)
         scores = evaluate_each(methods, recorded_take(stream, playback), progress=bar)

@@ -4,7 +4,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.output import print_result
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
@@ -31,15 +32,14 @@ def run_report(args: argparse.Namespace) -> Outcome:
         require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
-    from harness.report.run.writer import write_run_page
+    from harness.report.run.page import write_run_page
 
     with show_steps("parts of the report"):
         page = write_run_page(args.run)
     if args.readme:
-        from harness.core.options import split_outside_brackets
         from harness.report.figures.performer_table import update_readme
 
-        update_readme(args.readme, args.run, split_outside_brackets(args.methods, ",") if args.methods else ())
+        update_readme(args.readme, args.run, split_list(args.methods))
     return _print_page(args, page, following=["plot", args.run, "--kind", "ranking"])
 
 
@@ -62,8 +62,7 @@ def _report_placement(args: argparse.Namespace) -> Outcome:
 
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
-    from harness.report.paper.page import write_paper_page
-    from harness.report.paper.readme import update_readme
+    from harness.report.paper.page import update_readme, write_paper_page
     from harness.results.findings import read_findings
     from harness.results.folder_kind import FINDINGS
 

@@ -1,13 +1,12 @@
-"""The verb `run`: run a scenario and write its report."""
+"""The verbs `run` and `demo`: run a scenario, or the main job on synthetic motion, and write its report."""
 
 import argparse
 import sys
-from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, progress_note, this_command
-from harness.commands.isolation_flags import add_isolation_flags, read_isolation
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.flags import Verbs, add_isolation_flags, add_verb, parse_methods, read_isolation
+from harness.commands.output import long_work, print_result, print_status, this_command
+from harness.core.progress import show_steps
 from harness.errors import Outcome
 
 EVERY_METHOD = "all"
@@ -51,11 +50,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         scenario = replace(scenario, methods=_named_methods(args.methods, scenario.methods))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
-    with (
-        progress_note(out),
-        ProgressBar("cells") as bar,
-        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
-    ):
+    with long_work(out, "cells") as bar:
         outcome = engine.run(
             scenario,
             out,
@@ -67,7 +62,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         )
     page = None
     if args.report:
-        from harness.report.run.writer import write_run_page
+        from harness.report.run.page import write_run_page
 
         print("writing the report", file=sys.stderr)
         with show_steps("parts of the report"):
@@ -86,11 +81,25 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
 
 def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
     """The methods that `--methods` names; `all` stands for the scenario's `own` and the others that are installed."""
-    from harness.core.options import expand_alternatives, split_outside_brackets
     from harness.reconstruct import registry
 
-    named = [name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part)]
+    named = parse_methods(text)
     if EVERY_METHOD not in named:
-        return tuple(named)
+        return named
     every = (*own, *registry.methods())
     return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))
+
+
+def add_demo(verbs: Verbs) -> None:
+    text = "run the main job on synthetic motion and write its report: nothing to download, a minute"
+    verb = add_verb(verbs, "demo", text, run_demo, "seed", "out", "jobs")
+    add_methods_flag(verb)
+    add_all_flag(verb)
+    verb.set_defaults(scenario="demo", mocap=None, report=True, jobs=2)
+    verb.set_defaults(isolate=False, time_limit=None, memory_limit=None)
+
+
+def run_demo(args: argparse.Namespace) -> Outcome:
+    """Say what comes before the imports, which take a second, and run the demo."""
+    print_status("demo: synthetic motion of twelve performers")
+    return run_scenario(args)

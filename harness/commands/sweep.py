@@ -1,19 +1,24 @@
-"""The verb `sweep`: run many scenarios, clips, methods, seeds and values."""
+"""The verbs `sweep` and `status`: run many scenarios, clips, methods, seeds and values, and tell what is finished."""
 
 import argparse
 import os
 import shlex
 import sys
-from contextlib import ExitStack, redirect_stdout
+from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from harness.commands.common import Verbs, add_verb, print_result, process_count, progress_note, repeat_flags
-from harness.commands.isolation_flags import add_isolation_flags, read_isolation
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.flags import Verbs, add_isolation_flags, add_verb, process_count, read_isolation, repeat_flags
+from harness.commands.output import long_work, print_result
+from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.experiment.status import RunStatus
 
 _DEFAULT_CLUSTER_WORKERS = 64
 """Number of workers that cells are planned for when a scheduler's workers may come and go."""
+_MAX_FAILURES = 10
 
 
 def add_sweep(verbs: Verbs) -> None:
@@ -33,8 +38,8 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     from harness.experiment.engine import run_sweep as run
     from harness.experiment.executors import dask_executor, process_executor
     from harness.experiment.sweep_config import expand_sweep, load_sweep
+    from harness.report.sweep.data import read_sweep
     from harness.report.sweep.page import sweep_text, write_sweep_page
-    from harness.report.sweep.reader import read_sweep
     from harness.results.integrity import read_summary_json
 
     if args.dask and args.jobs and args.dask != "local":
@@ -43,9 +48,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     scenarios = expand_sweep(sweep, path, args.seed, args.mocap)
     out = args.out or Path("results") / sweep.name
     with ExitStack() as stack:
-        stack.enter_context(progress_note(out))
-        bar = stack.enter_context(ProgressBar("cells"))
-        stack.enter_context(redirect_stdout(sys.stderr))  # a method may print; stdout is for data
+        bar = stack.enter_context(long_work(out, "cells"))
         workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _DEFAULT_CLUSTER_WORKERS)
         executor = dask_executor(args.dask, args.jobs) if args.dask else process_executor(workers)
         outcome = run(
@@ -76,3 +79,52 @@ def _resume_command(args: argparse.Namespace, out: Path) -> str:
     """The command that resumes the sweep, also in a folder whose cells were computed elsewhere."""
     flags = repeat_flags(args, "mocap", "isolate", "time_limit", "memory_limit", "seed")
     return shlex.join(["harness", "sweep", args.sweep, "--out", str(out), *flags])
+
+
+def add_status(verbs: Verbs) -> None:
+    text = "tell how much of a run, sweep or placement study is finished, also while it runs"
+    verb = add_verb(verbs, "status", text, run_status)
+    verb.add_argument("folder", type=Path, metavar="DIR", help="the folder that it writes")
+
+
+def run_status(args: argparse.Namespace) -> Outcome:
+    from harness.experiment.status import read_status
+
+    found = read_status(args.folder)
+    content = {
+        "kind": found.kind,
+        "name": found.name,
+        "cells_planned": found.planned,
+        "cells_finished": found.finished,
+        "cells_failed": len(found.failures),
+        "running": found.running,
+        "left_s": found.left_s,
+        "failures": found.failures,
+        "command": found.command,
+    }
+    following = ["report", args.folder] if not found.remaining else shlex.split(found.command)[1:]
+    if found.running:
+        following = ["status", args.folder]
+    outcome = Outcome.PASS if found.finished == found.planned else Outcome.INCOMPLETE
+    return print_result(args, content, *_status_lines(found), outcome=outcome, following=following)
+
+
+def _status_lines(found: "RunStatus") -> list[str]:
+    from harness.report.kit.text import last_line
+
+    counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
+    state = "running" if found.running else "finished" if not found.remaining else "not running"
+    left = f", about {_format_duration(found.left_s)} left" if found.left_s is not None else ""
+    lines = [f"{found.kind} {found.name}: {state}, {counted}{left}"]
+    lines += [f"FAILED {cell}: {last_line(text)}" for cell, text in found.failures.items()][:_MAX_FAILURES]
+    if len(found.failures) > _MAX_FAILURES:
+        lines.append(f"and {len(found.failures) - _MAX_FAILURES:,} more")
+    if found.failures and found.kind == "sweep":
+        lines.append(f"one of them again: {found.command} --cell {shlex.quote(next(iter(found.failures)))}")
+    return lines
+
+
+def _format_duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

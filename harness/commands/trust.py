@@ -1,12 +1,11 @@
 """The verb `trust`: tell whether the simulation ranks methods as a device does."""
 
 import argparse
-import sys
-from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, process_count, progress_note, this_command
-from harness.core.progress import ProgressBar, show_steps
+from harness.commands.flags import Verbs, add_verb, process_count
+from harness.commands.output import long_work, print_result, record_content, this_command
+from harness.core.progress import show_steps
 from harness.errors import Outcome
 
 
@@ -25,9 +24,6 @@ def add_trust(verbs: Verbs) -> None:
 
 
 def run_trust(args: argparse.Namespace) -> Outcome:
-    from dataclasses import asdict
-
-    from harness.core.files import to_json_types
     from harness.experiment.executors import process_executor
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
@@ -35,12 +31,7 @@ def run_trust(args: argparse.Namespace) -> Outcome:
     from harness.study.trust.trust_study import run_trust_study
 
     out = args.out or Path("results") / f"trust_{args.plan.stem}"
-    with (
-        progress_note(out),
-        process_executor(args.jobs) as executor,
-        ProgressBar("captures") as bar,
-        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
-    ):
+    with long_work(out, "captures") as bar, process_executor(args.jobs) as executor:
         study = run_trust_study(
             args.plan,
             args.captures,
@@ -54,5 +45,5 @@ def run_trust(args: argparse.Namespace) -> Outcome:
     page = trust_page(study.findings, this_command())
     with show_steps("parts of the report"):
         report = write_page(page, out / "report.html")
-    content = {**to_json_types(asdict(study.findings)), "out": str(out), "report": str(report)}
+    content = record_content(study.findings, out=out, report=report)
     return print_result(args, content, page_text(page), "", f"report: {report}", outcome=study.findings.outcome)

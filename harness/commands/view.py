@@ -7,7 +7,8 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.common import Verbs, add_verb, positive_float, print_result, print_status
+from harness.commands.flags import Verbs, add_verb, parse_methods, positive_float
+from harness.commands.output import print_result, print_status
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -20,7 +21,7 @@ _MOST_SAVED_S = 60.0
 
 def add_view(verbs: Verbs) -> None:
     text = "show a clip, a run or a recording in 3-D in the browser; save movies and pages"
-    verb = add_verb(verbs, "view", text, run_view, "seed", "mocap")
+    verb = add_verb(verbs, "view", text, run_view, "seed", "mocap", "force")
     text = "name of a clip, motion file (AMC, BVH, MVNX, AMASS npz), folder of a run, or recording"
     verb.add_argument("what", metavar="CLIP|RUN|RECORDING", help=text)
     text = "methods to show, in this order (default: all of a run, none of a recording)"
@@ -36,7 +37,6 @@ def add_view(verbs: Verbs) -> None:
     verb.add_argument("--colour-by-error", action="store_true", help="colour bodies in the movie by their error")
     text = "write one page that holds all of it, instead of opening a browser"
     verb.add_argument("--out", type=Path, metavar="FILE.html", help=text)
-    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
     verb.add_argument("--no-browser", action="store_true", help="print the address alone")
 
 
@@ -65,11 +65,8 @@ def run_view(args: argparse.Namespace) -> Outcome:
 
 def _open(args: argparse.Namespace) -> "ViewedMotion":
     from harness.commands.viewed_motion import open_motion
-    from harness.core.options import expand_alternatives, split_outside_brackets
 
-    methods = None
-    if args.methods is not None:
-        methods = [name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)]
+    methods = None if args.methods is None else parse_methods(args.methods)
     of_run = Path(args.what).is_dir()
     playback = {"scenario": args.scenario, "clip": None if of_run else args.clip, "seed": args.seed}
     options = {"methods": methods, "mocap": args.mocap, "rate_hz": args.rate, "playback": playback}

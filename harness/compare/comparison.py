@@ -28,7 +28,7 @@ from harness.compare.matching import (
 from harness.compare.significance import Verdict
 from harness.compare.units import Sampling
 from harness.core.files import to_json_types
-from harness.core.training_data import training_note
+from harness.core.split import training_note
 from harness.errors import Outcome
 from harness.results.manifest import Manifest, flatten
 from harness.results.reader import ResultSet, load_results

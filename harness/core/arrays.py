@@ -53,3 +53,9 @@ def immutable(values: Any, dtype: type = np.float64) -> NDArray[Any]:
     if narrower and not np.array_equal(np.isfinite(given), np.isfinite(array)):
         raise ValueError(f"a number that is too large for {array.dtype}")
     return np.ndarray(array.shape, array.dtype, array.tobytes())
+
+
+def find_runs(condition: Bools) -> Ints:
+    """(N, 2) index of the first sample of each run of True in an array (T,), and of the first sample after it."""
+    edges = np.diff(np.concatenate([[False], condition, [False]]).astype(np.int8))
+    return np.stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)], axis=1).astype(np.int64)

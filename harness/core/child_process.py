@@ -25,7 +25,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from harness.core.interrupts import SIGNALS, defer_interrupts, shield_children
-from harness.core.python_process import python_command, python_environment
+from harness.core.working_folder import python_command, python_environment
 from harness.errors import SystemFault
 
 SPAWN = get_context("spawn")

@@ -29,7 +29,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from harness.core.cache_folder import cache_folder, keep_newest
-from harness.core.plain_import import plain_import
+from harness.core.working_folder import plain_import
 
 with plain_import():
     import numba

@@ -1,4 +1,4 @@
-"""JSON with the same text for the same content, atomic writers, and one reader each for JSON and TOML."""
+"""JSON with the same text for the same content, atomic writers, files that a user names for output, and readers."""
 
 import hashlib
 import json
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core import parsing
+from harness.core.fault_report import is_system_fault
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile
 
@@ -231,3 +232,28 @@ def parse_toml(path: Path, data: bytes, expected: str, advice: str) -> dict[str,
         return parsing.parse_toml(data.decode("utf-8").replace("\r\n", "\n"))
     except ValueError as error:
         raise BadFile(path, f"not TOML: {error}", expected, advice) from error
+
+
+def require_writable(path: Path, what: str, *, force: bool) -> None:
+    """BadFile when `what`, such as "a calibration", cannot be written to this path, or would replace a file.
+
+    `force` allows the replacement.
+    """
+    if path.exists() and not path.is_file():
+        raise BadFile(path, "it is not a file", f"a file name for {what}", "Choose another.")
+    if path.exists() and not force:
+        raise BadFile(path, "it exists", "a new file", "Choose another name, or overwrite it with --force.")
+    if not path.absolute().parent.is_dir():
+        raise BadFile(path, "the folder does not exist", f"a file name for {what}", "Create it, or choose another.")
+
+
+def write_output(path: Path, text: str, what: str, *, force: bool) -> None:
+    """Write a text in UTF-8 atomically; BadFile as `require_writable`, and where the system refuses the file."""
+    require_writable(path, what, force=force)
+    target = path.resolve()  # a symbolic link stays; its target is replaced
+    try:
+        write_bytes(target, text.encode("utf-8", errors="replace"))
+    except OSError as error:
+        if is_system_fault(error):
+            raise
+        raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Choose another.") from error

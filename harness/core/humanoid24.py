@@ -11,6 +11,7 @@ because MuJoCo composes the joints of a body in the order listed; the skeleton (
 first. Only `pack` and `unpack` convert between the two orders.
 """
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -18,201 +19,79 @@ import numpy as np
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
-# bone, parent, vector [m] in the rest pose (x forward, y left, z up), hinges: (channel, axis, lowest, highest [deg])
-_BONES: tuple[tuple[str, str, tuple[float, ...], tuple[tuple[str, tuple[float, ...], float, float], ...]], ...] = (
-    (
-        "lowerback",
-        "root",
-        (-0.0097, 0.0, 0.1163),
-        (
-            ("rx", (0.0, 1.0, 0.0), -53.0, 111.0),
-            ("ry", (0.0, 0.0, 1.0), -26.0, 27.0),
-            ("rz", (1.0, 0.0, 0.0), -38.0, 43.0),
-        ),
-    ),
-    (
-        "upperback",
-        "lowerback",
-        (-0.0005, 0.0, 0.117),
-        (
-            ("rx", (0.0, 1.0, 0.0), -34.0, 38.0),
-            ("ry", (0.0, 0.0, 1.0), -31.0, 35.0),
-            ("rz", (1.0, 0.0, 0.0), -23.0, 29.0),
-        ),
-    ),
-    (
-        "thorax",
-        "upperback",
-        (0.0041, 0.0, 0.1181),
-        (
-            ("rx", (0.0, 1.0, 0.0), -40.0, 23.0),
-            ("ry", (0.0, 0.0, 1.0), -20.0, 23.0),
-            ("rz", (1.0, 0.0, 0.0), -41.0, 28.0),
-        ),
-    ),
-    (
-        "lowerneck",
-        "thorax",
-        (0.01, 0.0, 0.0956),
-        (
-            ("rx", (0.0, 1.0, 0.0), -59.0, 40.0),
-            ("ry", (0.0, 0.0, 1.0), -36.0, 54.0),
-            ("rz", (1.0, 0.0, 0.0), -43.0, 71.0),
-        ),
-    ),
-    (
-        "upperneck",
-        "lowerneck",
-        (-0.0149, 0.0, 0.0953),
-        (
-            ("rx", (0.0, 1.0, 0.0), -46.0, 69.0),
-            ("ry", (0.0, 0.0, 1.0), -47.0, 75.0),
-            ("rz", (1.0, 0.0, 0.0), -57.0, 49.0),
-        ),
-    ),
-    (
-        "head",
-        "upperneck",
-        (-0.0063, 0.0, 0.0983),
-        (
-            ("rx", (0.0, 1.0, 0.0), -186.0, 49.0),
-            ("ry", (0.0, 0.0, 1.0), -65.0, 30.0),
-            ("rz", (1.0, 0.0, 0.0), -69.0, 169.0),
-        ),
-    ),
-    (
-        "lclavicle",
-        "thorax",
-        (-0.0148, 0.1799, 0.0652),
-        (
-            ("ry", (0.0, 0.0, 1.0), -11.0, 11.0),
-            ("rz", (1.0, 0.0, 0.0), -11.0, 11.0),
-        ),
-    ),
-    (
-        "lhumerus",
-        "lclavicle",
-        (0.0, 0.3001, 0.0),
-        (
-            ("rx", (0.5, 0.0, -0.866025404), -126.0, 130.0),
-            ("ry", (0.0, -1.0, 0.0), -99.0, 94.0),
-            ("rz", (-0.866025404, 0.0, -0.5), -186.0, 168.0),
-        ),
-    ),
-    (
-        "lradius",
-        "lhumerus",
-        (0.0, 0.1882, 0.0),
-        (("rx", (0.5, 0.0, -0.866025404), -12.0, 157.0),),
-    ),
-    (
-        "lwrist",
-        "lradius",
-        (0.0, 0.0941, 0.0),
-        (("ry", (0.0, -1.0, 0.0), -183.0, 114.0),),
-    ),
-    (
-        "lhand",
-        "lwrist",
-        (0.0, 0.038, 0.0),
-        (
-            ("rx", (-1.0, 0.0, 0.0), -75.0, 90.0),
-            ("rz", (0.0, 0.0, 1.0), -110.0, 135.0),
-        ),
-    ),
-    (
-        "rclavicle",
-        "thorax",
-        (-0.0148, -0.1799, 0.0652),
-        (
-            ("ry", (0.0, 0.0, 1.0), -11.0, 11.0),
-            ("rz", (1.0, 0.0, 0.0), -11.0, 11.0),
-        ),
-    ),
-    (
-        "rhumerus",
-        "rclavicle",
-        (0.0, -0.3001, 0.0),
-        (
-            ("rx", (-0.5, 0.0, 0.866025404), -190.0, 190.0),
-            ("ry", (0.0, 1.0, 0.0), -100.0, 93.0),
-            ("rz", (-0.866025404, 0.0, -0.5), -190.0, 190.0),
-        ),
-    ),
-    (
-        "rradius",
-        "rhumerus",
-        (0.0, -0.1882, 0.0),
-        (("rx", (-0.5, 0.0, 0.866025404), -10.0, 162.0),),
-    ),
-    (
-        "rwrist",
-        "rradius",
-        (0.0, -0.0941, 0.0),
-        (("ry", (0.0, 1.0, 0.0), -190.0, 189.0),),
-    ),
-    (
-        "rhand",
-        "rwrist",
-        (0.0, -0.038, 0.0),
-        (
-            ("rx", (1.0, 0.0, 0.0), -87.0, 110.0),
-            ("rz", (0.0, 0.0, 1.0), -188.0, 127.0),
-        ),
-    ),
-    ("lhipjoint", "root", (0.0431, 0.0878, -0.1005), ()),
-    (
-        "lfemur",
-        "lhipjoint",
-        (0.0, 0.1387, -0.3812),
-        (
-            ("rx", (0.0, 0.939692621, 0.342020143), -186.0, 61.0),
-            ("ry", (0.0, -0.342020143, 0.939692621), -52.0, 94.0),
-            ("rz", (1.0, 0.0, 0.0), -129.0, 138.0),
-        ),
-    ),
-    (
-        "ltibia",
-        "lfemur",
-        (0.0, 0.1488, -0.409),
-        (("rx", (0.0, 0.939692621, 0.342020143), -11.0, 166.0),),
-    ),
-    (
-        "lfoot",
-        "ltibia",
-        (0.1184, 0.0105, -0.0289),
-        (
-            ("rx", (0.0, 0.939692621, 0.342020143), -95.0, 80.0),
-            ("rz", (0.0, -0.342020143, 0.939692621), -72.0, 76.0),
-        ),
-    ),
-    ("rhipjoint", "root", (0.0431, -0.0878, -0.1005), ()),
-    (
-        "rfemur",
-        "rhipjoint",
-        (0.0, -0.1387, -0.3812),
-        (
-            ("rx", (0.0, 0.939692621, -0.342020143), -185.0, 178.0),
-            ("ry", (0.0, 0.342020143, 0.939692621), -92.0, 50.0),
-            ("rz", (1.0, 0.0, 0.0), -79.0, 126.0),
-        ),
-    ),
-    (
-        "rtibia",
-        "rfemur",
-        (0.0, -0.1488, -0.409),
-        (("rx", (0.0, 0.939692621, -0.342020143), -11.0, 167.0),),
-    ),
-    (
-        "rfoot",
-        "rtibia",
-        (0.1184, -0.0105, -0.0289),
-        (
-            ("rx", (0.0, 0.939692621, -0.342020143), -93.0, 70.0),
-            ("rz", (0.0, 0.342020143, 0.939692621), -73.0, 42.0),
-        ),
-    ),
+_Axes = Mapping[str, tuple[float, float, float]]
+_TRUNK: _Axes = {"rx": (0.0, 1.0, 0.0), "ry": (0.0, 0.0, 1.0), "rz": (1.0, 0.0, 0.0)}
+_LEFT_ARM: _Axes = {"rx": (0.5, 0.0, -0.866025404), "ry": (0.0, -1.0, 0.0), "rz": (-0.866025404, 0.0, -0.5)}
+_RIGHT_ARM: _Axes = {"rx": (-0.5, 0.0, 0.866025404), "ry": (0.0, 1.0, 0.0), "rz": (-0.866025404, 0.0, -0.5)}
+_LEFT_HAND: _Axes = {"rx": (-1.0, 0.0, 0.0), "rz": (0.0, 0.0, 1.0)}
+_RIGHT_HAND: _Axes = {"rx": (1.0, 0.0, 0.0), "rz": (0.0, 0.0, 1.0)}
+_LEFT_LEG: _Axes = {
+    "rx": (0.0, 0.939692621, 0.342020143),
+    "ry": (0.0, -0.342020143, 0.939692621),
+    "rz": (1.0, 0.0, 0.0),
+}
+_LEFT_FOOT: _Axes = {"rx": (0.0, 0.939692621, 0.342020143), "rz": (0.0, -0.342020143, 0.939692621)}
+_RIGHT_FOOT: _Axes = {"rx": (0.0, 0.939692621, -0.342020143), "rz": (0.0, 0.342020143, 0.939692621)}
+_RIGHT_LEG: _Axes = {
+    "rx": (0.0, 0.939692621, -0.342020143),
+    "ry": (0.0, 0.342020143, 0.939692621),
+    "rz": (1.0, 0.0, 0.0),
+}
+"""Hinge axes by channel that bones share."""
+_BONES: tuple[tuple[str, str, tuple[float, float, float], _Axes], ...] = (
+    ("lowerback", "root", (-0.0097, 0.0, 0.1163), _TRUNK),
+    ("upperback", "lowerback", (-0.0005, 0.0, 0.117), _TRUNK),
+    ("thorax", "upperback", (0.0041, 0.0, 0.1181), _TRUNK),
+    ("lowerneck", "thorax", (0.01, 0.0, 0.0956), _TRUNK),
+    ("upperneck", "lowerneck", (-0.0149, 0.0, 0.0953), _TRUNK),
+    ("head", "upperneck", (-0.0063, 0.0, 0.0983), _TRUNK),
+    ("lclavicle", "thorax", (-0.0148, 0.1799, 0.0652), _TRUNK),
+    ("lhumerus", "lclavicle", (0.0, 0.3001, 0.0), _LEFT_ARM),
+    ("lradius", "lhumerus", (0.0, 0.1882, 0.0), _LEFT_ARM),
+    ("lwrist", "lradius", (0.0, 0.0941, 0.0), _LEFT_ARM),
+    ("lhand", "lwrist", (0.0, 0.038, 0.0), _LEFT_HAND),
+    ("rclavicle", "thorax", (-0.0148, -0.1799, 0.0652), _TRUNK),
+    ("rhumerus", "rclavicle", (0.0, -0.3001, 0.0), _RIGHT_ARM),
+    ("rradius", "rhumerus", (0.0, -0.1882, 0.0), _RIGHT_ARM),
+    ("rwrist", "rradius", (0.0, -0.0941, 0.0), _RIGHT_ARM),
+    ("rhand", "rwrist", (0.0, -0.038, 0.0), _RIGHT_HAND),
+    ("lhipjoint", "root", (0.0431, 0.0878, -0.1005), _LEFT_LEG),
+    ("lfemur", "lhipjoint", (0.0, 0.1387, -0.3812), _LEFT_LEG),
+    ("ltibia", "lfemur", (0.0, 0.1488, -0.409), _LEFT_LEG),
+    ("lfoot", "ltibia", (0.1184, 0.0105, -0.0289), _LEFT_FOOT),
+    ("rhipjoint", "root", (0.0431, -0.0878, -0.1005), _RIGHT_LEG),
+    ("rfemur", "rhipjoint", (0.0, -0.1387, -0.3812), _RIGHT_LEG),
+    ("rtibia", "rfemur", (0.0, -0.1488, -0.409), _RIGHT_LEG),
+    ("rfoot", "rtibia", (0.1184, -0.0105, -0.0289), _RIGHT_FOOT),
 )
+"""Bone, parent, vector [m] in the rest pose (x forward, y left, z up), and axes of its hinges."""
+_LIMITS_DEG: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "lowerback": {"rx": (-53.0, 111.0), "ry": (-26.0, 27.0), "rz": (-38.0, 43.0)},
+    "upperback": {"rx": (-34.0, 38.0), "ry": (-31.0, 35.0), "rz": (-23.0, 29.0)},
+    "thorax": {"rx": (-40.0, 23.0), "ry": (-20.0, 23.0), "rz": (-41.0, 28.0)},
+    "lowerneck": {"rx": (-59.0, 40.0), "ry": (-36.0, 54.0), "rz": (-43.0, 71.0)},
+    "upperneck": {"rx": (-46.0, 69.0), "ry": (-47.0, 75.0), "rz": (-57.0, 49.0)},
+    "head": {"rx": (-186.0, 49.0), "ry": (-65.0, 30.0), "rz": (-69.0, 169.0)},
+    "lclavicle": {"ry": (-11.0, 11.0), "rz": (-11.0, 11.0)},
+    "lhumerus": {"rx": (-126.0, 130.0), "ry": (-99.0, 94.0), "rz": (-186.0, 168.0)},
+    "lradius": {"rx": (-12.0, 157.0)},
+    "lwrist": {"ry": (-183.0, 114.0)},
+    "lhand": {"rx": (-75.0, 90.0), "rz": (-110.0, 135.0)},
+    "rclavicle": {"ry": (-11.0, 11.0), "rz": (-11.0, 11.0)},
+    "rhumerus": {"rx": (-190.0, 190.0), "ry": (-100.0, 93.0), "rz": (-190.0, 190.0)},
+    "rradius": {"rx": (-10.0, 162.0)},
+    "rwrist": {"ry": (-190.0, 189.0)},
+    "rhand": {"rx": (-87.0, 110.0), "rz": (-188.0, 127.0)},
+    "lhipjoint": {},
+    "lfemur": {"rx": (-186.0, 61.0), "ry": (-52.0, 94.0), "rz": (-129.0, 138.0)},
+    "ltibia": {"rx": (-11.0, 166.0)},
+    "lfoot": {"rx": (-95.0, 80.0), "rz": (-72.0, 76.0)},
+    "rhipjoint": {},
+    "rfemur": {"rx": (-185.0, 178.0), "ry": (-92.0, 50.0), "rz": (-79.0, 126.0)},
+    "rtibia": {"rx": (-11.0, 167.0)},
+    "rfoot": {"rx": (-93.0, 70.0), "rz": (-73.0, 42.0)},
+}
+"""Lowest and highest angle of each hinge, innermost first [deg]."""
 
 BONES: tuple[str, ...] = tuple(bone for bone, *_ in _BONES)
 
@@ -224,14 +103,14 @@ def standard_skeleton() -> Skeleton:
         names=BONES,
         parents=tuple(-1 if parent == "root" else BONES.index(parent) for _, parent, _, _ in _BONES),
         bone_m=np.array([vector for _, _, vector, _ in _BONES]),
-        hinges=tuple(tuple(hinge[0] for hinge in hinges) for *_, hinges in _BONES),
-        axes=_unit(np.array([axis for *_, hinges in _BONES for _, axis, _, _ in hinges])),
+        hinges=tuple(tuple(_LIMITS_DEG[bone]) for bone in BONES),
+        axes=_unit(np.array([axes[channel] for bone, _, _, axes in _BONES for channel in _LIMITS_DEG[bone]])),
     )
 
 
 def limits_rad() -> Floats:
     """(48, 2) lowest and highest hinge angle [rad]."""
-    return np.deg2rad([[low, high] for *_, hinges in _BONES for _, _, low, high in hinges])
+    return np.deg2rad([limits for bone in BONES for limits in _LIMITS_DEG[bone].values()])
 
 
 def pack(root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Floats:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from threading import current_thread, main_thread
 from types import FrameType
 
-from harness.core.python_process import safe_import_path
+from harness.core.working_folder import safe_import_path
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 REPEAT_S = 0.5

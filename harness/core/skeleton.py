@@ -1,8 +1,13 @@
-"""A skeleton of bones with hinge joints, and its forward kinematics in plain numpy.
+"""A skeleton of bones with hinge joints, its hinge angles, and its forward kinematics in plain numpy.
 
 World axes everywhere: x forward, y left, z up, metres. In the rest pose (all angles zero, root unrotated)
 every bone's frame is parallel to the world. A bone's rotation relative to its parent is the product of its
 hinges, the last named one outermost: R = R(c) R(b) R(a) for hinges (a, b, c), as Acclaim files compose them.
+
+Three orthogonal hinges reach any rotation (closed-form Euler angles), each by two sets of angles; see
+`equivalent_euler_angles`. One or two hinges give the nearest rotation: the one whose quaternion has the largest inner
+product with the wanted quaternion. That product is bilinear in the half-angle vectors (cos, sin), so the best angles
+are the leading singular vectors of a matrix of at most 2 x 2.
 """
 
 from collections.abc import Sequence
@@ -13,7 +18,6 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.errors import UnknownName
 
 
@@ -80,6 +84,27 @@ class Skeleton:
     def with_bones(self, bone_m: Floats) -> "Skeleton":
         """A copy with other bone vectors (B, 3) [m] and the same joints."""
         return Skeleton(self.names, self.parents, bone_m, self.hinges, self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyGeom:
+    """One geom of the body, in the frame of its bone."""
+
+    bone: str
+    """Name of the bone, or "root"."""
+    name: str
+    kind: str
+    """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
+    centre_m: Floats
+    """(3,) [m]."""
+    bone_from_shape: Floats
+    """(4,) unit quaternion."""
+    size_m: Floats
+    """(3,) [m]; see `kind`."""
+    mass_kg: float
+
+    def __post_init__(self) -> None:
+        freeze(self, centre_m=(3,), bone_from_shape=(4,), size_m=(3,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,4 +204,52 @@ def _wrapped_squared(difference_rad: Floats) -> Floats:
 def _centre_on_zero(angles_rad: Floats) -> Floats:
     """Columns (T, N) shifted by whole turns so that each median lies in (-pi, pi]."""
     out: Floats = angles_rad - 2 * np.pi * np.ceil(np.median(angles_rad, axis=0) / (2 * np.pi) - 0.5)
+    return out
+
+
+def hinge_angles(axes: Floats, parent_from_bone: Floats) -> Floats:
+    """Angles (T, N) [rad] of N <= 3 orthogonal hinges (innermost first) whose rotations are nearest to (T, 4)."""
+    if len(axes) == 3:
+        return _euler(axes, parent_from_bone)
+    w, v = parent_from_bone[:, :1], parent_from_bone[:, 1:]
+    if len(axes) == 0:
+        return np.zeros((len(v), 0))
+    along: Floats = v @ axes.T
+    if len(axes) == 1:
+        return 2.0 * np.arctan2(along, w)
+    both: Floats = v @ np.cross(axes[1], axes[0])
+    product = np.stack([np.concatenate([w, along[:, :1]], -1), np.stack([along[:, 1], both], -1)], -2)
+    outer, _, inner = np.linalg.svd(product)
+    return 2.0 * np.stack([np.arctan2(inner[:, 0, 1], inner[:, 0, 0]), np.arctan2(outer[:, 1, 0], outer[:, 0, 0])], -1)
+
+
+def hinge_rotation(axes: Floats, angles_rad: Floats) -> Floats:
+    """Quaternions (T, 4) of hinges (N, 3) at angles (T, N) [rad], innermost first."""
+    out = np.broadcast_to(rotations.IDENTITY, (len(angles_rad), 4))
+    for k, axis in enumerate(axes):
+        out = rotations.multiply(rotations.exp(angles_rad[:, k, None] * axis), out)
+    return out
+
+
+def _euler(axes: Floats, parent_from_bone: Floats) -> Floats:
+    """Angles (T, 3) a, b, c of R = R(c) R(b) R(a) about right-handed orthogonal axes.
+
+    Where b is +-90 deg only a + c or a - c is determined, and a is 0.
+    """
+    m = axes @ rotations.to_matrix(parent_from_bone) @ axes.T
+    b = np.arctan2(-m[:, 2, 0], np.hypot(m[:, 2, 1], m[:, 2, 2]))
+    locked = np.hypot(m[:, 2, 1], m[:, 2, 2]) < 1e-9
+    a = np.where(locked, 0.0, np.arctan2(m[:, 2, 1], m[:, 2, 2]))
+    c = np.where(locked, np.arctan2(-m[:, 0, 1], m[:, 1, 1]), np.arctan2(m[:, 1, 0], m[:, 0, 0]))
+    return np.stack([a, b, c], axis=-1)
+
+
+def are_gimbal(axes: Floats) -> bool:
+    """Whether the axes (N, 3) are three and orthogonal."""
+    return len(axes) == 3 and bool(np.allclose(axes @ axes.T, np.eye(3), atol=1e-9))
+
+
+def equivalent_euler_angles(angles_rad: Floats) -> Floats:
+    """Second set of angles (..., 3) of three orthogonal hinges for the same rotation."""
+    out: Floats = angles_rad * [1.0, -1.0, 1.0] + np.pi
     return out

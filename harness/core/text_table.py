@@ -1,4 +1,4 @@
-"""A table as a record, and its rendering as aligned text; `harness.report.kit.table` renders it as HTML."""
+"""A table as a record, and its rendering as aligned text."""
 
 import textwrap
 from collections.abc import Sequence

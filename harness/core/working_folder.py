@@ -1,14 +1,21 @@
-"""Modules of the working folder: the one that a command names, and what that module imports from beside it.
+"""The working folder: what Python imports and libraries read from it.
 
-A user's own method may lie in the working folder. The folder is not on the import path: a library that tries an import,
-such as `yaml` or `coverage`, would run a file of that name.
+It is not on the import path. `python -m` and `python -c` put it first there, and a file such as `ezc3d.py` among a
+user's recordings would then be run; `-P` and PYTHONSAFEPATH leave it out. A user's own method may lie in it: the module
+that a command names is found, and what that module imports from beside it.
+
+Libraries are imported with their own defaults. On import MuJoCo loads the renderer that MUJOCO_GL names, which the
+harness never uses. matplotlib reads a `matplotlibrc` and numba a `.numba_config.yaml` of the working folder. Such a
+file or variable would change pages, or end every verb.
 """
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
 from types import FrameType, ModuleType
 
 from harness.core.package_data import PACKAGE_FOLDER
@@ -80,3 +87,82 @@ def _importer(frame: FrameType | None) -> str:
 
 def _is_below(file: str, folder: str) -> bool:
     return file.startswith(os.path.join(folder, ""))
+
+
+THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables by which every verb gives the libraries one thread: times are of one core, --jobs uses the others."""
+_SAFE_PATH = "PYTHONSAFEPATH"
+_HASH_SEED = "PYTHONHASHSEED"
+
+
+def python_command(*arguments: str) -> list[str]:
+    """The words that start this Python with `arguments`, such as "-m" and a module; see `python_environment`."""
+    return [sys.executable, "-P", *arguments]
+
+
+def python_environment() -> dict[str, str]:
+    """The environment of such a process: it imports this harness, and nothing from relative folders of PYTHONPATH.
+
+    Hashes of texts, hence the order of sets, are the same in all of them, so that a method computes the same.
+    """
+    root = PACKAGE_FOLDER.parent
+    folders = [folder for folder in os.environ.get("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(folder)]
+    if root.name not in _SITE_FOLDERS and str(root) not in folders:
+        folders.append(str(root))  # a checkout that is not installed
+    return {**os.environ, _SAFE_PATH: "1", _HASH_SEED: "0", "PYTHONPATH": os.pathsep.join(folders)}
+
+
+@contextmanager
+def safe_import_path() -> Iterator[None]:
+    """Python processes that `multiprocessing` starts in the block do not import from the working folder."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
+
+
+def leave_working_folder_out(folder: str) -> None:
+    """Leave the working folder, which `python -m` puts first and `__main__` takes off, out of the import path.
+
+    A checkout of the harness that is the working folder moves behind the standard library, so that worker processes
+    import the same harness. "" stands for no folder.
+    """
+    if folder and Path(folder).resolve() == PACKAGE_FOLDER.parent.resolve():
+        sites = [place for place, name in enumerate(sys.path) if Path(name).name in _SITE_FOLDERS]
+        sys.path.insert(sites[0] if sites else len(sys.path), folder)
+
+
+_ENVIRONMENT = {
+    "MATPLOTLIBRC": os.devnull,  # an empty file of settings
+    "MPLBACKEND": "agg",
+    "MUJOCO_GL": "disable",
+}
+WORKING_FOLDER_FILES = ("matplotlibrc", ".numba_config.yaml")
+"""Files of settings that libraries look for in the working folder."""
+
+
+@contextmanager
+def plain_import() -> Iterator[None]:
+    """Libraries that are first imported in the block have their default settings and read none of a folder.
+
+    The environment is as before afterwards. A variable such as NUMBA_NUM_THREADS, which no library reads on import
+    alone, counts as ever.
+    """
+    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
+    exists = os.path.exists
+    os.environ.update(_ENVIRONMENT)
+    vars(os.path)["exists"] = lambda path: path not in WORKING_FOLDER_FILES and exists(path)
+    try:
+        yield
+    finally:
+        vars(os.path)["exists"] = exists
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

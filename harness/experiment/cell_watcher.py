@@ -1,4 +1,4 @@
-"""Progress while workers compute.
+"""Progress while workers compute, and the end of a run that is interrupted.
 
 A worker reports the cells of a whole task at once, which may be minutes after the first of them was written. Cells are
 folders that appear whole, so a thread counts them there, on this computer or on a disk that workers share.
@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 
 from harness.core.files import TEMPORARY
+from harness.core.interrupts import answer_first_interrupt, raise_interrupt
 from harness.errors import HarnessError
 from harness.results.cell import cell_folder, read_row
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -19,6 +20,7 @@ from harness.results.reported_metrics import PRIMARY_METRIC
 _POLL_INTERVAL_S = 0.5
 _MOST_SHARE = 0.05
 """Most of a core's time that the polls of a large folder take."""
+_STOP_MESSAGE = b"\nharness: finishing what runs; again stops it at once\n"
 
 
 class ProgressCount:
@@ -76,3 +78,27 @@ def _describe_cell(out: Path, key: str) -> str:
         error = row[PRIMARY_METRIC]
         return f"{row['method']} on {row['clip']}" + ("" if error is None else f": {error:.2f}°")
     return ""
+
+
+@contextmanager
+def graceful_stop(stop: Path) -> Iterator[None]:
+    """Turn the first signal into the file `stop`, which workers look for; the next raises KeyboardInterrupt.
+
+    Leaving the context removes the file, and raises KeyboardInterrupt if the file existed.
+    """
+    stop.unlink(missing_ok=True)
+
+    def request_stop() -> None:
+        try:
+            stop.touch()
+        except OSError:  # the folder vanished or its disk is full: stop at once
+            raise_interrupt()
+        os.write(2, _STOP_MESSAGE)  # os.write is safe while something else is printed
+
+    try:
+        with answer_first_interrupt(request_stop):
+            yield
+            if stop.exists():
+                raise_interrupt()
+    finally:
+        stop.unlink(missing_ok=True)

@@ -6,21 +6,22 @@ stopped at any moment and resumed.
 """
 
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from itertools import pairwise
 from pathlib import Path
 from platform import node
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from harness.body.mounts import locate_mount
 from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.line_loss import BAUD, RECORD_BYTES, excess_loss
 from harness.core.split import ClipPart
+from harness.core.stream_health import BAUD, RECORD_BYTES, excess_loss
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.evaluation import evaluate
@@ -29,8 +30,8 @@ from harness.experiment.method_process import MethodFailure
 from harness.experiment.method_run import describe_failure
 from harness.experiment.observed_take import simulated_take
 from harness.experiment.remote_method import close_methods, resolve_method, start_methods
-from harness.experiment.scenario import Scenario, ScenarioMotion, variants
-from harness.mocap.library import LibraryFolders
+from harness.experiment.scenario import Scenario, ScenarioMotion, count_variants, variants
+from harness.mocap.library import LibraryFolders, absolute_folders
 from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct.contract import Method
 from harness.results import manifest, storage
@@ -69,6 +70,22 @@ class PlannedCell:
         return f"{label}{self.method} on {self.part}" + (f" ({', '.join(details)})" if details else "")
 
 
+def plan_cells(
+    scenario: Scenario, parts: Sequence[ClipPart], label: str, chosen: Collection[int] = ()
+) -> list[PlannedCell]:
+    """The cells of test clips in table order: variants change slowest, then clips, inputs and methods.
+
+    `chosen` selects variants by index; () is all.
+    """
+    return [
+        PlannedCell(variant, varied, part, method, inputs, label)
+        for varied, variant in variants(scenario, chosen)
+        for part in parts
+        for inputs in variant.inputs
+        for method in variant.methods
+    ]
+
+
 @dataclass(frozen=True)
 class ClipTask:
     """One test clip of a scenario: everything that a worker process needs."""
@@ -93,12 +110,7 @@ class ClipTask:
 
     def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
-        return [
-            PlannedCell(scenario, varied, self.part, method, inputs, self.label)
-            for varied, scenario in variants(self.scenario, self.chosen)
-            for inputs in scenario.inputs
-            for method in scenario.methods
-        ]
+        return plan_cells(self.scenario, [self.part], self.label, self.chosen)
 
 
 @dataclass(frozen=True)
@@ -301,3 +313,92 @@ def _check_variant_names(scenario: Scenario, source: MotionSource, isolation: Is
     if noise.physics is not None:
         emitters = load_constellation(noise.physics.constellation)
         check_emitters(noise.physics.room, scenario.tracker.origin_m[2], emitters.number, emitters.position_m)
+
+
+T = TypeVar("T")
+
+MAX_CELLS_PER_TASK = 200
+"""Largest number of cells in one task. It bounds what a killed worker loses and how rarely a progress bar moves."""
+_TASKS_PER_WORKER = 4
+"""Number of tasks per worker that the last clips are cut into, so that workers end at nearly the same time."""
+
+
+def scenario_label(scenario: Scenario) -> str:
+    """Label of a scenario in a folder of several; it precedes the names of the scenario's cells."""
+    return f"{scenario.name} seed {scenario.seed}"
+
+
+def cell_names(scenario: Scenario, *, labelled: bool = True) -> list[str]:
+    """Names of all cells of a scenario in table order: varied values change slowest, then clips, inputs and methods.
+
+    Without `labelled` the names leave out the scenario, as in the folder of a single run.
+    """
+    label = scenario_label(scenario) if labelled else ""
+    return [str(cell) for cell in plan_cells(scenario, list(map(ClipPart.parse, scenario.motion.test)), label)]
+
+
+def plan_tasks(
+    scenarios: Iterable[Scenario],
+    folder: LibraryFolders | None,
+    command: str,
+    workers: int,
+    *,
+    labelled: bool = True,
+    isolation: Isolation = DEFAULT_ISOLATION,
+) -> list[ClipTask]:
+    """Tasks that together hold every cell of the scenarios once.
+
+    A task is a whole clip where possible, because its cells share motion and training. The last clips are cut into
+    parts, so that all workers end at nearly the same time.
+    """
+    clips = [task for scenario in scenarios for task in _clip_tasks(scenario, folder, command, labelled, isolation)]
+    shared = max(min(len(clips), workers), 1)
+    tasks = []
+    for place, task in enumerate(clips):
+        count = count_variants(task.scenario)
+        pieces = -(-_TASKS_PER_WORKER * workers // shared) if workers > 1 and place >= len(clips) - shared else 1
+        cells_per_variant = len(task.scenario.inputs) * len(task.scenario.methods)
+        pieces = max(pieces, -(-count * cells_per_variant // MAX_CELLS_PER_TASK))
+        parts = (tuple(part) if len(part) < count else () for part in _split_evenly(range(count), pieces))
+        tasks += [replace(task, chosen=chosen) for chosen in parts]
+    pieces = -(-workers // max(len(tasks), 1))
+    return [
+        replace(task, scenario=replace(task.scenario, methods=_rotate(methods, place, workers)))
+        for place, task in enumerate(tasks)
+        for methods in _split_evenly(task.scenario.methods, pieces)
+    ]
+
+
+def split_task(task: ClipTask) -> list[ClipTask]:
+    """One task for each cell of a task."""
+    chosen = task.chosen or range(count_variants(task.scenario))
+    return [
+        replace(task, scenario=replace(task.scenario, methods=(method,), inputs=(inputs,)), chosen=(place,))
+        for place in chosen
+        for inputs in task.scenario.inputs
+        for method in task.scenario.methods
+    ]
+
+
+def _clip_tasks(
+    scenario: Scenario, folder: LibraryFolders | None, command: str, labelled: bool, isolation: Isolation
+) -> list[ClipTask]:
+    label = scenario_label(scenario) if labelled else ""
+    library = None if folder is None else absolute_folders(folder)  # a worker may have another working directory
+    return [
+        ClipTask(scenario, ClipPart.parse(clip), b, library, command, label=label, isolation=isolation)
+        for clip, b in scenario.motion.tested
+    ]
+
+
+def _rotate(methods: Sequence[str], place: int, workers: int) -> tuple[str, ...]:
+    """The methods, from another one on for each worker: in a first run each then compiles other functions."""
+    start = place % workers * len(methods) // workers
+    return (*methods[start:], *methods[:start])
+
+
+def _split_evenly(items: Sequence[T], pieces: int) -> list[Sequence[T]]:
+    """At most `pieces` parts of nearly equal size, none of them empty."""
+    count = max(min(pieces, len(items)), 1)
+    ends = [len(items) * n // count for n in range(count + 1)]
+    return [items[start:stop] for start, stop in pairwise(ends)]

@@ -15,13 +15,12 @@ from harness.body import humanoid, retargeting
 from harness.body.mounts import Mount, locate_mount
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core.fields import replace_fields
-from harness.core.hearing import poor_hearing
 from harness.core.humanoid24 import BONES, standard_skeleton
-from harness.core.motion import BodyMotion, Clip
+from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_frames, refuse_leak, select_examples
-from harness.core.time_grid import count_steps
+from harness.core.stream_health import poor_hearing
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.remote_method import method_identity
@@ -43,7 +42,7 @@ from harness.results import manifest, storage
 from harness.score.loops import WARM_UP_S
 from harness.score.metrics import VERSIONS
 from harness.simulate import noise as noises
-from harness.simulate.mounting import perturb_mounts
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.simulate.trajectory import Trajectory

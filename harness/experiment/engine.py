@@ -19,23 +19,24 @@ from typing import Any
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
-from harness.core.split import ClipPart
-from harness.core.training_data import declared_training_data
+from harness.core.split import ClipPart, declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
-from harness.experiment.cell_watcher import ProgressCount
+from harness.experiment.cell_watcher import ProgressCount, graceful_stop
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
+    cell_names,
     check_names,
     clear_caches,
     open_scenario_motion,
+    plan_tasks,
     run_task,
+    scenario_label,
+    split_task,
 )
 from harness.experiment.executors import TaskExecutor, process_executor, run_in_process
-from harness.experiment.interruption import graceful_stop
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
-from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
 from harness.experiment.remote_method import close_methods, describe_options, hash_method, resolve_method
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep

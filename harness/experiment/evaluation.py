@@ -24,8 +24,7 @@ from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_fa
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.reconstruct.contract import Method
-from harness.results.reported_metrics import TABLE_COLUMNS
-from harness.results.sigma_table import sigma_lines
+from harness.results.reported_metrics import TABLE_COLUMNS, sigma_lines
 from harness.score.loops import COVERAGE_FLOOR, LoopScores, score_loops
 from harness.score.metrics import FRAME_METRICS
 from harness.score.timing import step_times_ms

@@ -21,9 +21,8 @@ from threading import Lock
 from typing import Any, Protocol, TypeVar
 
 from harness.core.interrupts import shield_children
-from harness.core.python_process import THREAD_VARIABLES
 from harness.core.workers import Pool, schedule_tasks
-from harness.core.working_folder import serve_folder
+from harness.core.working_folder import THREAD_VARIABLES, serve_folder
 from harness.errors import BadInput, MissingExtra
 from harness.experiment.cells import ClipTask
 from harness.results.manifest import source_hash

@@ -1,20 +1,20 @@
 """Audit of what a method reads in its process: files below its own folders, and environment variables.
 
 They must be part of the cell's key. Python reports every file that it opens (PEP 578). Files that a library in C opens,
-and files of other processes, are not reported.
+and files of other processes, are not reported. Python has no event for variables; `os.environ` reports them.
 """
 
 import errno
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from harness.core.python_process import THREAD_VARIABLES
+from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import HarnessError
-from harness.experiment.environment_audit import audit_environment
 from harness.reconstruct.source_files import (
     CACHE_FOLDER,
     SourceFiles,
@@ -33,6 +33,9 @@ _MACHINE_CODE = (".pyc", ".nbi", ".nbc")
 which an edit may leave as they are."""
 _OPEN_FOLDERS = "/proc/self/fd"
 """Links to open files and folders on Linux."""
+_PASSED_THROUGH = ("os", "collections", "collections.abc", "_collections_abc", "string", "configparser", __name__)
+"""Modules whose functions read a variable for somebody else, such as `os.getenv`; so does `os.path.expandvars`."""
+_listeners: list[Callable[[str, str], None]] = []
 
 
 class UndeclaredInput(HarnessError):
@@ -175,3 +178,26 @@ def _file_state(path: str) -> tuple[int, ...]:
     except OSError:
         return ()
     return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
+
+
+class _AuditedEnvironment(os._Environ):  # type: ignore[type-arg]  # generic in type stubs alone
+    def __getitem__(self, key: Any) -> Any:
+        frame: Any = sys._getframe(1)
+        while frame.f_back is not None and (
+            frame.f_globals.get("__name__") in _PASSED_THROUGH or frame.f_code.co_name == "expandvars"
+        ):
+            frame = frame.f_back
+        for hear in _listeners:
+            hear(os.fsdecode(key), frame.f_code.co_filename)
+        return super().__getitem__(key)
+
+    def clear(self) -> None:
+        for key in list(self):  # without a look at the values
+            del self[key]
+
+
+def audit_environment(hear: Callable[[str, str], None]) -> None:
+    """Call `hear` with the name of each variable that is read from now on, and the file of the code that reads it."""
+    _listeners.append(hear)
+    for environment in (os.environ, getattr(os, "environb", os.environ)):
+        environment.__class__ = _AuditedEnvironment

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.fields import build, replace_fields
-from harness.core.toml_digest import EARLIER_SCHEMA
+from harness.core.toml_file import EARLIER_SCHEMA
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file
 from harness.simulate.link import TrackerConfig

@@ -19,7 +19,7 @@ from harness.core.estimate import as_estimate
 from harness.core.fault_report import find_system_fault
 from harness.core.messages import MessageError, read_message, write_message
 from harness.core.object_state import describe_state
-from harness.core.training_data import declared_training_data
+from harness.core.split import declared_training_data
 from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, HarnessError, SystemFault, shorten
 from harness.experiment.file_audit import FileAudit, UndeclaredInput

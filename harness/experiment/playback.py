@@ -172,7 +172,4 @@ def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequen
 
 def _behaviour(scenario: Scenario, part: ClipPart) -> str:
     """Behaviour of a test clip; "" for a clip that is none of the scenario's test clips."""
-    tested, behaviours = scenario.motion.test, scenario.motion.behaviours
-    if str(part) not in tested:
-        return ""
-    return behaviours[tested.index(str(part))] if len(behaviours) > 1 else behaviours[0]
+    return dict(scenario.motion.tested).get(str(part), "")

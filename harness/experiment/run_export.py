@@ -9,11 +9,11 @@ from harness.core.fields import build
 from harness.errors import BadInput
 from harness.experiment.clip_evaluation import mount_of
 from harness.experiment.scenario import Station
-from harness.mocap.write.body_model import BodyModel, StationPlace
+from harness.mocap.write.body_model import BodyModel, MountedStation
 from harness.mocap.write.export import export
 from harness.mocap.write.posed_motion import PosedMotion
 from harness.results.cell import Cell
-from harness.results.selection import select_cells
+from harness.results.reader import select_cells
 
 
 def export_run(
@@ -28,7 +28,7 @@ def export_run(
 ) -> list[Path]:
     """Write the true and the estimated motion of a run's cells to files; returns the files.
 
-    `clips` and `methods` choose the cells (see `results.selection.select_cells`), `fmt` is one of
+    `clips` and `methods` choose the cells (see `results.reader.select_cells`), `fmt` is one of
     `mocap.write.export.FORMATS`. Raises the errors of both.
     """
     return export(
@@ -47,5 +47,5 @@ def body_model(cell: Cell, motion: PosedMotion) -> BodyModel:
     places = [(mount, locate_mount(motion.skeleton, mount)) for mount in mounts]
     return BodyModel(
         body_geoms(motion.skeleton),
-        [StationPlace(mount.station, mount.bone, position_m, turn) for mount, (position_m, turn) in places],
+        [MountedStation(mount.station, mount.bone, position_m, turn) for mount, (position_m, turn) in places],
     )

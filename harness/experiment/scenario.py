@@ -13,10 +13,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import MAX_TOML_BYTES, read_toml
 from harness.core.input_file import check_input_file, names_input_file
-from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields, check_words
 from harness.core.split import ClipPart, StatisticalUnit
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.fitted_unit import merge_fitted_unit
@@ -78,6 +77,12 @@ class ScenarioMotion:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def tested(self) -> list[tuple[str, str]]:
+        """Each test clip with its behaviour."""
+        repeated = self.behaviours * (len(self.test) if len(self.behaviours) == 1 else 1)
+        return list(zip(self.test, repeated, strict=True))
 
 
 @dataclass(frozen=True)
@@ -369,18 +374,36 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
             yield f"{before}{key}", value
 
 
-def find_scenario(path: Path | str) -> Path:
-    """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile."""
+def find_scenario(path: Path | str, beside: Path | None = None) -> Path:
+    """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile.
+
+    With a folder `beside`, a file there comes first, then one in the folder of shipped scenarios, both with or without
+    `.toml` in their names.
+    """
+    for folder in (beside, data_folder("scenarios")) if beside is not None else ():
+        for file in (folder / path, folder / f"{path}.toml"):
+            if names_input_file(file):
+                return file
+    return find_config(
+        path, "scenario", Path("scenarios"), shipped_scenarios(), "`harness list` names the shipped ones."
+    )
+
+
+def find_config(path: Path | str, kind: str, folder: Path, shipped: Sequence[Path], advice: str) -> Path:
+    """The path of a file in TOML of a kind, such as "sweep": a file, or a shipped one by its bare name.
+
+    A shipped one is also found by its name in the `folder` of the repository. UnknownName, BadFile with this advice.
+    """
     given = Path(path)
     check_words(given)
     if names_input_file(given):
         return given
-    shipped = {file.stem: file for file in shipped_scenarios()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
-        return shipped[given.stem]
+    by_name = {file.stem: file for file in shipped}
+    if given.suffix in ("", ".toml") and given.stem in by_name and given.parent in (Path(), folder):
+        return by_name[given.stem]
     if given.parent == Path() and not given.suffix:
-        raise UnknownName("scenario", str(path), shipped)
-    check_input_file(given, "a scenario in TOML", MAX_TOML_BYTES, "`harness list` names the shipped ones.")
+        raise UnknownName(kind, str(path), by_name)
+    check_input_file(given, f"a {kind} in TOML", MAX_TOML_BYTES, advice)
     return given
 
 

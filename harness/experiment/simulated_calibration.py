@@ -111,10 +111,7 @@ def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold
     pose = tpose(session.body.skeleton)
     frames = session.observe_poses([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
-    errors = measure_calibration_errors(found.calibration, session.body.skeleton, session)
-    return PerformerCalibration(
-        found.calibration, session.body, errors, (_error_note("T-pose, bone lengths known", errors),)
-    )
+    return _with_errors(session, found.calibration, session.body, "T-pose, bone lengths known")
 
 
 def simulate_poses_calibration(
@@ -126,9 +123,8 @@ def simulate_poses_calibration(
     """
     held = _observe_eight_poses(session, miss_rad, hold_s)
     found = calibrate_poses(held, prior, session.nominal)
-    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
-    notes = (_error_note(f"eight poses, other bones learnt from {prior.source}", errors),)
-    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
+    procedure = f"eight poses, other bones learnt from {prior.source}"
+    return _with_errors(session, found.calibration, build_body(found.skeleton), procedure)
 
 
 def simulate_liu2011_calibration(
@@ -139,9 +135,8 @@ def simulate_liu2011_calibration(
     UnusableHold also when a bone of the minimum has no length, since no body can be built from it.
     """
     found = calibrate_liu2011(_observe_eight_poses(session, miss_rad, hold_s), prior, session.nominal)
-    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
-    notes = (_error_note(f"Liu's eq. 1 as printed, other bones learnt from {prior.source}", errors),)
-    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
+    procedure = f"Liu's eq. 1 as printed, other bones learnt from {prior.source}"
+    return _with_errors(session, found.calibration, build_body(found.skeleton), procedure)
 
 
 def simulate_kim2012_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
@@ -191,12 +186,14 @@ def _heading_error_deg(world_from_tracker: Floats, session: TrackerSession) -> f
     return float(np.rad2deg(abs(rotations.yaw_rad(room))))
 
 
-def _error_note(procedure: str, errors: Mapping[str, float]) -> str:
-    return (
+def _with_errors(session: TrackerSession, found: Calibration, body: Body, procedure: str) -> PerformerCalibration:
+    errors = measure_calibration_errors(found, body.skeleton, session)
+    note = (
         f"calibrated by {procedure}: mounts {errors['mount_mm']:.0f} mm and {errors['mount_deg']:.1f} deg off, "
         f"bone lengths {errors['length_mm']:.0f} mm (root mean square), "
         f"room {errors['room_heading_deg']:.1f} deg about the vertical"
     )
+    return PerformerCalibration(found, body, errors, (note,))
 
 
 def _rms(values: Floats) -> float:

@@ -1,17 +1,14 @@
 """Sweeps: their TOML files, and the scenarios that they expand to (scenario x clip x method x seed x any key)."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from harness.core.fields import build
-from harness.core.files import MAX_TOML_BYTES, read_toml
-from harness.core.input_file import check_input_file, names_input_file
-from harness.core.names import FileName, MethodName, Name, Text, check_words
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range
+from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.scenario import (
     SCHEMA,
@@ -19,6 +16,7 @@ from harness.experiment.scenario import (
     check_scenario,
     dotted_keys,
     expand_clips,
+    find_config,
     find_scenario,
     load_scenario,
 )
@@ -46,7 +44,8 @@ class Sweep:
 
 def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     """Load the sweep of a TOML file or the shipped one of that name; the sweep and its path. BadFile, UnknownName."""
-    path = find_sweep(path)
+    advice = "Shipped ones are in scenarios/sweeps/."
+    path = find_config(path, "sweep", Path("scenarios/sweeps"), shipped_sweeps(), advice)
     content = read_toml(path, _EXPECTED, _ADVICE)
     if "motion" in content:
         raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
@@ -68,21 +67,6 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     return sweep, path
 
 
-def find_sweep(path: Path | str) -> Path:
-    """Path of a sweep, given as a file or as the name of a shipped one; BadFile, UnknownName."""
-    given = Path(path)
-    check_words(given)
-    if names_input_file(given):
-        return given
-    shipped = {file.stem: file for file in shipped_sweeps()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/sweeps")):
-        return shipped[given.stem]
-    if given.parent == Path() and not given.suffix:
-        raise UnknownName("sweep", str(path), shipped)
-    check_input_file(given, "a sweep in TOML", MAX_TOML_BYTES, "Shipped ones are in scenarios/sweeps/.")
-    return given
-
-
 def shipped_sweeps() -> list[Path]:
     return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
@@ -96,7 +80,7 @@ def expand_sweep(
     for values that do not fit.
     """
     with name_file(path):
-        loaded = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
+        loaded = [expand_clips(load_scenario(find_scenario(name, path.parent)), folder) for name in sweep.scenarios]
         clips = dict.fromkeys(clip for scenario in loaded for clip in scenario.motion.test)
         for clip in sweep.clips:
             if clip not in clips:
@@ -116,8 +100,7 @@ def expand_sweep(
 
 def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
     motion = scenario.motion
-    behaviours = motion.behaviours * (1 if len(motion.behaviours) > 1 else len(motion.test))
-    kept = {c: b for c, b in zip(motion.test, behaviours, strict=True) if not sweep.clips or c in sweep.clips}
+    kept = {clip: behaviour for clip, behaviour in motion.tested if not sweep.clips or clip in sweep.clips}
     if not kept:
         advice = f"Its test clips are: {', '.join(motion.test)}."
         raise BadInput(f"The sweep has none of the clips of {scenario.name}.", advice)
@@ -127,20 +110,8 @@ def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
         motion=replace(motion, test=tuple(kept), behaviours=tuple(kept.values())),
         methods=methods or scenario.methods,
         inputs=sweep.inputs or scenario.inputs,
-        vary=_merge_vary(scenario.vary, sweep.vary),
+        vary=dict(dotted_keys(scenario.vary)) | dict(dotted_keys(sweep.vary)),
         expected_order=(),
         left_out={},
         fault=(),
     )
-
-
-def _merge_vary(scenario: Mapping[str, Any], sweep: Mapping[str, Any]) -> dict[str, Any]:
-    """Varied values by dotted key; those of the sweep replace those of the scenario."""
-    return {**dict(dotted_keys(scenario)), **dict(dotted_keys(sweep))}
-
-
-def _scenario_file(name: str, beside: Path) -> Path:
-    for file in (beside / name, beside / f"{name}.toml"):
-        if names_input_file(file):
-            return file
-    return find_scenario(name)

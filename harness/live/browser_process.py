@@ -15,7 +15,7 @@ from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput
 from harness.live.live_statistics import LiveStatistics
-from harness.live.pose_ring import PoseRing
+from harness.live.shared_memory import PoseRing
 from harness.view.live_page import LiveContent
 from harness.view.server import ViewServer
 

@@ -17,10 +17,10 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.live.browser_process import BrowserConfig
 from harness.live.pose import LivePose
-from harness.live.pose_ring import PoseRing
-from harness.stream.recording.recording_switch import RecordingSwitch
+from harness.live.shared_memory import PoseRing, first_message
+from harness.stream.recording.recorder import RecordingSwitch
 
-_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 2.0
+_END_TIMEOUT_S = 2.0
 
 
 class BrowserOutput:
@@ -50,24 +50,16 @@ class BrowserOutput:
             self._ring = PoseRing(SPAWN, len(stations))
             self._process = FunctionProcess(_run_process, config, self._ring)
         try:
-            self.url = self._wait_for_url()
+            message = first_message(self._process)
+            if isinstance(message, OSError):
+                raise BadInput(f"{self.name} cannot be shown: {message}.", "Leave the option out.")
         except BaseException:
             self.close()
             raise
+        self.url = str(message)
         self.description = f"view: {self.url}"
         self._thread = Thread(target=self._carry_out, name="page commands", daemon=True)
         self._thread.start()
-
-    def _wait_for_url(self) -> str:
-        try:
-            message = self._process.receive(_START_TIMEOUT_S)
-        except TimeoutError:
-            message = OSError("it does not answer")
-        except EOFError:
-            message = OSError(f"its process ended with exit code {self._process.exit_code}")
-        if isinstance(message, OSError):
-            raise BadInput(f"{self.name} cannot be shown: {message}.", "Leave the option out.")
-        return str(message)
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""

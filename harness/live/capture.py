@@ -1,21 +1,59 @@
-"""The capture thread, which only reads the tracker, so that no byte waits while a pose is solved."""
+"""The capture thread, which only reads the tracker, and the queue to the solving thread: no byte waits for a pose."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from threading import Thread
+from typing import Generic, TypeVar
 
-from harness.live.dropping_queue import DroppingQueue
 from harness.stream.frame import TrackerFrame, TrackerStream
 
+T = TypeVar("T")
 
-@dataclass(frozen=True, slots=True)
-class CapturedFrame:
-    """A frame, and when it came out of the stream."""
 
-    frame: TrackerFrame
-    captured_s: float
-    """Host monotonic clock when the stream delivered the frame [s]."""
+class DroppingQueue(Generic[T]):
+    """A bounded queue for one producer and one consumer thread; a full queue drops and counts its oldest item."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.dropped = 0
+        self._items: SimpleQueue[T | None] = SimpleQueue()
+
+    def __len__(self) -> int:
+        return self._items.qsize()
+
+    def put(self, item: T) -> None:
+        """Add an item; never blocks."""
+        if self._items.qsize() >= self.size:
+            try:
+                self._items.get_nowait()
+                self.dropped += 1
+            except Empty:  # the consumer took it meanwhile
+                pass
+        self._items.put(item)
+
+    def take(self) -> T | None:
+        """Remove and return the oldest item, waiting for one; None after the end."""
+        item = self._items.get()
+        if item is None:
+            self._items.put(None)  # for the next call
+        return item
+
+    def drop_all(self) -> None:
+        """Drop and count all items in the queue; called by the consumer."""
+        for _ in range(len(self)):
+            if self._items.get() is None:
+                self.end()
+            else:
+                self.dropped += 1
+
+    def end(self) -> None:
+        """Mark the end; items in the queue can still be taken."""
+        self._items.put(None)
+
+
+CapturedFrame = tuple[TrackerFrame, float]
+"""A frame, and the time on the host's monotonic clock at which the stream delivered it [s]."""
 
 
 class CaptureThread:
@@ -43,7 +81,7 @@ class CaptureThread:
         try:
             for frame in self._stream:
                 self.frames += 1
-                self._queue.put(CapturedFrame(frame, self._clock()))
+                self._queue.put((frame, self._clock()))
         except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:

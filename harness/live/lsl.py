@@ -14,8 +14,8 @@ from typing import Any
 
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra
+from harness.live.file_outputs import hinges_in_qpos_order
 from harness.live.pose import LivePose
-from harness.live.pose_table import hinges_in_qpos_order
 
 _LOOPBACK_CONFIG = """
 [multicast]

@@ -5,9 +5,9 @@ drops its oldest frames, solves and sends. The caller's thread waits, and Ctrl-C
 """
 
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from threading import Event, Thread
 
 from harness.body.humanoid import Body
@@ -15,11 +15,9 @@ from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin, Status
-from harness.live.capture import CapturedFrame, CaptureThread
-from harness.live.dropping_queue import DroppingQueue
-from harness.live.latency import StageLatencies
+from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
+from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
-from harness.live.low_latency import collect_garbage, low_latency_mode
 from harness.live.pose import LivePose, Output
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream
@@ -50,24 +48,24 @@ class LiveOptions:
     measured from the time at which the stream delivers a frame."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LiveResult:
     """Result of a live session."""
 
-    captured: int
-    """Frames that the stream delivered."""
-    frames_before: int
-    """Frames before the calibration was done and the method was ready."""
-    dropped: int
-    """Frames that the queue dropped."""
-    status: dict[str, int]
-    """Number of poses by status."""
-    origin: dict[str, int]
-    """Number of poses by origin."""
-    seconds: float
-    """Time from the first to the last pose [s]."""
     stages: StageLatencies
-    failed: dict[str, str]
+    captured: int = 0
+    """Frames that the stream delivered."""
+    frames_before: int = 0
+    """Frames before the calibration was done and the method was ready."""
+    dropped: int = 0
+    """Frames that the queue dropped."""
+    status: dict[str, int] = field(default_factory=lambda: {state.name.lower(): 0 for state in Status})
+    """Number of poses by status."""
+    origin: dict[str, int] = field(default_factory=lambda: {part.name.lower(): 0 for part in Origin})
+    """Number of poses by origin."""
+    seconds: float = 0.0
+    """Time from the first to the last pose [s]."""
+    failed: dict[str, str] = field(default_factory=dict)
     """Error of each output that failed, by its name."""
     lag: int = 0
     """Number of frames by which the method answers later than it could, see `core.estimate.Estimate.lag`."""
@@ -138,7 +136,9 @@ def run_session(
         progress("")
     if error := solver.error or capture.error:
         raise error
-    return replace(solver.result(capture.frames), stopped=stopped)
+    solver.result.captured, solver.result.dropped = capture.frames, solver.dropped
+    solver.result.stopped = stopped
+    return solver.result
 
 
 class _SolverThread:
@@ -161,15 +161,12 @@ class _SolverThread:
         self._outputs, self._options, self._say, self._clock = list(outputs), options, say, clock
         self._kinematics = Kinematics(body)
         self._host_clock = HostClockEstimator()
-        self._stages = StageLatencies(1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s)
-        self._status: Counter[str] = Counter()
-        self._origin: Counter[str] = Counter()
-        self._failed: dict[str, str] = {}
+        deadline_s = 1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s
+        self.result = LiveResult(StageLatencies(deadline_s))
         self._session: Session | None = None
-        self._frames_calibrated = self._frames_discarded = 0
-        """Frames that the calibration used, and frames that came while the method prepared."""
-        self._first_s = self._last_s = 0.0
-        self._lag = 0
+        self._frames_discarded = 0
+        """Frames that came while the method prepared."""
+        self._first_s = 0.0
         self._waiting: deque[tuple[TrackerFrame, float]] = deque()
         """The frame that was answered last and those after it, with their times of measurement [s]."""
         self.start_s = float("inf")
@@ -204,21 +201,7 @@ class _SolverThread:
         try:
             output.close()
         except Exception as error:  # the other outputs must be closed too
-            self._failed.setdefault(output.name, _error_text(error))
-
-    def result(self, captured: int) -> LiveResult:
-        return LiveResult(
-            captured=captured,
-            frames_before=self._frames_calibrated + self._frames_discarded,
-            dropped=self.dropped,
-            status={state.name.lower(): self._status[state.name] for state in Status},
-            origin={part.name.lower(): self._origin[part.name] for part in Origin},
-            seconds=self._last_s - self._first_s,
-            stages=self._stages,
-            failed=self._failed,
-            lag=self._lag,
-            lag_s=self._lag / self._options.rate_hz,
-        )
+            self.result.failed.setdefault(output.name, _error_text(error))
 
     @property
     def dropped(self) -> int:
@@ -233,23 +216,24 @@ class _SolverThread:
             if (captured := self._queue.take()) is None:
                 self._say("calibration: the stream ended before it was done")
                 return None
-            self._frames_calibrated += 1
-            calibration = calibrator.add(captured.frame, self._say)
+            self.result.frames_before += 1
+            calibration = calibrator.add(captured[0], self._say)
         session = self._reconstructor.begin(calibration)  # a method may need some time for it
         self._queue.drop_all()
         self._frames_discarded = self._queue.dropped
+        self.result.frames_before += self._frames_discarded
         return session
 
     def _solve(self, session: Session) -> None:
-        number, collected_s = 0, self._clock()
+        number, collected_s, done = 0, self._clock(), self.result
         while (captured := self._queue.take()) is not None:
             taken_s = self._clock()
-            frame = captured.frame
+            frame, captured_s = captured
             estimate = session.step(frame)
             ready_s = self._clock()
             self._waiting.append((frame, self._host_clock.measured_s(frame)))
-            if estimate.lag > self._lag:  # the first frames of a session with a lag: the first one is answered again
-                self._lag = estimate.lag
+            if estimate.lag > done.lag:  # the first frames of a session with a lag: the first one is answered again
+                done.lag, done.lag_s = estimate.lag, estimate.lag / self._options.rate_hz
                 continue
             while len(self._waiting) > estimate.lag + 1:
                 self._waiting.popleft()
@@ -257,12 +241,13 @@ class _SolverThread:
             pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics)
             self._send(pose)
             sent_s = self._clock()
-            received_s = frame.received_s if self._options.host_timestamps else captured.captured_s
-            self._stages.add(received_s, taken_s, ready_s, sent_s)
+            received_s = frame.received_s if self._options.host_timestamps else captured_s
+            done.stages.add(received_s, taken_s, ready_s, sent_s)
             self._statistics.add(frame, estimate.status, ready_s - received_s)
-            self._status[estimate.status.name] += 1
-            self._origin[estimate.origin.name] += 1
-            self._first_s, self._last_s = self._first_s or ready_s, ready_s
+            done.status[estimate.status.name.lower()] += 1
+            done.origin[estimate.origin.name.lower()] += 1
+            self._first_s = self._first_s or ready_s
+            done.seconds = ready_s - self._first_s
             number += 1
             if len(self._queue) == 0 and sent_s - collected_s > _COLLECT_PERIOD_S:
                 collected_s = sent_s
@@ -273,7 +258,7 @@ class _SolverThread:
             try:
                 output.send(pose)
             except Exception as error:  # no error of an output ends the session
-                self._failed[output.name] = _error_text(error)
+                self.result.failed[output.name] = _error_text(error)
                 self._outputs.remove(output)
                 self._say(f"{output.name}: {_error_text(error)}; the session goes on without it")
                 self._close(output)

@@ -18,7 +18,7 @@ from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.files import atomic_path
 from harness.core.skeleton import Skeleton, forward_kinematics
-from harness.live.shared_pose import BESIDE, CLOSED, CONFIGURATION, READY, STILL_SHARE, SharedPose, ViewerConfig
+from harness.live.shared_memory import BESIDE, CLOSED, CONFIGURATION, READY, STILL_SHARE, SharedPose, ViewerConfig
 
 _COLOURS = {Status.SOLVED: "#e8850c", Status.HELD: "#a98a63", Status.LOST: "#9aa3ab"}
 """The fewer readings a pose rests on, the paler it is drawn."""

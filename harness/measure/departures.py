@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 
 NAMED_LEVEL = 0.05
 """Largest corrected p-value with which a departure is named."""

@@ -10,39 +10,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import NORMAL_QUANTILE, Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
-from harness.measure.echoes import EchoBursts, echo_limit_m, find_echoes
-from harness.measure.episode_share import episode_share
+from harness.measure.episode_distributions import episode_share, fit_length, fit_uniform
 from harness.measure.excursions import (
     DEFAULT_RAMP_S,
     ExcursionDetector,
     ExcursionEvent,
-    ExcursionNoise,
-    ExcursionSearch,
+    Innovations,
 )
-from harness.measure.gaps import Gaps, find_gaps_at_rest, leaked_tilt_rad
+from harness.measure.gaps_and_echoes import (
+    EchoBursts,
+    Gaps,
+    echo_limit_m,
+    find_echoes,
+    find_gaps_at_rest,
+    leaked_tilt_rad,
+)
+from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.static_series import StaticSeries
-from harness.measure.uniform_size import fit_uniform
-from harness.measure.vector_length import fit_length
 
-EPISODE_KEYS = (
-    "components.excursion.onsets_per_min",
-    "components.excursion.size_m.0",
-    "components.excursion.size_m.1",
-    "components.excursion.stay_s.0",
-    "components.excursion.stay_s.1",
-    "components.echo.share",
-    "components.echo.burst_records.0",
-    "components.echo.burst_records.1",
-    "components.echo.size_m.0",
-    "components.echo.size_m.1",
-    "components.dropout.share",
-    "components.dropout.gap_s.0",
-    "components.dropout.gap_s.1",
-    "components.dropout.coast_s",
-    "components.dropout.tilt_rad",
-)
+EXCURSION_RATE = "components.excursion.onsets_per_min"
 _INJECTED = 200
 """Least number of excursions that are injected, if the capture has any."""
 _MOST_ROUNDS = 3
@@ -77,7 +65,7 @@ class EpisodeFit:
     """Episodes of all series, and the parameters behind them."""
 
     parameters: Mapping[str, Interval]
-    """Dotted key -> number, by `EPISODE_KEYS`."""
+    """Dotted key of a scenario -> number."""
     means: Mapping[str, Interval]
     """Key without an index -> mean of a distribution of which the parameters are the ends."""
     by_station: Mapping[str, Mapping[str, Interval]]
@@ -86,39 +74,39 @@ class EpisodeFit:
 
 
 def find_disturbances(
-    series: Sequence[StaticSeries], noise: ExcursionNoise
-) -> tuple[list[SeriesEpisodes], list[ExcursionSearch]]:
+    series: Sequence[StaticSeries], noise: ErrorProcess
+) -> tuple[list[SeriesEpisodes], list[Innovations]]:
     """Find the episodes of each series among noise of this size, and what the search for excursions leaves."""
-    limit_m = echo_limit_m(noise.white_m, noise.drift_m, noise.correlation_s)
+    limit_m = echo_limit_m(noise.white, noise.drift, noise.correlation_s)
     detectors = {one.rate_hz: ExcursionDetector(one.rate_hz, noise) for one in series}
-    out, searches = [], []
+    out, residuals = [], []
     for one in series:
         echoes, gaps = find_echoes(one, limit_m), find_gaps_at_rest(one)
         left_out = echoes.mask(len(one)) | gaps.coasting
         detector = detectors[one.rate_hz]
-        search = detector.search(detector.innovations(one, left_out), one.station)
+        events, residual = detector.search(detector.innovations(one, left_out), one.station)
         disturbed = left_out | gaps.lost
-        for event in search.events:
+        for event in events:
             first = int((event.begin_s - _BEFORE_S) * one.rate_hz)
             last = int((event.begin_s + event.stay_s + DEFAULT_RAMP_S + _AFTER_S) * one.rate_hz)
             disturbed[max(first, 0) : max(last, 0)] = True
-        out.append(SeriesEpisodes(one, echoes, gaps, tuple(search.events), disturbed))
-        searches.append(search)
-    return out, searches
+        out.append(SeriesEpisodes(one, echoes, gaps, tuple(events), disturbed))
+        residuals.append(residual)
+    return out, residuals
 
 
-def fit_episodes(series: Sequence[StaticSeries], noise: ExcursionNoise) -> EpisodeFit:
+def fit_episodes(series: Sequence[StaticSeries], noise: ErrorProcess) -> EpisodeFit:
     """Find the episodes of stations at rest and fit their parameters."""
-    found, searches = find_disturbances(series, noise)
+    found, residuals = find_disturbances(series, noise)
     parameters, means = _fit_echoes(found)
     gap_parameters, gap_means = _fit_gaps(found, noise)
-    excursion_parameters, excursion_means = _fit_excursions(found, searches, noise)
+    excursion_parameters, excursion_means = _fit_excursions(found, residuals, noise)
     burst, gap = (_longest(found, name) for name in ("echoes", "gaps"))
     by_station = {}
     for station in dict.fromkeys(one.series.station for one in found):
         own = [one for one in found if one.series.station == station]
         by_station[station] = {
-            "components.excursion.onsets_per_min": _station_rate(own, excursion_parameters[EPISODE_KEYS[0]], found),
+            EXCURSION_RATE: _station_rate(own, excursion_parameters[EXCURSION_RATE], found),
             "components.echo.share": _echo_share(own, burst),
             "components.dropout.share": _lost_share(own, gap),
         }
@@ -178,9 +166,7 @@ def _lost_share(found: Sequence[SeriesEpisodes], longest: float = 1.0) -> Interv
     return episode_share(lengths, sum(len(one.series) for one in found), longest)
 
 
-def _fit_gaps(
-    found: Sequence[SeriesEpisodes], noise: ExcursionNoise
-) -> tuple[dict[str, Interval], dict[str, Interval]]:
+def _fit_gaps(found: Sequence[SeriesEpisodes], noise: ErrorProcess) -> tuple[dict[str, Interval], dict[str, Interval]]:
     durations_s = np.concatenate(
         [((one.gaps.end - one.gaps.begin) / one.series.rate_hz)[one.gaps.whole] for one in found]
     )
@@ -207,7 +193,7 @@ def _typical(values: Floats) -> Interval:
     return Interval.normal(middle, spread + 1e-4 * middle, len(values))
 
 
-def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Interval, noise: ExcursionNoise) -> Interval:
+def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Interval, noise: ErrorProcess) -> Interval:
     """Tilt error while coasting: the size of the displacements, beyond that of noise."""
     if not coast_s.is_measured:
         return Interval.missing(coast_s.reason)
@@ -220,7 +206,7 @@ def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Interval, noise: Excursi
                 max(int((event.begin_s + event.stay_s + 0.6) * one.series.rate_hz), 0),
             )
             others[rows] = True
-        fitted = noise.white_m, noise.drift_m, noise.correlation_s
+        fitted = noise.white, noise.drift, noise.correlation_s
         coasted = one.gaps.begin[np.isfinite(one.gaps.coast_s)]  # a station that is covered at once does not coast
         own, deviation = leaked_tilt_rad(one.series, coasted, coast_s.value, others, fitted)
         tilts.append(own)
@@ -228,7 +214,7 @@ def _fit_tilt(found: Sequence[SeriesEpisodes], coast_s: Interval, noise: Excursi
 
 
 def _fit_excursions(
-    found: Sequence[SeriesEpisodes], searches: Sequence[ExcursionSearch], noise: ExcursionNoise
+    found: Sequence[SeriesEpisodes], residuals: Sequence[Innovations], noise: ErrorProcess
 ) -> tuple[dict[str, Interval], dict[str, Interval]]:
     alone = [event for one in found for event in _isolated(one.excursions)]
     sizes_m = np.array([event.size_m for event in alone])
@@ -239,7 +225,7 @@ def _fit_excursions(
     ends_m = (smallest.value, largest.value) if smallest.is_measured else (0.005, 0.03)
     ends_s = (shortest.value, longest.value) if shortest.is_measured else (1.0, 5.0)
     parameters = {
-        "components.excursion.onsets_per_min": _fit_rate(found, searches, noise, ends_m, ends_s),
+        EXCURSION_RATE: _fit_rate(found, residuals, noise, ends_m, ends_s),
         "components.excursion.size_m.0": smallest,
         "components.excursion.size_m.1": largest,
         "components.excursion.stay_s.0": shortest,
@@ -266,8 +252,8 @@ def _isolated(events: Sequence[ExcursionEvent]) -> list[ExcursionEvent]:
 
 def _fit_rate(
     found: Sequence[SeriesEpisodes],
-    searches: Sequence[ExcursionSearch],
-    noise: ExcursionNoise,
+    residuals: Sequence[Innovations],
+    noise: ErrorProcess,
     ends_m: tuple[float, float],
     ends_s: tuple[float, float],
 ) -> Interval:
@@ -276,7 +262,7 @@ def _fit_rate(
     detected = sum(len(_counted(one.excursions)) for one in found)
     if not detected:
         return Interval(0.0, 0.0, _NONE_SEEN / minutes, 0)
-    recovery, relative, dispersion = _recover(found, searches, noise, detected / minutes, ends_m, ends_s)
+    recovery, relative, dispersion = _recover(found, residuals, noise, detected / minutes, ends_m, ends_s)
     rate_per_min = detected / minutes / recovery
     spread = float(np.sqrt(dispersion / detected + relative**2))
     low, high = (rate_per_min * float(np.exp(sign * NORMAL_QUANTILE * spread)) for sign in (-1.0, 1.0))
@@ -290,8 +276,8 @@ def _counted(events: Sequence[ExcursionEvent]) -> list[ExcursionEvent]:
 
 def _recover(
     found: Sequence[SeriesEpisodes],
-    searches: Sequence[ExcursionSearch],
-    noise: ExcursionNoise,
+    residuals: Sequence[Innovations],
+    noise: ErrorProcess,
     rate_per_min: float,
     ends_m: tuple[float, float],
     ends_s: tuple[float, float],
@@ -304,13 +290,13 @@ def _recover(
     recovered: list[int] = []
     rounds = 0
     while rounds < 1 or (rounds < _MOST_ROUNDS and sum(injected) < _INJECTED):
-        for number, (one, search) in enumerate(zip(found, searches, strict=True)):
+        for number, (one, residual) in enumerate(zip(found, residuals, strict=True)):
             rng = generator(0, "injected excursions", rounds, number)
             detector = ExcursionDetector(one.series.rate_hz, noise)
             displacement_m, onsets = _draw_displacement(rng, one.series, rate_per_min, ends_m, ends_s)
-            again = detector.search(detector.displaced(search.residual, displacement_m), "")
+            again, _ = detector.search(detector.displaced(residual, displacement_m), "")
             injected.append(onsets)
-            recovered.append(len(_counted(again.events)))
+            recovered.append(len(_counted(again)))
         rounds += 1
     given, seen = np.array(injected, float), np.array(recovered, float)
     if not seen.sum():

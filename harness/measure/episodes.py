@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.runs import find_runs
+from harness.core.arrays import Bools, Floats, Ints, find_runs, freeze
 from harness.errors import BadInput
 
 _SLACK_S = 1e-9

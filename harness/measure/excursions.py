@@ -13,8 +13,8 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
+from harness.measure.gauss_markov import ErrorProcess, kalman_gains, transpose_whiten, whiten
 from harness.measure.static_series import StaticSeries
-from harness.measure.whitening import kalman_gains, transpose_whiten, whiten
 
 THRESHOLD = 45.0
 """Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in some hundred hours."""
@@ -33,15 +33,6 @@ _SHARED_EDGE_S = 0.3
 _SEEN = 0.8
 """Share of samples around an edge that must count for its time to be certain."""
 _ROUNDS = 6
-
-
-@dataclass(frozen=True)
-class ExcursionNoise:
-    """Noise of the position on each axis, among which excursions are searched."""
-
-    white_m: float
-    drift_m: float
-    correlation_s: float
 
 
 @dataclass(frozen=True)
@@ -89,21 +80,13 @@ class Innovations:
     """(N,) standard deviation of an innovation [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class ExcursionSearch:
-    """Excursions of one series, and the innovations that are left without them."""
-
-    events: list[ExcursionEvent]
-    residual: Innovations
-
-
 class ExcursionDetector:
-    """Finds excursions in series of one rate."""
+    """Finds excursions in series of one rate, among noise of the position with this process on each axis [m]."""
 
-    def __init__(self, rate_hz: float, noise: ExcursionNoise, ramp_s: float = DEFAULT_RAMP_S) -> None:
+    def __init__(self, rate_hz: float, noise: ErrorProcess, ramp_s: float = DEFAULT_RAMP_S) -> None:
         self._rate_hz, self._noise, self._ramp_s = rate_hz, noise, max(ramp_s, 1e-6)
         self._correlation = float(np.exp(-1.0 / (rate_hz * noise.correlation_s)))
-        self._white_m = max(noise.white_m, 1e-3 * noise.drift_m, 1e-9)
+        self._white_m = max(noise.white, 1e-3 * noise.drift, 1e-9)
         self._stride = max(round(_STEP_S * rate_hz), 1)
         longest = round(LONGEST_STAY_S * rate_hz)
         self._stays = np.arange(max(round(_SHORTEST_STAY_S * rate_hz), 1), longest + 1, 2 * self._stride)
@@ -135,7 +118,7 @@ class ExcursionDetector:
         return self._whiten(np.where(valid[:, None], place_m, 0.0), valid)
 
     def _whiten(self, place_m: Floats, valid: Bools) -> Innovations:
-        gain, deviation_m = kalman_gains(valid, self._correlation, self._noise.drift_m**2, self._white_m**2)
+        gain, deviation_m = kalman_gains(valid, self._correlation, self._noise.drift**2, self._white_m**2)
         return Innovations(whiten(place_m, valid, gain, deviation_m, self._correlation), valid, gain, deviation_m)
 
     def displaced(self, innovations: Innovations, displacement_m: Floats) -> Innovations:
@@ -144,8 +127,8 @@ class ExcursionDetector:
         added = whiten(displacement_m, valid, gain, deviation_m, self._correlation)
         return Innovations(innovations.values + added, valid, gain, deviation_m)
 
-    def search(self, innovations: Innovations, station: str) -> ExcursionSearch:
-        """Find the excursions in innovations, strongest first, and take them out."""
+    def search(self, innovations: Innovations, station: str) -> tuple[list[ExcursionEvent], Innovations]:
+        """Find the excursions in innovations, strongest first, and the innovations that are left without them."""
         valid, gain, deviation_m = innovations.valid, innovations.gain, innovations.deviation_m
         residual = Innovations(innovations.values.copy(), valid, gain, deviation_m)
         rise = self._rise_power(residual)
@@ -161,7 +144,7 @@ class ExcursionDetector:
             found = [fit for fit in self._refit(residual, found + new) if fit.score >= THRESHOLD]
             found = self._merge(residual, found)
         events = [self._event(station, residual.valid, fit) for fit in sorted(found, key=lambda fit: fit.onset)]
-        return ExcursionSearch(events, residual)
+        return events, residual
 
     def _refit(self, residual: Innovations, fits: list["_Fit"]) -> list["_Fit"]:
         """Each excursion again, with the others taken out; one that is too weak then goes back into the residual."""

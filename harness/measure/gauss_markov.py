@@ -1,12 +1,15 @@
-"""White noise and first-order Gauss-Markov drift of readings at rest: parameters and likelihood.
+"""White noise and first-order Gauss-Markov drift of readings: parameters, likelihood, whitening, least squares.
 
 Each axis of a series is a constant, plus drift with the covariance s^2 exp(-t / tau), plus white noise. The likelihood
 is that of a Kalman filter over the records that are used, so it is exact with any gaps (Schweppe 1965, IEEE Trans.
 Inf. Theory 11). The constant is integrated out with a flat prior (restricted likelihood), which removes the bias of
-subtracting a mean (Harville 1977, J. Am. Stat. Assoc. 72).
+subtracting a mean (Harville 1977, J. Am. Stat. Assoc. 72). The filter is linear in the values: it also whitens a signal
+that was added to the noise, and derivatives, so that ordinary least squares of both is generalised least squares.
 """
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +30,56 @@ AXIS_GROUPS = ((0, 1), (2, 3), (2, 4))
 """Rows of the white noise and of the drift of each group of axes: position, pitch and roll, yaw."""
 CORRELATION = 5
 """Row of the correlation time."""
+_LEAST, _MOST = np.log([1e-9, 1e-9, 0.05]), np.log([10.0, 10.0, 30.0])
+
+
+@compiled
+def kalman_gains(
+    valid: Bools, correlation: float, drift_variance: float, white_variance: float
+) -> tuple[Floats, Floats]:
+    """Gain and standard deviation of the innovation (N,) at each sample; both are 0 where it is not valid."""
+    count = len(valid)
+    gain, deviation = np.zeros(count), np.zeros(count)
+    variance = drift_variance
+    for i in range(count):
+        variance = correlation**2 * variance + drift_variance * (1.0 - correlation**2)
+        if valid[i]:
+            gain[i] = variance / (variance + white_variance)
+            deviation[i] = np.sqrt(variance + white_variance)
+            variance *= 1.0 - gain[i]
+    return gain, deviation
+
+
+@compiled
+def whiten(values: Floats, valid: Bools, gain: Floats, deviation: Floats, correlation: float) -> Floats:
+    """Innovations (N, A) of values (N, A), in standard deviations; 0 where they are not valid."""
+    count, axes = values.shape
+    out = np.zeros((count, axes))
+    state = np.zeros(axes)
+    for i in range(count):
+        for a in range(axes):
+            state[a] *= correlation
+            if valid[i]:
+                innovation = values[i, a] - state[a]
+                state[a] += gain[i] * innovation
+                out[i, a] = innovation / deviation[i]
+    return out
+
+
+@compiled
+def transpose_whiten(values: Floats, valid: Bools, gain: Floats, deviation: Floats, correlation: float) -> Floats:
+    """The transpose of `whiten`, a linear map, applied to innovations (N, A)."""
+    count, axes = values.shape
+    out = np.zeros((count, axes))
+    state = np.zeros(axes)
+    for back in range(count):
+        i = count - 1 - back
+        for a in range(axes):
+            if valid[i]:
+                out[i, a] = values[i, a] / deviation[i] + gain[i] * state[a]
+                state[a] -= out[i, a]
+            state[a] *= correlation
+    return out
 
 
 class NoiseSample:
@@ -104,3 +157,42 @@ def series_log_likelihood(
     constant = (count - 1) * math.log(2.0 * math.pi)
     out: float = -0.5 * (misfit + axes * (total + math.log(ones) + constant))
     return out
+
+
+@dataclass(frozen=True)
+class ErrorProcess:
+    """Standard deviations of white noise and of a Gauss-Markov process, and its correlation time."""
+
+    white: float
+    drift: float
+    correlation_s: float
+
+    def whiten(self, values: Floats, valid: Bools, period_s: float) -> Floats:
+        """Filter the columns (N, C) of one axis, sampled every `period_s` [s]; rows that are not valid become zero."""
+        correlation = float(np.exp(-period_s / self.correlation_s))
+        gain, deviation = kalman_gains(valid, correlation, self.drift**2, self.white**2)
+        return whiten(np.ascontiguousarray(values), valid, gain, deviation, correlation)
+
+
+def fit_process(errors: Floats, valid: Bools, period_s: float) -> ErrorProcess:
+    """Fit the process to errors (N, A) of A axes by maximum likelihood."""
+    from scipy import optimize
+
+    known = np.where(valid[:, None], errors, 0.0)
+    spread = float(np.sqrt(np.mean(known[valid] ** 2))) if valid.any() else 0.0
+    both = valid[1:] & valid[:-1]
+    step = float(np.sqrt(np.mean((errors[1:] - errors[:-1])[both] ** 2) / 2.0)) if both.any() else spread
+
+    def cost(logarithms: Floats) -> float:
+        bounded = np.clip(logarithms, _LEAST, _MOST)
+        white, drift, correlation_s = np.exp(bounded)
+        correlation = float(np.exp(-period_s / correlation_s))
+        fit = series_log_likelihood(known, valid, correlation, float(drift**2), float(white**2))
+        return float(np.sum((logarithms - bounded) ** 2)) - float(fit) / max(int(valid.sum()), 1)
+
+    start: Floats = np.log(np.maximum([0.7 * min(step, spread), spread, 1.0], 1e-8))
+    corners = np.concatenate([start[None], start + np.diag([-0.5, 0.5, 0.5])])
+    options: dict[str, Any] = {"initial_simplex": corners, "xatol": 0.01, "fatol": 1e-5, "maxiter": 300}
+    found: Any = optimize.minimize(cost, start, method="Nelder-Mead", options=options)  # type: ignore[call-overload]  # its stubs know no simplex
+    white, drift, correlation_s = np.exp(np.clip(found.x, _LEAST, _MOST)).tolist()
+    return ErrorProcess(white, drift, correlation_s)

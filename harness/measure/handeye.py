@@ -13,6 +13,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.errors import NotComparable
+from harness.measure.registration_model import RegistrationState
 
 LEAST_TURN_RAD = 0.05
 """Least spread of the body's orientations about a second axis [rad]; a smaller one is motion about one axis."""
@@ -37,28 +38,8 @@ class PosePairs:
         freeze(self, tracker_from_station=(count, 4), body_m=(count, 3), world_from_body=(count, 4))
 
 
-@dataclass(frozen=True, eq=False)
-class HandEye:
-    """Room and mounts of S stations."""
-
-    tracker_from_world: Floats
-    """(4,) unit quaternion."""
-    tracker_origin_m: Floats
-    """(3,) origin of the tracker's frame in the world [m]."""
-    scale: float
-    """Relative scale error of reported positions about the tracker's origin."""
-    body_from_station: Floats
-    """(S, 4) unit quaternions."""
-    mount_m: Floats
-    """(S, 3) origin of each station in the frame of its body [m]."""
-
-    def __post_init__(self) -> None:
-        freeze(self, tracker_from_world=(4,), tracker_origin_m=(3,))
-        freeze(self, body_from_station=("S", 4), mount_m=("S", 3))
-
-
-def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> HandEye:
-    """Solve for the room and the mount of each station by least squares.
+def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
+    """Solve for the room, the scale and the mount of each station by least squares; all other values are zero.
 
     NotComparable if no station turns about two axes: the room's and the mounts' turn about the only axis is then
     not observable.
@@ -66,7 +47,7 @@ def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) ->
     require_two_axes(stations)
     room, mounts = _solve_rotations(stations)
     origin_m, scale, mount_m = _solve_positions(stations, room, with_scale)
-    return HandEye(room, origin_m, scale, mounts, mount_m)
+    return RegistrationState(0.0, room, origin_m, scale, 0.0, 0.0, 0.0, 0.0, mounts, mount_m)
 
 
 def require_two_axes(stations: Sequence[PosePairs]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.time_grid import require_seconds
+from harness.core.motion import require_seconds
 from harness.errors import BadInput
 
 _LONGEST_STEP = 4.0

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
 from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
-from harness.measure.excursions import ExcursionNoise
-from harness.measure.noise_fit import NoiseFit, fit_noise
-from harness.measure.noise_start import start_values
+from harness.measure.gauss_markov import ErrorProcess
+from harness.measure.noise_fit import NoiseFit, fit_noise, start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
 from harness.measure.timing import TimingAccumulator, TimingMeasurement
@@ -228,7 +227,7 @@ def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit
     """Noise and episodes, in turn: each is found better once the other is known."""
     nothing: list[Bools] = [np.zeros(len(one), bool) for one in rest]
     start = np.exp(start_values(rest, nothing))
-    found, _ = find_disturbances(rest, ExcursionNoise(float(start[0]), float(start[1]), float(start[5])))
+    found, _ = find_disturbances(rest, ErrorProcess(float(start[0]), float(start[1]), float(start[5])))
     progress("fitting the noise", 1, 3)
     noise = fit_noise(rest, [one.disturbed for one in found], by_station=False)
     progress("fitting the episodes", 2, 3)
@@ -238,12 +237,12 @@ def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit
     return final, episodes
 
 
-def _excursion_noise(noise: NoiseFit, start: Floats) -> ExcursionNoise:
+def _excursion_noise(noise: NoiseFit, start: Floats) -> ErrorProcess:
     """The fitted noise of the position; rough values stand in for what the fit could not tell or found to be 0."""
     keys = ("components.white.position_m", "components.drift.position_m", "components.drift.correlation_s")
     fitted = [noise.all_stations[key] for key in keys]
     rough = (start[0], start[1], start[5])
-    return ExcursionNoise(
+    return ErrorProcess(
         *(one.value if one.value > 0.0 else float(value) for one, value in zip(fitted, rough, strict=True))
     )
 

@@ -1,15 +1,15 @@
 """Registration of a capture with a reference: clocks, room, scale, heading error, and the mount of each station."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
-from harness.core.interval import CHI_QUANTILE, NORMAL_QUANTILE, Interval
-from harness.core.time_grid import count_steps
+from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
+from harness.measure.angular_speed import TimeOffset, coarse_offset, record_period_s
 from harness.measure.conventions import (
     MOST_PLACE_M,
     require_clock,
@@ -18,9 +18,8 @@ from harness.measure.conventions import (
     require_same_hand,
     require_scale,
 )
-from harness.measure.correlated_errors import ErrorProcess
+from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_hand_eye
-from harness.measure.offset import SpeedSeries, TimeOffset, angular_speed, time_offset
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
 from harness.measure.registration_model import (
@@ -152,12 +151,6 @@ class Registration:
         """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
         return self.state.reference_s
 
-    def room_turn_from(self, world_from_tracker: Floats) -> tuple[Interval, Interval, Interval]:
-        """Rotation vector from an expected `world_from_tracker` (4,) to the measured one, tracker's axes [rad]."""
-        measured, expected = rotations.inverse(self.world_from_tracker), rotations.inverse(world_from_tracker)
-        x, y, z = _turns(measured, expected, self.room_covariance[:3, :3], self.blocks)
-        return x, y, z
-
     def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
         """World coordinates of a point (3,) given in the tracker's frame, without the scale error [m]."""
         at_m = rotations.rotate(self.world_from_tracker, point_m)
@@ -223,28 +216,6 @@ def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
             )
 
 
-def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
-    """Median time between records of a station [s]."""
-    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
-    return float(np.median(np.concatenate(steps_s)))
-
-
-def coarse_offset(
-    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
-) -> TimeOffset:
-    """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
-    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
-    expected = [reference_speed(splines[name], period_s) for name in stations]
-    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
-
-
-def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
-    """Angular speed of a reference, over steps of `period_s` as the device's."""
-    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
-    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
-    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
-
-
 def _make_grids(
     stations: Mapping[str, MeasuredPoses],
     splines: Mapping[str, TruthSpline],
@@ -301,11 +272,7 @@ def _start(
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
     require_same_hand([one.position_m for one in paired], [one.body_m for one in paired])
-    solved = solve_hand_eye(paired, with_scale=False)
-    return RegistrationState(
-        middle_s, solved.tracker_from_world, solved.tracker_origin_m, solved.scale, 0.0, offset_s, 0.0, 0.0,
-        solved.body_from_station, solved.mount_m,
-    )  # fmt: skip
+    return replace(solve_hand_eye(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
 
 
 def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
-from harness.core.runs import find_runs
-from harness.measure.correlated_errors import ErrorProcess, fit_process
+from harness.core.arrays import Bools, Floats, find_runs
+from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration_model import OWN, SHARED, RegistrationState, linearise
 
@@ -85,9 +84,10 @@ def _linear(
     """Residuals (N, 6) and slopes (N, 6, 17) of one station; zero where nothing is known."""
     grid, truth = grids[s], truths[s]
     rows = grid.known
-    one = linearise(state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth)
     residual, slope = np.zeros((len(rows), 6)), np.zeros((len(rows), 6, SHARED + OWN))
-    residual[rows], slope[rows] = one.residual, one.slope
+    residual[rows], slope[rows] = linearise(
+        state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth
+    )
     return residual, slope
 
 

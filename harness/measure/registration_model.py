@@ -76,20 +76,14 @@ class RegistrationState:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """Residuals of one station's N records, and their derivatives by the shared and the station's own parameters."""
-
-    residual: Floats
-    """(N, 6) reported minus modelled: position [m], then rotation vector in the tracker's axes [rad]."""
-    slope: Floats
-    """(N, 6, 17) derivative of the modelled values; 11 shared parameters, then 6 of the mount."""
-
-
 def linearise(
     state: RegistrationState, station: int, measured_s: Floats, position_m: Floats, turn: Floats, truth: TruthSpline
-) -> Linearised:
-    """Linearise the model of one station at its records: device times (N,), positions (N, 3), quaternions (N, 4)."""
+) -> tuple[Floats, Floats]:
+    """Linearise the model of one station at its records: device times (N,), positions (N, 3), quaternions (N, 4).
+
+    Returns residuals (N, 6), reported minus modelled: position [m], then rotation vector in the tracker's axes [rad];
+    and derivatives (N, 6, 17) of the modelled values by 11 shared parameters, then 6 of the mount.
+    """
     count = len(measured_s)
     room, mount_m, mount = state.tracker_from_world, state.mount_m[station], state.body_from_station[station]
     rate = 1.0 / (1.0 + state.clock_ratio)
@@ -126,7 +120,7 @@ def linearise(
     slope[:, 3:, OFFSET] = -rate * rate_rad_s
     slope[:, 3:, CLOCK] = -rate * rate_rad_s * since_s
     slope[:, 3:, SHARED : SHARED + 3] = rotations.to_matrix(in_tracker)
-    return Linearised(residual, slope)
+    return residual, slope
 
 
 def _station_point(

@@ -13,7 +13,7 @@ from scipy import special
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
 
 SPEED_EDGES_M_S = (0.0, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0)

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.runs import find_runs
-from harness.core.time_grid import count_steps
+from harness.core.arrays import Bools, Floats, Ints, find_runs, freeze
+from harness.core.motion import count_steps
 from harness.stream.recording.station_readings import StationReadings
 
 MIN_REST_S = 5.0

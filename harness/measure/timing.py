@@ -7,13 +7,13 @@ late.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.interval import Interval
-from harness.measure.robust_slope import robust_slope
+from harness.core.number_format import Interval
+from harness.core.seeds import generator
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 
 TIMING_KEYS = (
@@ -39,6 +39,8 @@ _LAST_STAMPS = 500
 """Stamps of each station at the end of a capture whose resolution is measured."""
 _AGE_TOLERANCE_S = 0.5
 """Half width of the interval of the clock's age [s]: the set-up of a device takes that long [choice]."""
+_DRAWS = 300
+_LEAST_BLOCK = 4
 
 
 @dataclass
@@ -58,14 +60,6 @@ class _StationCounts:
     """The last record, to compare the next block with it."""
 
 
-@dataclass
-class _SessionClocks:
-    """Least difference of host and device clock in each second of one session of the line."""
-
-    least_s: dict[int, tuple[float, float]] = field(default_factory=dict)
-    """Number of the second -> difference and device time [s]."""
-
-
 @dataclass(frozen=True)
 class TimingMeasurement:
     """Numbers by `TIMING_KEYS`, of all stations together and of each."""
@@ -83,7 +77,8 @@ class TimingAccumulator:
         """`rate_hz` is the nominal rate of each station [Hz]."""
         self._rate_hz = rate_hz
         self._counts: dict[str, _StationCounts] = {}
-        self._clocks: dict[int, _SessionClocks] = {}
+        self._clocks: dict[int, dict[int, tuple[float, float]]] = {}
+        """Session of the line -> second -> least difference of host and device clock, and device time [s]."""
         self._delays_s: list[float] = []
         """Mean delay of each second of each station [s]."""
         self._tails_s: dict[str, Floats] = {}
@@ -149,14 +144,13 @@ class TimingAccumulator:
             return
         device_s, host_s = readings.measured_s[known], readings.received_s[known]
         difference_s = host_s - device_s
-        clocks = self._clocks.setdefault(block.session, _SessionClocks())
+        clocks = self._clocks.setdefault(block.session, {})
         second = (device_s // _BIN_S).astype(np.int64)
         order = np.lexsort((difference_s, second))
         _, first = np.unique(second[order], return_index=True)
         for row in order[first].tolist():
             least, number = (float(difference_s[row]), float(device_s[row])), int(second[row])
-            if least < clocks.least_s.get(number, (math.inf, 0.0)):
-                clocks.least_s[number] = least
+            clocks[number] = min(least, clocks.get(number, (math.inf, 0.0)))
         _, group = np.unique(second, return_inverse=True)
         late_s = np.bincount(group, difference_s - difference_s[order[first]][group]) / np.bincount(group)
         self._delays_s += late_s.tolist()
@@ -184,8 +178,8 @@ class TimingAccumulator:
 
     def _clock_drift_ppm(self) -> tuple[Interval, float]:
         """Rate error of the device's clock [1e-6] from the longest session, and the length of it [s]."""
-        clocks = max(self._clocks.values(), key=lambda one: len(one.least_s), default=None)
-        points = np.array(list(clocks.least_s.values())) if clocks else np.zeros((0, 2))
+        clocks = max(self._clocks.values(), key=len, default={})
+        points = np.array(list(clocks.values())).reshape(-1, 2)
         if len(points) < _FEWEST_BINS:
             return Interval.missing(f"The clock needs {_FEWEST_BINS} s of records with stamps."), 0.0
         points = points[np.argsort(points[:, 1])]
@@ -260,3 +254,30 @@ def _mean(values: Floats) -> Interval:
 
 def _exact(value: float, count: int) -> Interval:
     return Interval.missing("No record has a stamp.") if math.isnan(value) else Interval(value, value, value, count)
+
+
+def robust_slope(at: Floats, values: Floats) -> tuple[float, float, float]:
+    """Slope of values (N,) over rising places (N,), and the ends of its 95 % interval.
+
+    The slope is the median over all pairs (Theil and Sen). Its interval is the wider one of two. One is Sen's, for
+    independent errors. The other comes from residuals drawn in blocks, for errors that are correlated over several
+    values (Kunsch 1989, Ann. Stat. 17), widened for the few blocks.
+    """
+    from scipy import special, stats
+
+    slope, _, low, high = (float(one) for one in stats.theilslopes(values, at, 0.95))
+    count = len(values)
+    length = max(round(2.0 * math.sqrt(count)), _LEAST_BLOCK)
+    blocks = count / length
+    if blocks < 2.0:
+        return slope, low, high
+    first, second = np.triu_indices(count, 1)
+    apart = at[second] - at[first]
+    residual = values - slope * at
+    rng = generator(0, "slope")
+    begins = rng.integers(0, count - length + 1, size=(_DRAWS, math.ceil(blocks)))
+    drawn = residual[(begins[:, :, None] + np.arange(length)).reshape(_DRAWS, -1)[:, :count]]
+    slopes = np.array([np.median((one[second] - one[first]) / apart) for one in drawn])
+    scatter = float(np.std(slopes)) * math.sqrt(blocks / (blocks - 1.0))
+    half = scatter * float(special.stdtrit(max(blocks - 2.0, 1.0), 0.975))
+    return slope, min(low, slope - half), max(high, slope + half)

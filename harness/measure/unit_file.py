@@ -3,7 +3,7 @@
 A scenario names the file with the key `fitted`. The tables `[components]` and `[tracker]` hold the values that a
 scenario takes over. `[measured]` holds value, interval and count of each measured key. `[not_measured]` says why a key
 kept its default. `[session]` holds what a reference showed of the session, such as latency and scale. The first line
-is a digest of all others (`core.toml_digest`).
+is a digest of all others (`core.toml_file`).
 """
 
 import math
@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from harness.core.fields import build
-from harness.core.interval import Interval
-from harness.core.output_file import write_output
-from harness.core.toml_digest import EARLIER_SCHEMA, SCHEMA, insert_toml_digest, read_digested_toml
-from harness.core.toml_text import format_toml
+from harness.core.files import write_output
+from harness.core.number_format import Interval
+from harness.core.toml_file import EARLIER_SCHEMA, SCHEMA, format_toml, insert_toml_digest, read_digested_toml
 from harness.errors import BadFile, HarnessError
 from harness.measure.conventions import require_scale
 
@@ -116,13 +115,8 @@ def _require_all(path: Path, unit: UnitFile, content: Mapping[str, Any]) -> None
         raise BadFile(path, f"damaged: no {lost[0]}", f"the whole of {UNIT_FILE}", CUT_ADVICE)
 
 
-def unit_value(unit: UnitFile, key: str) -> float | None:
-    """The value of a dotted key of [components] or [tracker]; None where it is not there or no number."""
-    value = _find_value(unit, key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-
-
 def _find_value(unit: UnitFile, key: str) -> Any:
+    """The value of a dotted key of [components] or [tracker]; None where it is not there."""
     value: Any = {"components": unit.components, "tracker": unit.tracker}
     for part in key.split("."):
         if isinstance(value, Mapping):

@@ -7,28 +7,32 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput
-from harness.measure.allan import AllanDeviation, expected_allan, measure_allan, pool_allan
 from harness.measure.departures import Departure
-from harness.measure.episode_fit import SeriesEpisodes
+from harness.measure.episode_distributions import events_for_precision, recording_minutes
+from harness.measure.episode_fit import EXCURSION_RATE, SeriesEpisodes
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.mean_drift import drift_speed, mean_drift
+from harness.measure.noise_spectra import (
+    AllanDeviation,
+    expected_allan,
+    measure_allan,
+    measure_spectrum,
+    pool_allan,
+    pool_spectra,
+)
 from harness.measure.profile import QualityClass, StretchLength, UnitProfile
-from harness.measure.recording_time import events_for_precision, recording_minutes
+from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
 from harness.measure.rigid_pair import RigidPair
-from harness.measure.spectrum import measure_spectrum, pool_spectra
-from harness.measure.spread import rest_spread
 from harness.measure.static_series import StaticSeries
 from harness.measure.unit_file import UnitFile
 
 PRECISION = 0.2
 """Relative half width of the interval of a rate that is aimed at."""
-_RATE = "components.excursion.onsets_per_min"
 _STATION_KEYS = {
     "white_m": "components.white.position_m",
     "slow_m": "components.drift.position_m",
-    "excursions_per_min": _RATE,
+    "excursions_per_min": EXCURSION_RATE,
     "echo_share": "components.echo.share",
     "gap_share": "components.dropout.share",
     "rate_hz": "timing.rate_hz",
@@ -350,10 +354,10 @@ def _episodes(profile: UnitProfile) -> tuple[EpisodeMark, ...]:
 
 def _advice(profile: UnitProfile) -> tuple[RecordingAdvice, ...]:
     """How long to record for the rate of excursions to 20 %."""
-    rate = profile.parameters[_RATE]
+    rate = profile.parameters[EXCURSION_RATE]
     if not rate.is_measured:
         return ()
     minutes = sum(one.duration_s for one in profile.rest) / 60.0 / len(profile.stations)
     needed = events_for_precision(PRECISION)
     needed_minutes = recording_minutes(PRECISION, rate.value, len(profile.stations)) if rate.value > 0.0 else math.nan
-    return (RecordingAdvice(_RATE, PRECISION, rate.count, needed, minutes, needed_minutes),)
+    return (RecordingAdvice(EXCURSION_RATE, PRECISION, rate.count, needed, minutes, needed_minutes),)

@@ -57,7 +57,7 @@ def read_library_file(path: Path, top: Path, rate_hz: float | None) -> Clip:
 
         clip = read_amass_clip(path)
     else:
-        from harness.mocap.read.acclaim import read_amc_clip
+        from harness.mocap.read.amc import read_amc_clip
 
         if rate_hz is None:
             raise unknown_rate_error(path.name)

@@ -8,11 +8,8 @@ to crawl its site: name the subjects that are needed.
 
 import hashlib
 import re
-import secrets
-import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from http.client import HTTPException
 from importlib.resources import files
 from pathlib import Path
@@ -20,15 +17,14 @@ from urllib.error import HTTPError, URLError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
-from filelock import FileLock, Timeout
+from filelock import FileLock
 
 from harness.core.csv_text import csv_line
-from harness.core.files import atomic_path, move_into_place
-from harness.core.motion import Clip
+from harness.core.files import atomic_path
 from harness.errors import BadFile, BadInput
-from harness.mocap.folder_scan import FETCHED
-from harness.mocap.index import INDEX_NAME, read_index
-from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
+from harness.mocap.index import FETCHED, INDEX_NAME, read_index
+from harness.mocap.read.amc import read_amc
+from harness.mocap.read.asf import read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"
 SHIPPED_RATE_HZ = 120.0
@@ -60,7 +56,6 @@ def fetch_cmu(
         names += _list_subject_files(subject.zfill(2), base_url)
     if not names:
         raise BadInput("No subject is named.", "For example: --subjects 13,14.")
-    _remove_leftovers(top)
     fetched = []
     for done, name in enumerate(names):
         progress(name, done, len(names))
@@ -145,60 +140,30 @@ def _fetch_file(name: str, top: Path, base_url: str) -> Path:
         raise BadInput(
             f"{path.parent} cannot be created ({error.strerror}).", "Name another folder with --out."
         ) from error
-    with _fetch_folder(path.parent) as folder:
-        url = f"{base_url}/subjects/{name}"
+    url = f"{base_url}/subjects/{name}"
+    with atomic_path(path) as new:
         try:
-            new = _download(url, folder / path.name)
+            _download(url, new)
         except _NotFound:
             raise BadInput(f"There is no {url}.", "Check that the site has the layout of CMU's.") from None
-        _check_file(new, url, listed, path.parent)
-        move_into_place(new, path)
+        _check_file(new, url, listed, path)
     return path
 
 
-@contextmanager
-def _fetch_folder(parent: Path) -> Iterator[Path]:
-    """A folder for a file that is not checked yet. The lock beside it is held while this process lives."""
-    folder = parent / f"{FETCHED}{secrets.token_hex(8)}"
+def _check_file(new: Path, url: str, listed: str | None, path: Path) -> None:
+    """Raise BadFile with the address unless a file that shall lie at `path` parses and has the listed SHA-256."""
     try:
-        with FileLock(f"{folder}.lock"):
-            folder.mkdir()
-            try:
-                yield folder
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-    finally:
-        Path(f"{folder}.lock").unlink(missing_ok=True)
-
-
-def _remove_leftovers(top: Path) -> None:
-    """Remove the folders of fetches that were killed; those of a process that lives are locked."""
-    for folder in {path.with_name(path.name.removesuffix(".lock")) for path in top.glob(f"*/{FETCHED}*")}:
-        try:
-            with FileLock(f"{folder}.lock", timeout=0):
-                shutil.rmtree(folder, ignore_errors=True)
-        except Timeout:
-            continue
-        Path(f"{folder}.lock").unlink(missing_ok=True)
-
-
-def _check_file(new: Path, url: str, listed: str | None, folder: Path) -> None:
-    """Raise BadFile with the address unless the file parses and has the listed SHA-256."""
-    try:
-        _parse_file(new, folder)
+        if path.suffix == ".asf":
+            read_asf_file(new)
+        else:
+            skeleton, _ = read_asf_file(path.with_name(f"{path.stem.split('_')[0]}.asf"))
+            read_amc(new, skeleton, rate_hz=SHIPPED_RATE_HZ)
     except BadFile as error:
         raise BadFile(url, error.found, error.expected, "It was not kept; try again.", error.line) from error
     sha256 = sha256_of(new)
     if listed not in (None, sha256):
         advice = "It was not kept; try again, or use another mirror."
         raise BadFile(url, f"a file with SHA-256 {sha256[:12]}...", f"{listed[:12]}... as shipped", advice)
-
-
-def _parse_file(path: Path, folder: Path) -> AsfFile | Clip:
-    if path.suffix == ".asf":
-        return read_asf_file(path)
-    asf = read_asf_file(folder / f"{path.stem.split('_')[0]}.asf")
-    return read_amc(path, asf.skeleton, rate_hz=SHIPPED_RATE_HZ)
 
 
 def _write_index(top: Path, names: list[str]) -> None:

@@ -3,8 +3,7 @@
 Nothing is guessed where the evidence is ambiguous: the error says what is missing and which option gives it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +17,10 @@ from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
 from harness.mocap.clip_file import CMU_NAME, find_skeleton_file, motion_format, read_library_file
 from harness.mocap.index import INDEX_NAME, rate_from_index, unknown_rate_error
-from harness.mocap.inspection import Inspection
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
+from harness.mocap.motion_checks import Inspection
 from harness.mocap.read.file_checks import check_size
-from harness.mocap.read.joint_clip import LEG_BONES
+from harness.mocap.read.joint_clip import LEG_BONES, rest_positions
 
 if TYPE_CHECKING:
     from harness.mocap.read.c3d import MarkerClip
@@ -83,15 +82,11 @@ def inspect_clip(clip: Clip) -> Inspection:
     pose = forward_kinematics(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
     humanoid = set(BONES) <= set(skeleton.names)
     bones = [skeleton.index(bone) for bone in (BONES if humanoid else skeleton.names)]
-    rest_m = _rest_positions_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in bones)]]
-    points = PointTrajectories(
-        names=("root", *(skeleton.names[b] for b in bones)),
-        position_m=np.concatenate([clip.root_m[:, None], pose.end_m[:, bones]], axis=1),
-        rest_m=rest_m,
-    )
-    facts = replace(
-        _inspect_points(clip.name, points, clip.rate_hz), height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes
-    )
+    rest_m = np.concatenate([np.zeros((1, 3)), rest_positions(skeleton.parents, skeleton.bone_m)[bones]])
+    names = ("root", *(skeleton.names[b] for b in bones))
+    position_m = np.concatenate([clip.root_m[:, None], pose.end_m[:, bones]], axis=1)
+    facts = _inspect_points(clip.name, names, position_m, rest_m, clip.rate_hz)
+    facts = replace(facts, height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes)
     if not humanoid:
         return facts
     facts = replace(facts, turns=motion_checks.find_turns(skeleton, clip.angles_rad, clip.rate_hz))
@@ -112,19 +107,21 @@ def inspect_clip(clip: Clip) -> Inspection:
 
 
 def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: LibraryFolders | None) -> Inspection:
-    from harness.mocap.read.acclaim import read_amc, read_asf_file
+    from harness.mocap.read.amc import read_amc
+    from harness.mocap.read.asf import read_asf_file
 
     check_size(path, "an AMC motion")
     rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_from_index(path, library)
     file = path.resolve()
-    asf = read_asf_file(find_skeleton_file(file, file.parents[min(2, len(file.parents) - 1)]), unit_m=unit_m)
-    facts = inspect_clip(read_amc(path, asf.skeleton, rate_hz=rate, unit_m=asf.unit_m))
+    skeleton_file = find_skeleton_file(file, file.parents[min(2, len(file.parents) - 1)])
+    skeleton, length_m = read_asf_file(skeleton_file, unit_m=unit_m)
+    facts = inspect_clip(read_amc(path, skeleton, rate_hz=rate, unit_m=length_m))
     why = "as given" if unit_m is not None else "length in the ASF's :units"
     return replace(
         facts,
         format="amc",
         rate_evidence=evidence,
-        unit_m=asf.unit_m,
+        unit_m=length_m,
         unit_evidence=f"{why}; {facts.unit_evidence}",
         up=f"y ({facts.up})",
     )
@@ -138,9 +135,9 @@ def _inspect_bvh(path: Path, unit_m: float | None) -> Inspection:
     if clip is not None:
         facts = inspect_clip(clip)
     else:
-        points = PointTrajectories(joint_clip.names, joint_clip.world()[0], joint_clip.rest_m())
-        facts = _inspect_points(path.stem, points, joint_clip.rate_hz)
-        facts = replace(facts, height_m=float(np.ptp(joint_clip.rest_m()[:, 2])))
+        rest_m = joint_clip.rest_m()
+        facts = _inspect_points(path.stem, joint_clip.names, joint_clip.world()[0], rest_m, joint_clip.rate_hz)
+        facts = replace(facts, height_m=float(np.ptp(rest_m[:, 2])))
     return replace(
         facts,
         format="bvh",
@@ -158,7 +155,7 @@ def _inspect_c3d(path: Path, unit_m: float | None, library: LibraryFolders | Non
     visible: Bools = np.isfinite(markers.position_m[..., 0])
     if not visible.any():
         raise BadFile(path, "no marker in any frame", "positions of markers", "Export it again.")
-    facts = _inspect_points(path.stem, PointTrajectories(markers.labels, markers.position_m, None), markers.rate_hz)
+    facts = _inspect_points(path.stem, markers.labels, markers.position_m, None, markers.rate_hz)
     return replace(
         facts,
         format="c3d",
@@ -189,76 +186,50 @@ def _marker_spread_notes(path: Path, markers: "MarkerClip", library: MotionLibra
     return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {text}",)
 
 
-@dataclass(frozen=True, eq=False)
-class PointTrajectories:
-    """Positions of P joints or markers over T frames."""
-
-    names: tuple[str, ...]
-    position_m: Floats
-    """(T, P, 3) [m]."""
-    rest_m: Floats | None
-    """(P, 3) positions in the rest pose [m]; None where they are unknown."""
-
-
-def _inspect_points(name: str, points: PointTrajectories, rate_hz: float) -> Inspection:
-    """The checks that need positions only."""
-    feet, up, doubts = _feet_and_up(points)
-    floor_m, contact_share = motion_checks.estimate_floor(points.position_m, feet)
-    speed_m_s, joint, frame = motion_checks.find_fastest_joint(points.names, points.position_m, rate_hz)
+def _inspect_points(
+    name: str, labels: tuple[str, ...], position_m: Floats, rest_m: Floats | None, rate_hz: float
+) -> Inspection:
+    """The checks that need only positions (T, P, 3) of joints or markers, and those in the rest pose (P, 3) [m]."""
+    feet, up, doubts = _feet_and_up(labels, position_m, rest_m)
+    floor_m, contact_share = motion_checks.estimate_floor(position_m, feet)
+    speed_m_s, joint, frame = motion_checks.find_fastest_joint(labels, position_m, rate_hz)
     return Inspection(
         name=name,
-        format="clip",
-        frames=len(points.position_m),
+        frames=len(position_m),
         rate_hz=rate_hz,
-        rate_evidence="of the clip",
-        height_m=None,
         up=up,
-        unit_m=1.0,
-        unit_evidence="metres",
         floor_m=floor_m,
         contact_share=contact_share,
         fastest_m_s=speed_m_s,
         fastest_joint=joint,
         fastest_frame=frame,
-        spikes=motion_checks.find_spikes(points.names, points.position_m, rate_hz),
-        turns=(),
-        frozen=motion_checks.find_frozen_frames(points.position_m),
-        missing_share=0.0,
-        missing_markers=(),
-        limits_share=None,
-        limits_worst="",
+        spikes=motion_checks.find_spikes(labels, position_m, rate_hz),
+        frozen=motion_checks.find_frozen_frames(position_m),
         doubts=doubts,
-        notes=(),
     )
 
 
-def _feet_and_up(points: PointTrajectories) -> tuple[Ints, str, tuple[str, ...]]:
+def _feet_and_up(
+    labels: tuple[str, ...], position_m: Floats, rest_m: Floats | None
+) -> tuple[Ints, str, tuple[str, ...]]:
     """Indices of the feet's points, the evidence that z is up, and the evidence against it."""
-    if points.rest_m is None:
-        return np.arange(len(points.names)), "", ()
-    height = points.rest_m[:, 2]
+    if rest_m is None:
+        return np.arange(len(labels)), "", ()
+    height = rest_m[:, 2]
     tall = np.ptp(height)
     feet = np.flatnonzero(height < height.min() + FOOT_HEIGHT_SHARE * tall)
     head = int(height.argmax())
-    rise = points.position_m[:, head] - points.position_m[:, feet].mean(axis=1)
+    rise = position_m[:, head] - position_m[:, feet].mean(axis=1)
     above = float(np.mean(rise[:, 2] > 0.5 * np.sqrt(np.sum(rise**2, axis=1))))
-    stands = bool(tall >= np.ptp(points.rest_m, axis=0).max() * 0.7)
+    stands = bool(tall >= np.ptp(rest_m, axis=0).max() * 0.7)
     up = f"the rest pose {'stands along it' if stands else 'does not stand along it'}; "
-    up += f"{points.names[head]} is over the feet in {100 * above:.0f} % of the frames"
+    up += f"{labels[head]} is over the feet in {100 * above:.0f} % of the frames"
     doubts = []
     if not stands:
         doubts.append("the rest pose does not stand upright: is another axis up?")
     if above < UPRIGHT_SHARE:
         doubts.append(f"the body is upright in {100 * above:.0f} % of the frames only: is another axis up?")
     return feet, up, tuple(doubts)
-
-
-def _rest_positions_m(parents: Sequence[int], bone_m: Floats) -> Floats:
-    """(B + 1, 3) positions of the root and of the bones' far ends in the rest pose [m]."""
-    rest = np.zeros((len(parents) + 1, 3))
-    for b, parent in enumerate(parents):
-        rest[b + 1] = rest[parent + 1] + bone_m[b]
-    return rest
 
 
 def _standing_height_m(skeleton: Skeleton) -> float:

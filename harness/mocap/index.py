@@ -1,18 +1,54 @@
-"""The index of a motion library: `manifest.csv` at the top of its folder, which says what motion files do not record.
+"""What a folder of a motion library holds: its files, and its index, which says what motion files do not record.
 
-Columns: path (relative to the folder), subject, trial, behaviour, frames, fps and note. Only path is required. Paths
-are compared in Unicode's composed form (NFC), with slashes.
+Symbolic links are followed inside the folder only. The index is `manifest.csv` at its top. Columns: path (relative to
+the folder), subject, trial, behaviour, frames, fps and note. Only path is required. Paths are compared in Unicode's
+composed form (NFC), with slashes.
 """
 
 import csv
 import io
 import unicodedata
+from collections.abc import Collection
 from pathlib import Path, PurePath
 
 from harness.core.csv_text import unescape_formula
+from harness.core.files import TEMPORARY
 from harness.core.input_file import read_input_file
 from harness.errors import BadFile, BadInput
 from harness.mocap.read.file_checks import check_size
+
+FETCHED = ".fetch-"
+"""Prefix of the name of the lock of `harness mocap fetch`, and of folders that earlier versions left."""
+
+
+def scan_folder(folder: Path, suffixes: Collection[str]) -> tuple[list[Path], list[Path]]:
+    """Files of a folder, at any depth, with lower-case `suffixes` such as ".amc", and ignored paths, both sorted.
+
+    Links to files inside the folder are among the files. Ignored are links that lead outside the folder or to nothing,
+    and folders that cannot be read.
+    A link to a folder inside is not walked again: its files are found where they lie, so loops of links are harmless.
+    """
+    top = folder.resolve()
+    files, ignored, waiting = [], [], [top]
+    while waiting:
+        parent = waiting.pop()
+        try:
+            paths = list(parent.iterdir())
+        except PermissionError:
+            ignored.append(parent)
+            continue
+        for path in paths:
+            if path.name.startswith((TEMPORARY, FETCHED)):
+                continue  # a process writes there, or was killed while it did
+            link = path.is_symlink()
+            if link and not (path.exists() and path.resolve().is_relative_to(top)):
+                ignored.append(path)
+            elif path.is_dir():
+                waiting += [] if link else [path]
+            elif path.suffix.lower() in suffixes and path.is_file():
+                files.append(path)
+    return sorted(files), sorted(ignored)
+
 
 INDEX_NAME = "manifest.csv"
 _LIMIT_BYTES = 16 * 2**20

@@ -18,8 +18,7 @@ from pathlib import Path
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput, UnknownName, shorten
 from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
-from harness.mocap.folder_scan import scan_folder
-from harness.mocap.index import INDEX_NAME, index_key, read_index
+from harness.mocap.index import INDEX_NAME, index_key, read_index, scan_folder
 
 LibraryFolders = Path | str | Sequence[Path | str]
 """One folder, or several."""
@@ -207,9 +206,9 @@ def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
     top = folder.resolve()
     index = read_index(top / INDEX_NAME)
     rows = {(top / path).resolve(): row for path, row in index.items()}
-    scan = scan_folder(top, {f".{kind}" for kind in FORMATS})
-    files, ignored = [], list(scan.ignored_paths)
-    for path in scan.files:
+    paths, ignored = scan_folder(top, {f".{kind}" for kind in FORMATS})
+    files = []
+    for path in paths:
         inside = path.relative_to(top)
         if not str(inside).isprintable():  # no command line could name it
             ignored.append(path)

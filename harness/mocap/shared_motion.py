@@ -14,13 +14,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.arrays import Bools, Floats, Ints, Singles, find_runs
 from harness.core.motion import Clip
 from harness.mocap.limb_directions import MIRRORED, UPPER_BODY, limb_directions
 from harness.mocap.motion_correlation import EVERY, GRID_HZ, FirstClip, Match, best_match, changes
 
 SAME_MOTION = 0.004
-"""Largest root mean square difference of descriptions over one second of the same motion (see `least_difference`)."""
+"""Largest root mean square difference of descriptions over one second of the same motion."""
 LEAST_MOTION = 0.06
 """Least root mean square deviation of the descriptions of one second from their mean; people at rest stay below it."""
 _RATE_HZ, _WINDOW, _LEAST_WINDOW = 10.0, 10, 5
@@ -59,48 +59,25 @@ def find_shared_motion(
     """
     stretches = [
         stretch
-        for comparison in _compare(first, first_runs, second, second_runs)
+        for comparison in compare_poses(first, first_runs, second, second_runs)
         if (stretch := comparison.longest_stretch(first, second)) is not None
     ]
-    longest = max(stretches, key=lambda stretch: stretch.second_s[1] - stretch.second_s[0], default=None)
-    return longest or _find_edited_motion(first, first_runs, second, second_runs)
-
-
-def _find_edited_motion(
-    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
-) -> SharedMotion | None:
-    """The stretch of the best match of changes, if it is one of the same motion."""
-    match = _best_match(first, first_runs, second, second_runs, 1.0)
+    if stretches:
+        return max(stretches, key=lambda stretch: stretch.second_s[1] - stretch.second_s[0])
+    match = best_match_of_clips(first, first_runs, second, second_runs, 1.0)
     if match is None:
         return None
     first_s, second_s = ((begin_s, begin_s + match.length_s) for begin_s in (match.first_s, match.second_s))
     return SharedMotion(first_s, second_s, match.mirrored)
 
 
-def least_loss(
-    first: Clip,
-    first_runs: Sequence[range],
-    second: Clip,
-    second_runs: Sequence[range],
-    limit: float = np.inf,
-) -> float:
-    """Least loss of correlation of two clips, relative to the largest one of a copy; inf if none is below the limit.
-
-    The lower the limit, the less time it takes. Only windows that move have a loss.
-    """
-    match = _best_match(first, first_runs, second, second_runs, limit)
-    return match.share if match else np.inf
-
-
-def _best_match(
+def best_match_of_clips(
     first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range], limit: float
 ) -> Match | None:
     """The best match of changes whose share is below a limit, or None."""
     known, other = _first_clip(first), _describe_samples(second).changes
     moments = np.arange(other.shape[1]) * EVERY / GRID_HZ * second.rate_hz
-    allowed = np.zeros(len(moments), bool)
-    for run in second_runs:
-        allowed |= (moments >= run.start) & (moments < run.stop)
+    allowed = _lie_in_runs(moments, second_runs)
     grid = [
         range(*(min(round(frame / first.rate_hz * GRID_HZ), len(known.changes)) for frame in (run.start, run.stop)))
         for run in first_runs
@@ -108,13 +85,14 @@ def _best_match(
     return min((match for run in grid if (match := best_match(known, run, other, allowed, limit))), default=None)
 
 
-def least_difference(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
-    """Least difference of two clips over a second that moves, as `SAME_MOTION` bounds it; inf if it is large."""
-    comparisons = _compare(first, first_runs, second, second_runs)
-    return min((float(c.difference[c.moving].min(initial=np.inf)) for c in comparisons), default=np.inf)
+def _lie_in_runs(frames: Floats | Ints, runs: Sequence[range]) -> Bools:
+    """(N,) whether frames (N,), which may lie between two whole ones, are in a run."""
+    inside = [(frames >= run.start) & (frames < run.stop) for run in runs]
+    out: Bools = np.any([np.zeros(len(frames), bool), *inside], axis=0)
+    return out
 
 
-class _Comparison(NamedTuple):
+class PoseComparison(NamedTuple):
     """Windows of the second clip, compared with a run of the first one."""
 
     difference: Floats
@@ -129,24 +107,22 @@ class _Comparison(NamedTuple):
 
     def longest_stretch(self, first: Clip, second: Clip) -> SharedMotion | None:
         """The longest stretch of windows of the same motion, or None."""
-        same = np.concatenate([[False], self.moving & (self.difference < SAME_MOTION), [False]])
-        begins, ends = np.flatnonzero(np.diff(same.astype(int)) == 1), np.flatnonzero(np.diff(same.astype(int)) == -1)
-        if not len(begins):
+        runs = find_runs(self.moving & (self.difference < SAME_MOTION))
+        if not len(runs):
             return None
-        longest = int(np.argmax(ends - begins))
-        window = len(self.second_rows) - len(self.difference) + 1
-        poses = slice(begins[longest], ends[longest] - 1 + window)
+        begin, end = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+        poses = slice(begin, end + len(self.second_rows) - len(self.difference))
         times_s = self.first_rows[poses] / first.rate_hz, self.second_rows[poses] / second.rate_hz
         first_s, second_s = ((float(t.min()), float(t.max())) for t in times_s)
         return SharedMotion(first_s, second_s, self.mirrored)
 
 
-def _compare(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> list[_Comparison]:
+def compare_poses(
+    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]
+) -> list[PoseComparison]:
     """Comparisons of two clips by run of the first one, as recorded and mirrored, where any two poses are close."""
     rows, samples, _ = _describe_samples(second)
-    allowed = np.zeros(len(rows), bool)
-    for run in second_runs:
-        allowed |= (rows >= run.start) & (rows < run.stop)
+    allowed = _lie_in_runs(rows, second_runs)
     window = min(_WINDOW, len(rows))
     if window < _LEAST_WINDOW or not allowed.any():
         return []
@@ -161,7 +137,7 @@ def _compare(first: Clip, first_runs: Sequence[range], second: Clip, second_runs
             nearest, _ = _nearest(poses, path)
             difference = np.sqrt(_window_mean(_squared_distance_to_path(poses, path, nearest), window))
             moving = (_window_spread(samples, window) >= LEAST_MOTION) & (_window_mean(allowed, window) > 1.0 - 1e-9)
-            out.append(_Comparison(difference, moving, run.start + nearest, rows, mirrored))
+            out.append(PoseComparison(difference, moving, run.start + nearest, rows, mirrored))
     return out
 
 

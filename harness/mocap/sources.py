@@ -1,74 +1,29 @@
-"""Sources of a scenario's motion: the motion generator, or a library of files that the user names."""
+"""Sources of a scenario's motion, the motion generator or a library of files, and skeletons of the people in it."""
 
 import os
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
 
+import numpy as np
+
+from harness.core.humanoid24 import BONES
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap import synthetic
+from harness.mocap.index import scan_folder
 from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
-from harness.mocap.skeletons import read_skeletons
-from harness.mocap.synthetic.rig import RIG_TAKES, generate_rig
+from harness.mocap.read.asf import read_asf
+from harness.mocap.synthetic.takes import RIG_TAKES, generate_rig
 
 MOCAP_VARIABLE = "HARNESS_MOCAP"
 POPULATION_SIZE = 100
 """Number of synthetic skeletons besides the performers': modes and spreads are then known to a tenth [choice]."""
 
 
-class MotionSource(Protocol):
-    """Clips by name."""
-
-    @property
-    def title(self) -> str:
-        """Name of the source in tables and on pages."""
-        ...
-
-    def names(self) -> tuple[str, ...]: ...
-    def check(self, name: str) -> None:
-        """Raise UnknownName unless there is such a clip."""
-        ...
-
-    def subject(self, name: str) -> str: ...
-    def performer(self, name: str) -> str:
-        """The performer of the clip where an index, CMU's name or the motion generator tells it, else ""."""
-        ...
-
-    def behaviour(self, name: str) -> str:
-        """What the performer does in the clip; "" where it is unknown."""
-        ...
-
-    def load(self, name: str) -> Clip:
-        """The clip; the same object each time."""
-        ...
-
-    def other_skeletons(self, without: str) -> dict[str, Skeleton]:
-        """Skeletons by subject of everybody but the subject `without`, to learn how people's bones vary."""
-        ...
-
-
-def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, rate_hz: float | None) -> MotionSource:
-    """The source `builtin` (the motion generator), or `cmu`: a library in one or several folders.
-
-    Without `folders`, HARNESS_MOCAP names the library. `rate_hz` is the rate of AMC files whose rate no index names.
-    Raises UnknownName for another kind, and BadInput when no folder is named or the library cannot be used.
-    """
-    if kind == "builtin":
-        return SyntheticSource(seed)
-    if kind != "cmu":
-        raise UnknownName("motion source", kind, ("builtin", "cmu"))
-    return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
-
-
 @cache
-def _synthetic_names() -> frozenset[str]:
-    return frozenset(_list_synthetic_names())
-
-
-def _list_synthetic_names() -> tuple[str, ...]:
+def _synthetic_names() -> tuple[str, ...]:
     """All takes; the behaviours alternate, so that the first names, which a message suggests, are of each."""
     takes = zip(*map(synthetic.take_names, synthetic.BEHAVIOURS), strict=True)
     return (*chain.from_iterable(takes), *RIG_TAKES)
@@ -84,9 +39,10 @@ class SyntheticSource:
         self._clips: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
-        return _list_synthetic_names()
+        return _synthetic_names()
 
     def check(self, name: str) -> None:
+        """Raise UnknownName unless there is such a take."""
         if name not in _synthetic_names():
             raise UnknownName("synthetic take", name, self.names())
 
@@ -99,11 +55,11 @@ class SyntheticSource:
         return _parse_take_name(name)[0]
 
     def load(self, name: str) -> Clip:
+        """The clip; the same object each time."""
         if name not in self._clips:
-            behaviour, performer, take = _parse_take_name(name)
             is_rig = name in RIG_TAKES
             self._clips[name] = (
-                generate_rig(name) if is_rig else synthetic.generate(behaviour, performer, take, seed=self._seed)
+                generate_rig(name) if is_rig else synthetic.generate(*_parse_take_name(name), seed=self._seed)
             )
         return self._clips[name]
 
@@ -140,6 +96,7 @@ class LibrarySource:
         return self._library.names()
 
     def check(self, name: str) -> None:
+        """Raise UnknownName unless there is such a clip."""
         self._library.entry(name)
 
     def subject(self, name: str) -> str:
@@ -153,6 +110,7 @@ class LibrarySource:
         return self._library.entry(name).behaviour
 
     def load(self, name: str) -> Clip:
+        """The clip; the same object each time."""
         if name not in self._clips:
             self._clips[name] = self._library.load(name)
         return self._clips[name]
@@ -162,6 +120,23 @@ class LibrarySource:
         if self._skeletons is None:
             self._skeletons = read_skeletons(self._library.folders)
         return {subject: skeleton for subject, skeleton in self._skeletons.items() if subject != without}
+
+
+MotionSource = SyntheticSource | LibrarySource
+"""Clips by name. Either class says of a clip what an index, CMU's name or the motion generator tells; "" is unknown."""
+
+
+def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, rate_hz: float | None) -> MotionSource:
+    """The source `builtin` (the motion generator), or `cmu`: a library in one or several folders.
+
+    Without `folders`, HARNESS_MOCAP names the library. `rate_hz` is the rate of AMC files whose rate no index names.
+    Raises UnknownName for another kind, and BadInput when no folder is named or the library cannot be used.
+    """
+    if kind == "builtin":
+        return SyntheticSource(seed)
+    if kind != "cmu":
+        raise UnknownName("motion source", kind, ("builtin", "cmu"))
+    return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
 
 
 def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
@@ -182,3 +157,29 @@ def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
 def folders_of_environment() -> tuple[Path, ...]:
     """The folders that HARNESS_MOCAP names, separated as in PATH (by `os.pathsep`); empty when it names none."""
     return tuple(Path(folder) for folder in os.environ.get(MOCAP_VARIABLE, "").split(os.pathsep) if folder)
+
+
+def read_skeletons(folders: LibraryFolders) -> dict[str, Skeleton]:
+    """Skeleton of each subject [m], sorted by subject, from the ASF files in one or several folders at any depth.
+
+    A file is named after its subject. Raises BadInput if there is no file, and BadFile for a file that cannot be read,
+    lacks a bone, or differs from another file of the same subject.
+    """
+    paths = as_folders(folders)
+    skeletons: dict[str, Skeleton] = {}
+    for path in (file for folder in paths for file in scan_folder(folder, (".asf",))[0]):
+        subject, skeleton = path.stem.split("_", 1)[0], _read_skeleton(path)
+        if not np.array_equal(skeletons.setdefault(subject, skeleton).bone_m, skeleton.bone_m):
+            raise BadFile(path, f"another skeleton of subject {subject}", "the same as its copy", "Remove one of them.")
+    if not skeletons:
+        names = ", ".join(map(str, paths))
+        raise BadInput(f"There is no ASF file below {names}.", "Name the folder of a motion library with skeletons.")
+    return dict(sorted(skeletons.items()))
+
+
+def _read_skeleton(path: Path) -> Skeleton:
+    skeleton = read_asf(path)
+    try:
+        return skeleton.subset(BONES)[0]
+    except UnknownName as error:
+        raise BadFile(path, str(error), "the 24 bones of core.humanoid24", "Leave it out of the library.") from error

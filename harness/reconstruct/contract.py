@@ -1,7 +1,12 @@
-"""Interfaces of a reconstructor: a configured method is trained once, then makes one causal session per take."""
+"""Interfaces of a reconstructor: a configured method is trained once, then makes one causal session per take.
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+`Fitted` and `CalibrationCache` are what trained methods keep: how a session starts, and what was computed for a
+calibration.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -41,7 +46,7 @@ class Method(Protocol):
     """A configured algorithm. Its attributes are its options, and part of a cell's key (`core.object_state`).
 
     It may also have an attribute `source`, the paper it comes from, which `harness list` prints, and an attribute
-    `training_data` (`core.training_data`). Without the latter its rank has the note "training data unknown".
+    `training_data` (`core.split`). Without the latter its rank has the note "training data unknown".
     """
 
     @property
@@ -74,3 +79,36 @@ class DatabaseMethod(Method, Protocol):
     def fit_database(self, body: Body, database: "MotionDatabase", rng: np.random.Generator) -> Reconstructor:
         """Learn from poses on `body` at the tracker's rate; they may be memory-mapped, so avoid copies."""
         ...
+
+
+T = TypeVar("T")
+S = TypeVar("S", bound=Session, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted(Generic[S]):
+    """A `Reconstructor` that knows no more than what its sessions start with."""
+
+    begin: Callable[[Calibration], S]
+
+
+class CalibrationCache(Generic[T]):
+    """Cache of what takes seconds, such as the features of the examples.
+
+    It holds a value for the last calibration, so that sessions of one performer share it.
+    """
+
+    def __init__(self) -> None:
+        self._entry: tuple[tuple[tuple[str, ...], bytes], T] | None = None
+
+    def get(self, calibration: Calibration, make: Callable[[], T]) -> T:
+        """The value for a calibration's bones and mounts; `make` is called when they changed.
+
+        The old value is released first, since both may not fit into memory.
+        """
+        key = tuple(calibration.bones), calibration.mount_m.tobytes()
+        entry = self._entry
+        if entry is None or entry[0] != key:
+            entry = self._entry = None
+            entry = self._entry = (key, make())
+        return entry[1]

@@ -8,7 +8,8 @@ import dataclasses
 import importlib
 import importlib.util
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, cast
@@ -18,7 +19,7 @@ from harness.core.options import parse_name, split_outside_brackets
 from harness.core.working_folder import name_module
 from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
-from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, weighted_blend
+from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, local_regression
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
@@ -48,8 +49,8 @@ _BUILT_IN: dict[str, Callable[[], Method]] = {
     "dynamic_map:window": lambda: dynamic_map.WINDOW,
     "dynamic_map:literal": lambda: dynamic_map.LITERAL,
     "expert_map": expert_map.ExpertMap,
-    "weighted_blend": weighted_blend.WeightedBlend,
-    "weighted_blend:literal": lambda: weighted_blend.LITERAL,
+    "weighted_blend": local_regression.WeightedBlend,
+    "weighted_blend:literal": lambda: local_regression.LITERAL,
     "kernel_cca": kernel_cca.KernelCca,
     "kernel_cca:literal": lambda: kernel_cca.LITERAL,
 }
@@ -137,16 +138,20 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
 
 def _make_installed(entry: EntryPoint) -> Method:
     """The method of an installed package, which is imported only now; BadInput when that fails."""
-    try:
+    with _refused(f"{entry.name} ({entry.value})", "Repair or remove the package that registers it."):
         method: Method = entry.load()()
+    return method
+
+
+@contextmanager
+def _refused(what: str, advice: str) -> Iterator[None]:
+    """BadInput where code from outside raises anything but our own errors."""
+    try:
+        yield
     except HarnessError:
         raise
-    except (Exception, SystemExit) as error:  # code from outside may raise anything
-        raise BadInput(
-            f"{entry.name} ({entry.value}) cannot be made: {type(error).__name__}: {error}.",
-            "Repair or remove the package that registers it.",
-        ) from error
-    return method
+    except (Exception, SystemExit) as error:
+        raise BadInput(f"{what} cannot be made: {type(error).__name__}: {error}.", advice) from error
 
 
 def _base_method(name: str) -> Method:
@@ -158,22 +163,15 @@ def _base_method(name: str) -> Method:
     name_module(module)
     if not colon or not attribute or module in registered or not _module_exists(module):
         raise UnknownName("method", name, registered)
-    try:
+    with _refused(name, "It must import, and need no arguments."):
         factory = getattr(importlib.import_module(module), attribute, None)
         if factory is None:
             raise UnknownName(f"method in {module}", attribute, _public_classes(module))
         method: Method = factory()
-    except HarnessError:
-        raise
-    except (Exception, SystemExit) as error:  # code from outside may raise anything
-        raise BadInput(
-            f"{name} cannot be made: {type(error).__name__}: {error}.", "It must import, and need no arguments."
-        ) from error
     missing = [m for m in _REQUIRED_ATTRIBUTES if not hasattr(method, m)]
     if missing:
         raise BadInput(
-            f"{name} is not a method: it has no {' and no '.join(missing)}.",
-            "See harness.reconstruct.contract.Method.",
+            f"{name} is not a method: it has no {' and no '.join(missing)}.", "See harness.reconstruct.contract.Method."
         )
     return method
 

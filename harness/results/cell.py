@@ -22,9 +22,14 @@ from harness.core.files import flush_together, move_into_place, temporary_path, 
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
-from harness.results.content_types import check_cell_types, find_cell_fault
+from harness.results.content_types import (
+    check_cell_types,
+    find_cell_fault,
+    find_impossible_errors,
+    find_impossible_metric,
+    find_impossible_sigma,
+)
 from harness.results.digests import check_file, check_key, insert_digest, read_result_json
-from harness.results.plausibility import find_impossible_errors, find_impossible_metric, find_impossible_sigma
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -126,7 +131,7 @@ class Cell:
     step_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
     """(F,) CPU time of each step [ms]; NaN (the default) where not timed."""
     reference_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
-    """(F,) CPU time of the work of `experiment.reference_workload` right after each step [ms]; NaN (the default)
+    """(F,) CPU time of the work of `experiment.method_run` right after each step [ms]; NaN (the default)
     after steps that it did not follow."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
     """Errors of the calibration by name (see `harness.experiment.simulated_calibration`); empty if it is exact."""

@@ -6,13 +6,20 @@ digest of any other file stands in a JSON file. Whoever changes a file and compu
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from harness.core import files
+from harness.core.fields import build
 from harness.core.input_file import MEGABYTE, check_input_file, read_input_file
-from harness.errors import BadFile, shorten
+from harness.errors import BadFile, HarnessError, shorten
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 MAX_DIGESTED_BYTES = 1024 * MEGABYTE
 """Largest file whose digest is computed [choice]."""
@@ -49,6 +56,33 @@ def read_result_json(path: Path, expected: str, advice: str, limit_bytes: int = 
     if state.hexdigest() != line[1].decode():
         raise BadFile(path, "damaged or edited: its content does not fit its digest", expected, advice)
     return content
+
+
+def write_record(path: Path, record: "DataclassInstance") -> None:
+    """Write a record as JSON with its digest atomically; `read_record` reads it again."""
+    write_result_json(path, asdict(record))
+
+
+def read_record(
+    kind: type[T],
+    path: Path,
+    expected: str,
+    advice: str,
+    renamed: Callable[[dict[str, Any]], dict[str, Any]] = lambda content: content,
+) -> T:
+    """Read a record by its annotations (`core.fields.build`).
+
+    BadFile as from `read_result_json`, for another `schema` than that of the record, if it has one, and for keys and
+    values that do not fit. `renamed` gives the keys of earlier versions their names of today.
+    """
+    content = read_result_json(path, expected, advice)
+    found = content.get("schema")
+    if found != (schema := getattr(kind, "schema", None)):
+        raise BadFile(path, f"schema {found}", f"schema {schema}", advice)
+    try:
+        return build(kind, renamed(content), path.stem)
+    except (TypeError, ValueError, HarnessError) as error:
+        raise BadFile(path, str(error), expected, advice) from error
 
 
 def check_key(path: Path, found: Any, key: Any, expected: str, advice: str) -> None:

@@ -4,16 +4,12 @@ An experiment answers one question of a paper. It has claims (each a published s
 tables, and charts as the numbers that they are drawn from, so that a page can be drawn from the file alone.
 """
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.fields import build
-from harness.core.files import to_json_types
-from harness.errors import BadFile, UnknownName
 from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import check_study, read_result_json, write_result_json
+from harness.results.digests import check_study, read_record, write_record
 
 SCHEMA = 1
 
@@ -108,17 +104,13 @@ class PaperFindings:
 
 def write_findings(path: Path, findings: PaperFindings) -> None:
     """Write findings as JSON with a digest."""
-    write_result_json(path, to_json_types(dataclasses.asdict(findings)))
+    write_record(path, findings)
 
 
 def read_findings(path: Path) -> PaperFindings:
     """Read the findings of a paper study; BadFile when they are missing, damaged, edited, malformed or another's."""
     expected, advice = "the findings of a paper's study", "Give the command of the study again."
-    content = read_result_json(path, expected, advice)
-    try:
-        findings = build(PaperFindings, content, "findings")
-    except (TypeError, ValueError, UnknownName) as error:
-        raise BadFile(path, str(error), expected, advice) from error
+    findings = read_record(PaperFindings, path, expected, advice)
     identity = {"paper": findings.paper, "motion": findings.motion, "seed": findings.seed}
     check_study(path, identity, expected, advice)
     return findings

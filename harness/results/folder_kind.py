@@ -1,9 +1,16 @@
-"""What a folder of results holds, told by the files in it."""
+"""What a folder of results holds, told by the files in it, and its lock, which a process holds while it writes there.
 
+The operating system releases the lock however the process ends.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from harness.core.files import read_json
-from harness.errors import BadFile
+from harness.errors import BadFile, BadInput
 from harness.results.digests import STUDY_FILE
 from harness.results.index import INDEX_FILE, CellIndex
 
@@ -11,6 +18,7 @@ CELLS_FILE = "cells.json"
 """File of a baseline (see `compare.baseline.write_baseline`)."""
 FINDINGS = "findings.json"
 """File of a finished placement study, paper or trust study."""
+LOCK_FILE = ".lock"
 _KINDS = {
     "run": ("a run", "`harness report`, `view`, `table` and `plot` show it."),
     "sweep": ("a sweep", "`harness report` and `harness compare` show it."),
@@ -57,3 +65,27 @@ def require_kind(out: Path, *kinds: str) -> str:
         found, advice = _KINDS.get(kind, _KINDS[""])
         raise BadFile(out, found, expected, advice)
     return kind
+
+
+@contextmanager
+def folder_lock(out: Path) -> Iterator[None]:
+    """Hold the lock of a folder, so that one process at a time writes there; BadInput when another process holds it."""
+    try:
+        with FileLock(out / LOCK_FILE, timeout=0):
+            yield
+    except Timeout as error:
+        advice = f"`harness status {out}` shows its progress. Wait for it, or name another folder."
+        raise BadInput(f"Another process uses {out}.", advice) from error
+
+
+def is_running(out: Path) -> bool:
+    """Whether a process holds the folder's lock, on this machine or on another one that shares the file system."""
+    if not (out / LOCK_FILE).is_file():
+        return False
+    try:
+        with FileLock(out / LOCK_FILE, timeout=0):
+            return False
+    except Timeout:
+        return True
+    except OSError:  # a folder that cannot be written: nobody works there
+        return False

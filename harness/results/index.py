@@ -11,10 +11,9 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from harness.core.files import TEMPORARY, content_key, flush, to_json_types
 from harness.core.input_file import check_input_file
@@ -54,8 +53,7 @@ _KEYS_PER_QUERY = 500
 """Number of keys in one SQL query."""
 
 
-@dataclass(frozen=True)
-class CellCounts:
+class CellCounts(NamedTuple):
     """Counts of the planned cells by outcome."""
 
     planned: int
@@ -366,15 +364,12 @@ def _column_types(column: str) -> str:
 
 
 def _as_columns(row: Mapping[str, Any], seconds: float | None) -> tuple[Any, ...]:
-    rest = _json(
-        {
-            name: value
-            for name, value in row.items()
-            if name not in _COLUMNS and not (name in OPTIONAL_COLUMNS and value == OPTIONAL_COLUMNS[name])
-        }
-    )
+    rest = {name: value for name, value in row.items() if name not in _COLUMNS}
+    rest = {
+        name: value for name, value in rest.items() if name not in OPTIONAL_COLUMNS or value != OPTIONAL_COLUMNS[name]
+    }
     texts = {name: _json(row[name]) for name in _JSON_COLUMNS if name in row}
-    values = {**row, **texts, "seconds": seconds, "rest": rest}
+    values = {**row, **texts, "seconds": seconds, "rest": _json(rest)}
     return tuple(values.get(name) for name in _COLUMNS)
 
 

@@ -45,7 +45,7 @@ class Manifest:
 
     @property
     def training_data(self) -> Mapping[str, str]:
-        """Method -> its declared training data (`core.training_data`); empty in manifests that did not store it."""
+        """Method -> its declared training data (`core.split`); empty in manifests that did not store it."""
         return dict(self.circumstances.get("training_data", {}))
 
     def as_dict(self) -> dict[str, Any]:

@@ -5,18 +5,17 @@ of statistics (averaged over clips, methods and seeds), so that sets are compare
 can be drawn from the file alone.
 """
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.fields import build
-from harness.core.files import to_json_types
-from harness.errors import BadFile, UnknownName
+from harness.errors import BadFile
 from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import check_study, read_result_json, write_result_json
+from harness.results.digests import check_study, read_record, write_record
 
 SCHEMA = 1
+_RENAMED_KEYS = {"stays": "selection_stability", "crossed": "cross_validated_error", "worth": "contributions"}
+"""Key in findings of earlier versions -> today's."""
 PlacementMode = Literal["ablate", "add", "greedy", "exhaustive", "refine"]
 MODES: dict[PlacementMode, str] = {
     "ablate": "each left out of a base set",
@@ -31,7 +30,7 @@ StationNames = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class StationPlacement:
+class CandidatePlace:
     """A candidate: one tracker at one place (see `harness.body.mounts.Mount`). A moved candidate has a new name."""
 
     name: str
@@ -153,9 +152,9 @@ class BestSet:
     """Whether no set of fewer or as many stations has a smaller error (Pareto front)."""
     of: int = 0
     """Number of sets of this size that it was chosen from."""
-    stays: float | None = None
+    selection_stability: float | None = None
     """Share of resamples of the units in which it is still the best."""
-    crossed: float | None = None
+    cross_validated_error: float | None = None
     """Cross-validated error: the mean over units of the error of the set that the other units would have chosen.
 
     It exceeds the mean error by the optimism of choosing and evaluating on the same units.
@@ -180,7 +179,7 @@ class PlacementCondition:
     means: tuple[float | None, ...]
     """Mean error of each set of `PlacementFindings.compared`."""
     clips: int = 0
-    stays: float | None = None
+    selection_stability: float | None = None
     """Share of resamples of the units in which the best of the compared sets is still the best."""
 
 
@@ -268,7 +267,7 @@ class PlacementFindings:
     """Text that says how many stations the line carries at which rate; "" if the rate is the same for all."""
     seed: int
     command: str
-    candidates: tuple[StationPlacement, ...]
+    candidates: tuple[CandidatePlace, ...]
     tried: tuple[StationSetResult, ...]
     best: tuple[BestSet, ...]
     """Best set for each number of stations, smallest first."""
@@ -276,7 +275,7 @@ class PlacementFindings:
     """See `manifest.current_circumstances`."""
     rankings: tuple[Ranking, ...] = ()
     searches: tuple[PlacementSearch, ...] = ()
-    worth: tuple[MarginalContribution, ...] = ()
+    contributions: tuple[MarginalContribution, ...] = ()
     compared: tuple[StationNames, ...] = ()
     """The sets that every condition ranks."""
     conditions: tuple[PlacementCondition, ...] = ()
@@ -306,7 +305,7 @@ class PlacementFindings:
 
 def write_placement(path: Path, findings: PlacementFindings) -> None:
     """Write findings as JSON with a digest."""
-    write_result_json(path, to_json_types(dataclasses.asdict(findings)))
+    write_record(path, findings)
 
 
 def read_placement(path: Path) -> PlacementFindings:
@@ -316,18 +315,24 @@ def read_placement(path: Path) -> PlacementFindings:
     candidates.
     """
     expected, advice = "the findings of a placement study", "Give the command of the study again."
-    content = read_result_json(path, expected, advice)
-    if content.get("schema") != SCHEMA:
-        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
-    try:
-        findings = build(PlacementFindings, content, "findings")
-    except (TypeError, ValueError, UnknownName) as error:
-        raise BadFile(path, str(error), expected, advice) from error
+    findings = read_record(PlacementFindings, path, expected, advice, _rename_keys)
     if strangers := _unknown_stations(findings):
         raise BadFile(path, f"names {strangers[0]!r}, which is no candidate of it", expected, advice)
     identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}
     check_study(path, identity, expected, advice)
     return findings
+
+
+def _rename_keys(content: dict[str, Any]) -> dict[str, Any]:
+    """The content with today's keys: of the findings, their best sets and their conditions."""
+    renamed = {_RENAMED_KEYS.get(key, key): value for key, value in content.items()}
+    for name in ("best", "conditions"):
+        if isinstance(rows := renamed.get(name), list):
+            renamed[name] = [
+                {_RENAMED_KEYS.get(key, key): value for key, value in row.items()} if isinstance(row, dict) else row
+                for row in rows
+            ]
+    return renamed
 
 
 def _unknown_stations(findings: PlacementFindings) -> list[str]:
@@ -337,5 +342,5 @@ def _unknown_stations(findings: PlacementFindings) -> list[str]:
     sets += [row.stations for ranking in findings.rankings for row in ranking.rows]
     sets += [step.stations for search in findings.searches for step in search.steps]
     sets += [stations for best in findings.best for stations in (best.stations, *best.ties)]
-    sets += [*findings.compared, *((worth.candidate,) for worth in findings.worth)]
+    sets += [*findings.compared, *((contribution.candidate,) for contribution in findings.contributions)]
     return sorted({name for stations in sets for name in stations} - known)

@@ -1,22 +1,27 @@
-"""Results of a run, a sweep or a baseline, cell by cell, as comparisons use them."""
+"""Results of a run, a sweep or a baseline: cell by cell for comparisons, loaded whole, or selected by name."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from harness.core.line_loss import excess_loss
-from harness.core.names import check_words
-from harness.errors import BadFile, UnknownName
-from harness.results.cell import cell_folder, read_content, row_of_content
+from harness.core.ranges import check_words
+from harness.core.stream_health import excess_loss
+from harness.errors import BadFile, BadInput, MissingExtra, UnknownName
+from harness.results.cell import Cell, cell_folder, read_content, row_of_content
+from harness.results.content_types import find_impossible_metric
 from harness.results.digests import check_file, check_key, read_result_json
 from harness.results.folder_kind import CELLS_FILE
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_folder, check_row
 from harness.results.manifest import Manifest, flatten
-from harness.results.plausibility import find_impossible_metric
+from harness.results.storage import read_cells
 from harness.score.metrics import DEFINITIONS
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 BASELINES = Path("results/baselines")
 BASELINE_FILES = ("manifest.json", "summary.json")
@@ -24,6 +29,7 @@ BASELINE_FILES = ("manifest.json", "summary.json")
 SCHEMA = 2
 """Version of the format of `CELLS_FILE`; since 2 its files have digests."""
 _TEXTS = ("scenario", "clip", "method", "inputs", "split", "noise", "behaviour", "performer")
+_IDENTITY = ("scenario", "behaviour", "clip", "performer", "seed", "method", "inputs", "split", "noise")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
 COUNT_METRICS = ("frames_matched", "frames_expected")
 _ADVICE = "Run, or save, it again."
@@ -51,8 +57,8 @@ class CellResult:
     metrics: Mapping[str, float | None]
     """By name; None is "not measured"."""
     line_loss: float = 0.0
-    """Share of the records that the line dropped beyond what the scenario allows (see `core.line_loss.excess_loss`);
-    0 in a baseline."""
+    """Share of the records that the line dropped beyond what the scenario allows, 0 in a baseline (see
+    `core.stream_health.excess_loss`)."""
 
 
 @dataclass(frozen=True)
@@ -147,3 +153,87 @@ def _check_cell(path: Path, content: Mapping[str, Any]) -> CellResult:
     if found := find_impossible_metric(content["metrics"]):
         raise BadFile(path, found, "possible values", _ADVICE)
     return CellResult(**{name: content[name] for name in _KINDS})
+
+
+@dataclass(frozen=True)
+class LoadedRun:
+    """The results of a run or sweep: a record of each cell, and the arrays of each frame on request."""
+
+    folder: Path
+    results: ResultSet
+    """Everything that comparisons use: the records, the manifest, the number of planned cells, the failed ones."""
+
+    @property
+    def records(self) -> tuple[CellResult, ...]:
+        """One record for each finished cell, in the order of the tables: its identity, conditions and metrics."""
+        return self.results.cells
+
+    def cells(self, **identity: Any) -> Iterator[Cell]:
+        """The finished cells with their arrays over F frames, read from the disk one at a time.
+
+        `identity` chooses cells by equal fields, such as method="ik" or clip="walking_p1_01". BadInput for a field that
+        cells do not have.
+        """
+        for name in identity:
+            if name not in Cell.__dataclass_fields__:
+                raise BadInput(f"Cells have no field {name!r}.", "Choose by clip, method, inputs, seed or noise.")
+        cells = read_cells(self.folder)
+        return (cell for cell in cells if all(getattr(cell, name) == value for name, value in identity.items()))
+
+    def to_pandas(self) -> "DataFrame":
+        """A table with a row for each record: identity, `vary.KEY` for varied keys, metrics (NaN: not measured).
+
+        MissingExtra when pandas is not installed.
+        """
+        try:
+            from pandas import DataFrame
+        except ImportError:
+            raise MissingExtra("A table of a run", "pandas", "pandas") from None
+        return DataFrame(
+            {name: getattr(record, name) for name in _IDENTITY}
+            | {f"vary.{key}": value for key, value in record.varied.items()}
+            | {name: float("nan") if value is None else value for name, value in record.metrics.items()}
+            for record in self.records
+        )
+
+
+def load_run(folder: Path | str) -> LoadedRun:
+    """Load the folder of a run or sweep, finished or not; BadFile when it holds none or is damaged."""
+    return LoadedRun(Path(folder), load_results(folder))
+
+
+def select_cells(out: Path, *, clips: Sequence[str] = (), methods: Sequence[str] = ()) -> Iterator[Cell]:
+    """The finished cells of a run or sweep whose clip and method are chosen, in planned order, read one at a time.
+
+    `clips` and `methods` are names or patterns, in which `*` stands for any text and `?` for one character; without
+    any, all are chosen. A clip without a part ("13_17") stands for all its parts ("13_17@0.20-0.40"). Raises
+    UnknownName for an entry that fits no finished cell, BadInput when no cell has a chosen clip and a chosen method,
+    and BadFile as `read_cells`.
+    """
+    check_folder(out)
+    with CellIndex(out, read_only=True) as index:
+        cells = list(index.columns("key", "clip", "method"))
+    _check_entries("clip", clips, [clip for _, clip, _ in cells])
+    _check_entries("method", methods, [method for _, _, method in cells])
+    keys = {key for key, clip, method in cells if _is_chosen(clip, clips) and _is_chosen(method, methods)}
+    if cells and not keys:
+        chosen = f"clip {', '.join(clips)} with method {', '.join(methods)}"
+        raise BadInput(f"No finished cell of {out} has {chosen}.", "Each occurs, but not together.")
+    return read_cells(out, keys)
+
+
+def _check_entries(kind: str, entries: Sequence[str], names: Sequence[str]) -> None:
+    known = tuple(dict.fromkeys(names))
+    for entry in entries:
+        if not any(_fits(name, entry) for name in known):
+            raise UnknownName(kind, entry, known)
+
+
+def _is_chosen(name: str, entries: Sequence[str]) -> bool:
+    return not entries or any(_fits(name, entry) for entry in entries)
+
+
+def _fits(name: str, entry: str) -> bool:
+    """Whether a name fits a pattern; brackets stand for themselves, because they hold the options of a method."""
+    pattern = re.escape(entry).replace(r"\*", ".*").replace(r"\?", ".")
+    return any(re.fullmatch(pattern, text, re.DOTALL) for text in (name, name.partition("@")[0]))

@@ -16,7 +16,7 @@ it.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,37 +32,6 @@ SETTLING_S, WINDOW_S = 1.0, 1.0
 """Start of the evaluated window after the last bad frame, and its length [s]."""
 _SMOOTHING_S = 0.25
 _STATUS_TOLERANCE_S = 0.05
-
-
-@dataclass(frozen=True)
-class Recovery:
-    """Recovery of one disturbed cell against its undisturbed twin."""
-
-    method: str
-    inputs: str
-    split: str
-    behaviour: str
-    clip: str
-    disturbance: str
-    judged: int
-    """Number of frames in the evaluated window; 0 if the take ends before it, and then no value below is known."""
-    disturbed_deg: float
-    """Mean joint angle error in the evaluated window [deg]."""
-    undisturbed_deg: float
-    during: float
-    """Ratio to the undisturbed error during the disturbance, from the first bad frame to the last."""
-    disturbed_mm: float
-    """Mean distance of the joint centres in the evaluated window [mm]."""
-    undisturbed_mm: float
-    back_after_s: float | None
-    """Time from the last bad frame until the error, smoothed over 0.25 s, stays within 1.5 times the undisturbed one up
-    to the end of the window [s]; None if it never does."""
-    status_right: float
-    """Share of frames, from the first bad one to the end of the window, whose status agrees with the readings."""
-
-    @property
-    def ratio(self) -> float:
-        return error_ratio(self.disturbed_deg, self.undisturbed_deg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,41 +75,52 @@ class RecoveryCollector:
             (2 * seen >= len(cell.stations)) & (seen > 0),
         )
 
-    def pairs(self) -> list[Recovery]:
-        """Recovery of every disturbed cell that has an undisturbed twin; `judged` is 0 for takes that end too soon."""
+    def rows(self) -> list[dict[str, Any]]:
+        """Records for `summary.json` of every disturbed cell that has an undisturbed twin.
+
+        A record has the cell (`method`, `inputs`, `split`, `behaviour`, `clip`), its `disturbance`, and
+
+        - `evaluated_frames`: number of frames in the evaluated window; 0 if the take ends before
+          it, and then no value is known;
+        - `disturbed_deg`, `undisturbed_deg`, `disturbed_mm`, `undisturbed_mm`: mean joint angle error and mean distance
+          of the joint centres in the window; `ratio` is that of the angles;
+        - `during`: that ratio during the disturbance, from the first bad frame to the last;
+        - `back_after_s`: time from the last bad frame until the error, smoothed over 0.25 s, stays within 1.5 times the
+          undisturbed one up to the end of the window [s]; None if it never does;
+        - `status_right`: share of frames, from the first bad one to the end of the window, whose status agrees with the
+          readings.
+        """
         found = []
         for courses in self._courses.values():
             if (plain_course := courses.get("none")) is not None:
                 found += [_recovery(course, plain_course) for kind, course in courses.items() if kind != "none"]
         return found
 
-    def rows(self) -> list[dict[str, Any]]:
-        """Records for `summary.json`: the pairs, each with its ratio."""
-        return [{**asdict(recovery), "ratio": recovery.ratio} for recovery in self.pairs()]
 
-
-def _recovery(course: _CellErrors, undisturbed: _CellErrors) -> Recovery:
+def _recovery(course: _CellErrors, undisturbed: _CellErrors) -> dict[str, Any]:
     begin_s, end_s = float(course.disturbance["begins_s"]), float(course.disturbance["ends_s"])
     common, here, there = np.intersect1d(course.time_s, undisturbed.time_s, return_indices=True)
     bad = common[common < end_s - 1e-9]
     since_s = common - (bad[-1] if len(bad) else np.inf)
     long_enough = len(since_s) > 0 and since_s[-1] > SETTLING_S + WINDOW_S - 1e-9
     until = (since_s <= SETTLING_S + WINDOW_S + 1e-9) & long_enough
-    judged, during = until & (since_s > SETTLING_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
+    after, during = until & (since_s > SETTLING_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
     right = _status_is_correct(course.time_s, course.reporting, course.status)
-    return Recovery(
+    ours_deg, theirs_deg = _mean_over(disturbed_deg, after), _mean_over(undisturbed_deg, after)
+    return {
         **course.cell,
-        disturbance=str(course.disturbance["kind"]),
-        judged=int(np.count_nonzero(judged)),
-        disturbed_deg=_mean_over(disturbed_deg, judged),
-        undisturbed_deg=_mean_over(undisturbed_deg, judged),
-        during=error_ratio(_mean_over(disturbed_deg, during), _mean_over(undisturbed_deg, during)),
-        disturbed_mm=_mean_over(course.error_mm[here], judged),
-        undisturbed_mm=_mean_over(undisturbed.error_mm[there], judged),
-        back_after_s=_back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
-        status_right=_mean_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
-    )
+        "disturbance": str(course.disturbance["kind"]),
+        "evaluated_frames": int(np.count_nonzero(after)),
+        "disturbed_deg": ours_deg,
+        "undisturbed_deg": theirs_deg,
+        "during": error_ratio(_mean_over(disturbed_deg, during), _mean_over(undisturbed_deg, during)),
+        "disturbed_mm": _mean_over(course.error_mm[here], after),
+        "undisturbed_mm": _mean_over(undisturbed.error_mm[there], after),
+        "back_after_s": _back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
+        "status_right": _mean_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
+        "ratio": error_ratio(ours_deg, theirs_deg),
+    }
 
 
 def error_ratio(error: float, undisturbed: float) -> float:
@@ -191,7 +171,7 @@ def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
     found = []
     for (method, inputs, split), group in groups.items():
         after: dict[str, Any] = dict.fromkeys(row["disturbance"] for row in group)
-        known = [row for row in group if row["judged"]]
+        known = [row for row in group if row["evaluated_frames"]]
         for kind in dict.fromkeys(row["disturbance"] for row in known):
             those = [row for row in known if row["disturbance"] == kind]
             means = [_mean(those, name) for name in ("disturbed_deg", "undisturbed_deg")]
@@ -202,17 +182,12 @@ def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
                 "worst": float(np.max([_number(row["ratio"]) for row in those])),
                 "back_after_s": None if None in slowest else max(slowest),
             }
-        found.append(
-            {
-                "method": method,
-                "inputs": inputs,
-                "split": split,
-                "clips": len({row["clip"] for row in known}),
-                "undisturbed_deg": _mean(known, "undisturbed_deg") if known else None,
-                "status_right": min((row["status_right"] for row in known), default=None),
-                "after": after,
-            }
-        )
+        pooled = {
+            "clips": len({row["clip"] for row in known}),
+            "undisturbed_deg": _mean(known, "undisturbed_deg") if known else None,
+            "status_right": min((row["status_right"] for row in known), default=None),
+        }
+        found.append({"method": method, "inputs": inputs, "split": split, **pooled, "after": after})
     return found
 
 

@@ -11,18 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import TEMPORARY, content_key, digest
-from harness.core.line_loss import BAUD, describe_line_loss
-from harness.core.names import check_words
+from harness.core.ranges import check_words
+from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
-from harness.results.content_types import check_summary_types
+from harness.results.content_types import (
+    check_summary_types,
+    find_impossible_metric,
+    find_impossible_sigma,
+    find_impossible_statistic,
+)
 from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
+from harness.results.folder_kind import LOCK_FILE, folder_lock
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
-from harness.results.lock import LOCK_FILE, folder_lock
 from harness.results.manifest import Manifest
-from harness.results.plausibility import find_impossible_metric, find_impossible_sigma, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
 from harness.results.summary import GROUP_KEYS, SummaryStatistics
 from harness.results.table import compute_group_statistics, write_table
@@ -109,6 +113,9 @@ def read_summary(out: Path) -> dict[str, Any]:
     advice = "Give the command of the run again."
     if missing := [name for name in _SUMMARY_KEYS if name not in content]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
+    for row in content["recovery"] if isinstance(content.get("recovery"), list) else ():
+        if isinstance(row, dict) and "judged" in row:  # its name in earlier versions
+            row["evaluated_frames"] = row.pop("judged")
     check_summary_types(path, content, advice)
     for row in content["cells"]:
         if found := find_impossible_metric(row) or find_impossible_sigma(row.get("sigma_scores", {})):
@@ -148,7 +155,7 @@ def write_summary(
     """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
     summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason), line_loss
-    (see `core.line_loss`; absent where every line let its cell be measured) and groups (see
+    (see `core.stream_health`; absent where every line let its cell be measured) and groups (see
     `table.compute_group_statistics`). The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell
     was measured. With `orders`, as a run has them, it also has statistics over frames, for
     which every cell is read: methods (with their declared `training_data`) and behaviours (see

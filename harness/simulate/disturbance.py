@@ -9,11 +9,9 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import CheckedFields, Range
 from harness.errors import UnknownName
-from harness.simulate.components.lost_station import LostStation
-from harness.simulate.components.orientation_offset import OrientationOffset
-from harness.simulate.components.position_offset import PositionOffset
+from harness.simulate.components.faults import LostStation, OrientationOffset, PositionOffset
 from harness.simulate.noise import Noise
 
 Kind = Literal["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
@@ -21,7 +19,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 @dataclass(frozen=True)
-class Disturbance:
+class Disturbance(CheckedFields):
     """A fault of limited duration; sizes and lengths are those of docs/metrics.md ("recovery")."""
 
     kind: Kind = "none"
@@ -38,9 +36,6 @@ class Disturbance:
     """Angle of `all_turned` about the vertical [deg]."""
     start_off_m: Annotated[float, Range(-100.0, 100.0)] = 1.0
     """Position error of `start_off` [m]."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def begins_s(self) -> float:
@@ -68,17 +63,10 @@ class Disturbance:
             case "one_lost" | "all_lost":
                 lost = one if self.kind == "one_lost" else stations
                 return replace(noise, lost=(*noise.lost, *(LostStation(s, fade_s=0.0, **within) for s in lost)))
-            case "one_off":
-                return replace(
-                    noise,
-                    position_offset=(
-                        *noise.position_offset,
-                        PositionOffset(one, offset_m=forward_offset_m(self.off_m), **within),
-                    ),
-                )
-            case "start_off":
-                everything = PositionOffset((), offset_m=forward_offset_m(self.start_off_m), **within)
-                return replace(noise, position_offset=(*noise.position_offset, everything))
+            case "one_off" | "start_off":
+                which, off_m = (one, self.off_m) if self.kind == "one_off" else ((), self.start_off_m)
+                off = PositionOffset(which, offset_m=forward_offset_m(off_m), **within)
+                return replace(noise, position_offset=(*noise.position_offset, off))
             case "all_turned":
                 turned = OrientationOffset((), angle_rad=float(np.deg2rad(self.turn_deg)), **within)
                 return replace(noise, orientation_offset=(*noise.orientation_offset, turned))

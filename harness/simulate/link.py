@@ -32,7 +32,7 @@ class TrackerConfig:
     """Origin of the tracker's frame in the world [m]; the default is under the ceiling."""
     overload: bool = False
     """The line may drop any share of the records, because a slow line is what the scenario studies. Without it nothing
-    is measured where less than `core.line_loss.LEAST_ARRIVED` of them arrive."""
+    is measured where less than `core.stream_health.LEAST_ARRIVED` of them arrive."""
 
     def __post_init__(self) -> None:
         check_fields(self)

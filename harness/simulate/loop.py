@@ -6,6 +6,7 @@ configuration to the first (Flash & Hogan 1985), with noise of its own.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -14,14 +15,15 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
-from harness.simulate.filter_report import filter_samples
 from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
+from harness.simulate.physical_readings import filter_samples
 from harness.simulate.physics.fusion import Fusion
+from harness.simulate.readings import SimulatedReadings
 from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.codec.samples import DeviceSamples, FilterSamples
 
 SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 """Shortest duration of the return [s], and the walking speed and turning rate that may lengthen it."""
@@ -52,31 +54,12 @@ def simulate_loop(
     slots_s = time_s[0]
     back = _return_motion(take, ends[0], ends[1], periods / tracker.rate_hz + float(slots_s[-1]))
     back_s = np.arange(1, periods)[:, None] / tracker.rate_hz + slots_s
-    parts = [
-        simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
-        simulate_readings(
-            Trajectory(body, back),
-            mounts,
-            tracker,
-            noise,
-            back_s,
-            seed=seed,
-            take=back.name,
-            begins_s=time_s[-1, 0],
-            session=session,
-        ),
-    ]
-    return DeviceSamples(
-        stations=parts[0].stations,
-        rate_hz=tracker.rate_hz,
-        take_frames=first,
-        taken_s=np.concatenate([part.time_s for part in parts]),
-        ready_s=tracker.latency_s,
-        device_s=np.concatenate([part.device_s for part in parts]),
-        position_m=np.concatenate([part.position_m for part in parts]),
-        tracker_from_station=np.concatenate([part.turn for part in parts]),
-        quality=np.concatenate([part.quality for part in parts]),
+    simulate = partial(simulate_readings, mounts=mounts, tracker=tracker, noise=noise, seed=seed, session=session)
+    parts = (
+        simulate(trajectory, time_s=time_s, take=take.name),
+        simulate(Trajectory(body, back), time_s=back_s, take=back.name, begins_s=time_s[-1, 0]),
     )
+    return _device_samples(parts, tracker, first)
 
 
 def _simulate_physical_loop(
@@ -94,27 +77,34 @@ def _simulate_physical_loop(
     taken_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     time_s = np.arange(frames)[:, None] / tracker.rate_hz + taken_s[0]
     readings = simulate_readings(
-        trajectory,
-        mounts,
-        tracker,
-        noise,
-        time_s,
+        *(trajectory, mounts, tracker, noise, time_s),
         seed=seed,
         take=take.name,
         ends_s=float(taken_s.max()),
         session=session,
     )
+    return _device_samples([readings], tracker, len(taken_s), filter_samples(readings, fusion))
+
+
+def _device_samples(
+    parts: Sequence[SimulatedReadings], tracker: TrackerConfig, take_frames: int, samples: FilterSamples | None = None
+) -> DeviceSamples:
+    """The readings of a loop, part after part."""
+    time_s, device_s, position_m, turn, quality = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("time_s", "device_s", "position_m", "turn", "quality")
+    )
     return DeviceSamples(
-        stations=readings.stations,
+        stations=parts[0].stations,
         rate_hz=tracker.rate_hz,
-        take_frames=len(taken_s),
-        taken_s=readings.time_s,
+        take_frames=take_frames,
+        taken_s=time_s,
         ready_s=tracker.latency_s,
-        device_s=readings.device_s,
-        position_m=readings.position_m,
-        tracker_from_station=readings.turn,
-        quality=readings.quality,
-        filter=filter_samples(readings, fusion),
+        device_s=device_s,
+        position_m=position_m,
+        tracker_from_station=turn,
+        quality=quality,
+        filter=samples,
     )
 
 

@@ -1,24 +1,15 @@
 """Error model of an IS-900: error components, and the noise presets of docs/is900.md 13.5."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 from harness.errors import BadInput, UnknownName
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.echo import Echo
-from harness.simulate.components.excursion import Excursion
-from harness.simulate.components.lost_station import LostStation
-from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.orientation_offset import OrientationOffset
-from harness.simulate.components.position_offset import PositionOffset
-from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.components.faults import LostStation, OrientationOffset, PositionOffset
+from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact
-from harness.simulate.components.speed_error import SpeedError
-from harness.simulate.components.strap_slip import StrapSlip
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import Clock, DriftNoise, SessionBias, SpeedError, WhiteNoise
+from harness.simulate.components.transient import Dropout, Echo, Excursion
 from harness.simulate.physics.settings import Physics
 from harness.simulate.readings import SimulatedReadings
 
@@ -113,14 +104,6 @@ def noise_preset(name: str) -> Noise:
         case "noise":
             return Noise(white=WhiteNoise(), drift=DriftNoise(), session=SessionBias(), clock=Clock())
         case "default":
-            return Noise(
-                white=WhiteNoise(),
-                drift=DriftNoise(),
-                session=SessionBias(),
-                excursion=Excursion(),
-                echo=Echo(),
-                dropout=Dropout(),
-                speed=SpeedError(),
-                clock=Clock(),
-            )
+            every_reading = noise_preset("noise")
+            return replace(every_reading, excursion=Excursion(), echo=Echo(), dropout=Dropout(), speed=SpeedError())
     raise UnknownName("noise preset", name, NOISE_PRESETS)

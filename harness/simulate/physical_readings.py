@@ -1,4 +1,7 @@
-"""Physical readings of the stations that a performer wears: the parts of a physical tracker put together."""
+"""Physical readings of the stations that a performer wears: the parts of a physical tracker put together.
+
+Prediction and enhancement of the device change them by the settings of each station (docs/is900.md 4.2).
+"""
 
 from collections.abc import Sequence
 
@@ -9,17 +12,18 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
-from harness.simulate.physics.body_motion import BodyMotionSource
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
-from harness.simulate.physics.filter_readings import FilterReadings
+from harness.simulate.physics.fusion import Fusion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
-from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room
+from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room, place_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.worn import Worn
-from harness.simulate.skin import skin_below
+from harness.simulate.physics.worn import BodyMotionSource, Worn
+from harness.simulate.readings import FilterReadings, SimulatedReadings
 from harness.simulate.trajectory import Trajectory
+from harness.stream.codec.samples import FilterSamples
 
 _LEAD_OUT_S = 0.5
 """Motion after the take: the last slot may end later than it [s]."""
@@ -71,9 +75,7 @@ def simulate_physical_readings(
         take=take,
         session=session,
     )
-    fusion = physics.fusion
-    with_motion = ends_s is not None or any((*fusion.prediction_ms.values(), *fusion.enhancement.values()))
-    return tracker.measure(time_s, with_motion=with_motion), constellation
+    return tracker.measure(time_s), constellation
 
 
 def place_constellation(
@@ -90,12 +92,9 @@ def place_constellation(
         centre_m = np.round(middle_of_path_m(path[:, :3]), 2)
     else:
         centre_m = np.array(settings.centre_m)
-    placed = PlacedRoom(physics.room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
-    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
-    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     constellation = load_constellation(settings)
     check_emitters(physics.room, float(calibration.tracker_origin_m[2]), constellation.number, constellation.position_m)
-    return constellation.shifted(rotations.rotate(tracker_from_world, offset_m)), placed
+    return place_room(physics.room, constellation, centre_m, calibration)
 
 
 def _check_path(
@@ -113,3 +112,36 @@ def _check_path(
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     places_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
     check_reach(constellation, places_m.reshape(-1, 3))
+
+
+def filter_samples(readings: SimulatedReadings, fusion: Fusion) -> FilterSamples:
+    """What prediction and enhancement need, with the faults of physical readings (docs/is900.md 4.2).
+
+    A fault moves the poses of every enhancement mode alike. A station that is lost does not move. ValueError for
+    readings of no physical tracker.
+    """
+    found = readings.filter
+    if found is None:
+        raise ValueError("statistical readings have no filter")
+    turned = rotations.multiply(readings.turn, rotations.inverse(found.tracker_from_station))
+    moves = ~readings.affected.get("lost", np.zeros(readings.time_s.shape, dtype=bool))[..., None]
+    return FilterSamples(
+        velocity_m_s=np.where(moves, found.velocity_m_s, 0.0),
+        turn_rad_s=np.where(moves, found.turn_rad_s, 0.0),
+        enhanced_position_m=found.enhanced_position_m + (readings.position_m - found.position_m),
+        enhanced_tracker_from_station=rotations.multiply(turned, found.enhanced_tracker_from_station),
+        ranges_received=found.ranges_received,
+        ranges_rejected=found.ranges_rejected,
+        emitters=readings.emitters,
+        prediction_ms=np.array([fusion.prediction_ms.get(station, 0) for station in readings.stations]),
+        enhancement=np.array([fusion.enhancement.get(station, 0) for station in readings.stations]),
+    )
+
+
+def apply_device_settings(readings: SimulatedReadings, fusion: Fusion) -> None:
+    """Change the readings to what the stations report with the scenario's prediction and enhancement."""
+    if any((*fusion.prediction_ms.values(), *fusion.enhancement.values())):
+        samples = filter_samples(readings, fusion)
+        readings.position_m, readings.turn = samples.report_poses(
+            readings.position_m, readings.turn, samples.prediction_ms, samples.enhancement
+        )

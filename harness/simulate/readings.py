@@ -2,17 +2,44 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Bools, Floats, Ints
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.simulate.physics.filter_readings import FilterReadings
 from harness.stream.codec.replies import Emitter
 
 GRAVITY_M_S2 = 9.81
+
+
+class FilterReadings(NamedTuple):
+    """What the device's filters report of S stations at E times, before clock and line, in the tracker's frame."""
+
+    position_m: Floats
+    """(E, S, 3) position of the station's origin [m]."""
+    tracker_from_station: Floats
+    """(E, S, 4) unit quaternions."""
+    quality: Floats
+    """(E, S) 0 lost to 1 best."""
+    ranges_received: Ints
+    """(E, S) ranges received in the last cycle, 0 to 12."""
+    ranges_rejected: Ints
+    """(E, S) ranges of these that the filter rejected."""
+    velocity_m_s: Floats
+    """(E, S, 3) estimated velocity, for prediction [m/s]."""
+    turn_rad_s: Floats
+    """(E, S, 3) estimated angular velocity, for prediction [rad/s]."""
+    enhanced_position_m: Floats
+    """(2, E, S, 3) positions of the enhancement modes 1 and 2 [m]."""
+    enhanced_tracker_from_station: Floats
+    """(2, E, S, 4) unit quaternions of these modes."""
+    hearing_share: Floats
+    """(S,) share of the take's slots in which the station has heard three emitters or more within a turn, directly."""
+    echo_share: Floats
+    """(S,) share of the take's ranges that came from an echo."""
 
 
 @dataclass(eq=False)

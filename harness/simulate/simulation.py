@@ -11,20 +11,17 @@ from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
-from harness.core.hearing import hearing_key
-from harness.core.motion import BodyMotion
-from harness.core.time_grid import count_steps
+from harness.core.motion import BodyMotion, count_steps
+from harness.core.stream_health import hearing_key
 from harness.errors import BadInput
-from harness.simulate.filter_report import apply_device_settings
+from harness.simulate.components.soft_tissue import skin_below, tissue_force_m_s2
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
-from harness.simulate.physical_readings import simulate_physical_readings
+from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
-from harness.simulate.skin import skin_below, tissue_force_m_s2
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import position_range_m
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 
@@ -154,6 +151,26 @@ def simulate_readings(
     """
     calibration = exact_calibration(trajectory.body, mounts, tracker)
     skin = skin_below(trajectory.body.skeleton, mounts, calibration)
+    if noise.physics is None:
+        measured = _measure_ideally(trajectory, calibration, time_s)
+    else:
+        found, constellation = simulate_physical_readings(
+            *(trajectory, mounts, calibration, noise, noise.physics, time_s),
+            seed=seed,
+            take=take,
+            session=session,
+            ends_s=ends_s,
+        )
+        unknown = np.broadcast_to(np.nan, (*time_s.shape, 3))  # only statistical components ask for these
+        measured = {
+            "velocity_m_s": unknown,
+            "force_m_s2": unknown,
+            "position_m": found.position_m,
+            "turn": found.tracker_from_station,
+            "quality": found.quality,
+            "filter": found,
+            "emitters": constellation.emitters,
+        }
     readings = SimulatedReadings(
         seed=seed,
         take=take,
@@ -164,39 +181,14 @@ def simulate_readings(
         tissue_m=skin.tissue_m,
         device_s=time_s + begins_s,
         session=session,
-        **_measure(trajectory, mounts, calibration, noise, time_s, seed, take, ends_s, session),
+        **measured,
     )
     noise.apply(readings)
     return readings
 
 
-def _measure(
-    trajectory: Trajectory,
-    mounts: Sequence[Mount],
-    calibration: Calibration,
-    noise: Noise,
-    time_s: Floats,
-    seed: int,
-    take: str,
-    ends_s: float | None,
-    session: str,
-) -> dict[str, Any]:
-    """The fields of readings that depend on the motion: those of an ideal tracker, or of a physical one."""
-    if noise.physics is not None:
-        found, constellation = simulate_physical_readings(
-            trajectory, mounts, calibration, noise, noise.physics, time_s,
-            seed=seed, take=take, session=session, ends_s=ends_s,
-        )  # fmt: skip
-        unknown = np.broadcast_to(np.nan, (*time_s.shape, 3))  # only statistical components ask for these
-        return {
-            "velocity_m_s": unknown,
-            "force_m_s2": unknown,
-            "position_m": found.position_m,
-            "turn": found.tracker_from_station,
-            "quality": found.quality,
-            "filter": found,
-            "emitters": constellation.emitters,
-        }
+def _measure_ideally(trajectory: Trajectory, calibration: Calibration, time_s: Floats) -> dict[str, Any]:
+    """The fields of readings that depend on the motion, as an ideal tracker measures them."""
     motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     return {

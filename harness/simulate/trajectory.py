@@ -1,14 +1,14 @@
 """A smooth trajectory with consistent pose, velocity and acceleration, and the motion of stations on it."""
 
 from copy import copy
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.arrays import Floats, freeze
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
@@ -28,10 +28,10 @@ from harness.simulate.resting_ends import (
 OVERLAP_S = 0.05
 """Time for which a take goes on into its next round [s]: longer than what a device does at once."""
 _RETURN_HZ, _LAST_REST_S = 120.0, 0.5
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
-@dataclass(frozen=True, eq=False)
-class StationMotion:
+class StationMotion(NamedTuple):
     """True motion of S stations, each at its own N times; world axes."""
 
     time_s: Floats
@@ -46,11 +46,6 @@ class StationMotion:
     """(N, S, 3) accelerations [m/s^2]."""
     turn_rad_s: Floats
     """(N, S, 3) angular velocities [rad/s]."""
-
-    def __post_init__(self) -> None:
-        freeze(self, time_s=("N", "S"), world_from_station=("N", "S", 4))
-        vector = (*self.time_s.shape, 3)
-        freeze(self, position_m=vector, velocity_m_s=vector, acceleration_m_s2=vector, turn_rad_s=vector)
 
 
 class Trajectory:
@@ -203,8 +198,7 @@ class Trajectory:
         return point.at_m, station, point.velocity, point.acceleration, omega
 
 
-@dataclass(frozen=True, eq=False)
-class _PointMotion:
+class _PointMotion(NamedTuple):
     """Position, velocity and acceleration of a point on a rigid bone, (N, 3) each."""
 
     at_m: Floats
@@ -252,6 +246,3 @@ def _cross(a: Floats, b: Floats) -> Floats:
     """Cross products (N, 3); `np.cross` is slow on short rows."""
     out: Floats = a[:, _NEXT] * b[:, _AFTER] - a[:, _AFTER] * b[:, _NEXT]
     return out
-
-
-_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])

@@ -17,6 +17,14 @@ INPUT_COMBINATIONS = {
     "mixed": "position of torso and both ankles, orientation of torso, head and both hands (or wrists)",
 }
 """Description of each input combination, by the name used in tables."""
+_REQUIRED = {
+    "pos+ori": ("all", "all"),
+    "pos+torso_ori": ("all", "torso"),
+    "pos": ("all", ""),
+    "ori": ("", "all"),
+    "mixed": ("torso left_ankle right_ankle", "torso head hands"),
+}
+"""Stations whose position and whose orientation each combination uses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,31 +57,16 @@ def make_inputs(name: str, stations: Sequence[str]) -> Inputs:
     """Build the named combination for these stations. Raises BadInput when it needs a station that is not worn, and
     UnknownName for an unknown combination.
     """
-    all_stations, no_station = np.ones(len(stations), bool), np.zeros(len(stations), bool)
-    if name == "pos+ori":
-        return Inputs(name, all_stations, all_stations)
-    if name == "pos":
-        return Inputs(name, all_stations, no_station)
-    if name == "ori":
-        return Inputs(name, no_station, all_stations)
-    if name == "pos+torso_ori":
-        return Inputs(name, all_stations, _station_mask(name, stations, "torso"))
-    if name == "mixed":
-        legs_and_torso = _station_mask(name, stations, "torso", "left_ankle", "right_ankle")
-        upper = _station_mask(name, stations, "torso", "head", *_hand_stations(stations))
-        return Inputs(name, legs_and_torso, upper)
-    raise UnknownName("input combination", name, INPUT_COMBINATIONS)
-
-
-def _hand_stations(stations: Sequence[str]) -> tuple[str, str]:
-    return ("left_wrist", "right_wrist") if "left_wrist" in stations else ("left_hand", "right_hand")
-
-
-def _station_mask(combination_name: str, stations: Sequence[str], *required: str) -> Bools:
-    missing = [w for w in required if w not in stations]
-    if missing:
-        raise BadInput(
-            f"inputs {combination_name!r} need a station called {' and one called '.join(missing)}.",
-            f"Stations worn: {', '.join(stations)}.",
-        )
-    return np.array([s in required for s in stations])
+    if name not in _REQUIRED:
+        raise UnknownName("input combination", name, INPUT_COMBINATIONS)
+    hands = ("left_wrist", "right_wrist") if "left_wrist" in stations else ("left_hand", "right_hand")
+    masks = []
+    for required in _REQUIRED[name]:
+        names = stations if required == "all" else required.replace("hands", " ".join(hands)).split()
+        if missing := [station for station in names if station not in stations]:
+            raise BadInput(
+                f"inputs {name!r} need a station called {' and one called '.join(missing)}.",
+                f"Stations worn: {', '.join(stations)}.",
+            )
+        masks.append(np.array([station in names for station in stations]))
+    return Inputs(name, *masks)

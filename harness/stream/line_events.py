@@ -2,6 +2,8 @@
 it.
 """
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -65,3 +67,25 @@ class NullLineObserver:
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
     def on_configured(self, wire: WireFormat) -> None: ...
     def on_event(self, event: LineEvent) -> None: ...
+
+
+_SHOWN_ONCE: tuple[LineEventKind, ...] = ("garbage", "out of range", "wrong list")
+"""Kinds that recur while frames go on. The others tell a change of the line's state and are always shown."""
+
+
+class EventCounter:
+    """Keeps all events, and sends the texts that are not repetitions to `show`. Call it with each event."""
+
+    def __init__(self, show: Callable[[str], None]) -> None:
+        self._show = show
+        self.events: list[LineEvent] = []
+
+    def __call__(self, event: LineEvent) -> None:
+        again = event.kind in _SHOWN_ONCE and any(event.kind == earlier.kind for earlier in self.events)
+        self.events.append(event)
+        if not again:
+            self._show(event.text)
+
+    def counts(self) -> dict[str, int]:
+        """Number of events by kind, in the order of their first one."""
+        return dict(Counter(event.kind for event in self.events))

@@ -1,14 +1,20 @@
-"""The contract suite for a method from outside the package, in a process that it may end, hang or crash."""
+"""The contract suite for a method from outside the package, in a process that it may end, hang or crash.
 
-from collections.abc import Iterator
+Rules and method run together in that process, because rules look at both.
+"""
+
+from collections.abc import Callable, Iterator
 from contextlib import closing
+from functools import cached_property
 
 from harness.errors import SystemFault
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.method_messages import MAX_TEXT
+from harness.experiment.method_messages import MAX_TEXT, Arrays, Header, Message
 from harness.experiment.method_process import MethodFailure, MethodProcess
+from harness.experiment.method_worker import MethodWorker, serve
 from harness.experiment.remote_method import RemoteMethod
-from harness.testing.method_checks import RuleResult
+from harness.testing.contract_case import ContractCase, make_case
+from harness.testing.method_checks import RuleResult, check_rule
 from harness.testing.rules import RULES
 
 _REFERENCE = "mean_pose"
@@ -23,7 +29,7 @@ def check_rules_apart(name: str, isolation: Isolation = DEFAULT_ISOLATION) -> It
     that one violates it as well. UnknownName and BadInput as for `registry.resolve`.
     """
     tested, reference = (
-        RemoteMethod(each, MethodProcess(each, isolation, "harness.testing.check_worker"))
+        RemoteMethod(each, MethodProcess(each, isolation, "harness.testing.check_process"))
         for each in (name, _REFERENCE)
     )
     with closing(tested.process), closing(reference.process):
@@ -43,3 +49,24 @@ def _check_rule(method: RemoteMethod, rule: str) -> RuleResult:
     except MethodFailure as error:
         lines = str(error).strip().splitlines() or ["no reason"]
         return RuleResult(rule, False, lines[-1])
+
+
+class CheckWorker(MethodWorker):
+    """Also answers the request `rule`."""
+
+    def operations(self) -> dict[str, Callable[[Header, Arrays], Message]]:
+        return {**super().operations(), "rule": self._check_rule}
+
+    @cached_property
+    def _case(self) -> ContractCase:
+        if self.method is None:
+            raise RuntimeError("the method was not described")
+        return make_case(self.method)
+
+    def _check_rule(self, header: Header, arrays: Arrays) -> Message:
+        return check_rule(self._case, header["rule"])._asdict(), {}
+
+
+def main(*descriptors: str) -> None:
+    """Serve a method to a check."""
+    serve(CheckWorker(), *descriptors)

@@ -1,7 +1,7 @@
 """The test case of the contract suite: a method, a swaying motion that is not among its examples, disturbed frames.
 
 Sessions that are compared are begun together from one reconstructor, unless their order is what is tested. So a fault
-violates one rule and no other.
+violates one rule and no other. The assertions that the rules share raise `RuleViolation`.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
+from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.reconstruct.contract import Method, Reconstructor, Session
@@ -168,3 +168,41 @@ def disturb_frames(frames: Frames, disturbance: str) -> tuple[list[TrackerFrame]
     disturbed, apply = DISTURBANCES[disturbance]
     window = slice(disturbed.stop + FRAMES_PER_SECOND, disturbed.stop + 3 * FRAMES_PER_SECOND // 2)
     return [apply(frame) if i in disturbed else frame for i, frame in enumerate(frames[: window.stop])], window
+
+
+class RuleViolation(Exception):
+    """A rule does not hold; the message describes the fault."""
+
+
+def require_poses(case: ContractCase, frames: Frames) -> str:
+    """Require valid poses of a new session; returns the number of frames as text."""
+    for index, estimate in enumerate(case.steps(frames)):
+        require_pose(case, index, estimate)
+    return f"{len(frames)} frames"
+
+
+def require_pose(case: ContractCase, index: int, estimate: Estimate) -> None:
+    """Require a finite configuration (55,) with a unit root quaternion near the stations, a status and an origin."""
+    qpos = np.asarray(estimate.qpos)
+    if qpos.shape != (55,) or not np.all(np.isfinite(qpos)):
+        count = np.count_nonzero(~np.isfinite(qpos))
+        raise RuleViolation(f"qpos in frame {index} has shape {qpos.shape} and {count} non-finite numbers")
+    if abs(float(np.linalg.norm(qpos[3:7])) - 1.0) > 1e-6:
+        raise RuleViolation(f"the root quaternion in frame {index} has length {np.linalg.norm(qpos[3:7]):.6f}")
+    if np.any(qpos[:3] < case.bounds[0]) or np.any(qpos[:3] > case.bounds[1]):
+        raise RuleViolation(f"the root in frame {index} is at {np.round(qpos[:3], 2)}, far from every station")
+    if not isinstance(estimate.status, Status):
+        raise RuleViolation(f"the status in frame {index} is {estimate.status!r}, not a Status")
+    if not isinstance(estimate.origin, Origin):
+        raise RuleViolation(f"the origin in frame {index} is {estimate.origin!r}, not an Origin")
+
+
+def require_identical(qpos: Floats, expected_qpos: Floats, verb: str = "differ") -> str:
+    """Require two sets of estimates (F, 55) to be identical to the bit; `verb` describes the fault."""
+    differing = np.flatnonzero(np.any(qpos != expected_qpos, axis=1))
+    if len(differing):
+        most = float(np.max(np.abs(qpos - expected_qpos)))
+        raise RuleViolation(
+            f"{len(differing)} estimates {verb}, the first in frame {differing[0]}, by up to {most:.3g}"
+        )
+    return f"{len(qpos)} estimates are identical to the bit"

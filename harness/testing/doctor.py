@@ -6,10 +6,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,17 +61,13 @@ ERROR_METRICS = tuple(
 _ZERO_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True)
-class InstallationCheck:
+class InstallationCheck(NamedTuple):
     """Result of one check."""
 
     name: str
     ok: bool
     detail: str
     """What was measured or is missing."""
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]:
@@ -81,35 +76,20 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
     A missing optional part is listed and is not a failure. A named library that cannot be read is a failure.
     """
     report_step("compilation")
-    compilation = _check_compilation()
+    checks = [("functions are compiled", *check_compilation()), ("machine code", True, describe_cache())]
     report_step("scores")
     clips = [synthetic.generate(b, "p1", 1, seed=1, duration_s=6.0) for b in synthetic.BEHAVIOURS]
-    takes = [retargeting.retarget_to_own_body(clip)[1] for clip in clips]
-    scores = check_scores(takes)
+    scores = check_scores([retargeting.retarget_to_own_body(clip)[1] for clip in clips])
     report_step("stream")
     stream = _check_stream(clips[0])
     report_step("results")
-    results = [InstallationCheck(*check) for check in check_results()]
+    further = list(check_results())
     report_step("device")
-    device = _check_device()
+    further += [(f"an emulated device over {kind.upper()}", *check_emulated_device(kind)) for kind in ("tcp", "udp")]
+    further.append(("serial ports", True, describe_serial_ports()))
     report_step("optional parts")
-    return [*compilation, *scores, stream, *results, *device, *_check_optional_parts(), _check_library(folder)]
-
-
-def _check_compilation() -> list[InstallationCheck]:
-    return [
-        InstallationCheck("functions are compiled", *check_compilation()),
-        InstallationCheck("machine code", True, describe_cache()),
-    ]
-
-
-def _check_device() -> list[InstallationCheck]:
-    """Read an emulated device on this computer, and list the ports at which a real one may be."""
-    return [
-        InstallationCheck("an emulated device over TCP", *check_emulated_device("tcp")),
-        InstallationCheck("an emulated device over UDP", *check_emulated_device("udp")),
-        InstallationCheck("serial ports", True, describe_serial_ports()),
-    ]
+    first, later = ([InstallationCheck(*check) for check in some] for some in (checks, further))
+    return [*first, *scores, stream, *later, *_check_optional_parts(), _check_library(folder)]
 
 
 def _check_stream(clip: Clip) -> InstallationCheck:

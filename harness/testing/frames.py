@@ -1,16 +1,19 @@
 """Frames without a device: exact readings of a known motion, for tests and contract suites."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from harness.body import mounts
 from harness.body.humanoid import Body, tpose
 from harness.body.kinematics import Kinematics
+from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.seeds import generator
+from harness.simulate import simulation
+from harness.simulate.link import TrackerConfig
 from harness.stream.frame import TrackerFrame
 
 SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -18,16 +21,9 @@ SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso
 
 def exact_calibration(body: Body, stations: Sequence[str] = SIX_STATIONS) -> Calibration:
     """Exact calibration of the default mounts of these stations, with a tracker frame that is not the world frame."""
-    mount_poses = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in stations]
-    return Calibration(
-        kind="exact",
-        stations=tuple(stations),
-        bones=tuple(mounts.DEFAULT_MOUNTS[station].bone for station in stations),
-        mount_m=np.array([mount_m for mount_m, _ in mount_poses]),
-        bone_from_station=np.array([bone_from_station for _, bone_from_station in mount_poses]),
-        world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])),
-        tracker_origin_m=np.array([1.0, -2.0, 2.5]),
-    )
+    room = TrackerConfig(origin_m=(1.0, -2.0, 2.5))
+    exact = simulation.exact_calibration(body, [DEFAULT_MOUNTS[station] for station in stations], room)
+    return replace(exact, world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])))
 
 
 def exact_frames(body: Body, calibration: Calibration, qpos: Floats, rate_hz: float = 40.0) -> list[TrackerFrame]:
@@ -58,8 +54,8 @@ def drop_stations(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
     """Remove the readings of stations, given by index, from a frame."""
     kept = np.ones(len(frame.quality), bool)
     kept[list(lost)] = False
-    return TrackerFrame(
-        received_s=frame.received_s,
+    return replace(
+        frame,
         measured_s=np.where(kept, frame.measured_s, np.nan),
         position_m=np.where(kept[:, None], frame.position_m, np.nan),
         tracker_from_station=np.where(kept[:, None], frame.tracker_from_station, np.nan),

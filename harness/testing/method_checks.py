@@ -1,15 +1,13 @@
 """The contract suite for methods: `check_method(MyMethod())` in your tests, or `harness check my_module:MyMethod`."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from typing import Any
+from typing import NamedTuple
 
 from harness.core.fault_report import find_system_fault
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
-from harness.testing.contract_case import ContractCase, make_case
+from harness.testing.contract_case import ContractCase, RuleViolation, make_case
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import RuleViolation
 
 
 class MethodContractError(HarnessError):
@@ -23,17 +21,13 @@ class MethodContractError(HarnessError):
         return f"{self.method} violates the rule '{self.rule}': {self.seen}."
 
 
-@dataclass(frozen=True)
-class RuleResult:
+class RuleResult(NamedTuple):
     """The result of one rule."""
 
     rule: str
     ok: bool
     seen: str
     """What was measured, or the fault."""
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def check_method(method: Method) -> None:

@@ -3,17 +3,21 @@
     def test_my_method(harness_gate):
         harness_gate("my_module:MyMethod", baseline="mine")
 
+On GitHub it annotates the code with what the gates found.
+
 pytest loads this file in every project of an environment that has the harness. Nothing else is imported until a test
 uses the fixture.
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+_LEVELS = {"worse": "error", "cannot tell": "warning"}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -109,9 +113,33 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):
         properties = {name: str(value) for name, value in report.user_properties if name.startswith("harness.")}
         if properties:
-            from harness.testing.github_annotations import format_annotations
-
             path, line, _ = report.location
             file = os.path.relpath(config.rootpath / path, os.environ.get("GITHUB_WORKSPACE") or config.rootpath)
             for text in format_annotations(properties, Path(file).as_posix(), (line or 0) + 1):
                 terminalreporter.write_line(text)
+
+
+def format_annotations(properties: Mapping[str, str], file: str, line: int) -> Iterator[str]:
+    """GitHub annotations of a gate: a line for each metric that is worse or undecided.
+
+    Without any, one line says why nothing was compared. `properties` are named as in `GateResult.properties`.
+    """
+    annotated = False
+    for name, verdict in properties.items():
+        metric = name.removeprefix("harness.").removesuffix(".verdict")
+        if name.endswith(".verdict") and verdict in _LEVELS:
+            difference, interval = (properties[f"harness.{metric}.{key}"] for key in ("difference", "interval"))
+            yield _annotation(
+                _LEVELS[verdict], file, line, f"{metric} {verdict}", f"{difference}, 95 % interval {interval}"
+            )
+            annotated = True
+    if not annotated and properties.get("harness.outcome", "pass") != "pass":
+        yield _annotation("error", file, line, properties["harness.outcome"], properties["harness.why"])
+
+
+def _annotation(level: str, file: str, line: int, title: str, message: str) -> str:
+    return f"::{level} file={_escape(file, ':,')},line={line},title={_escape(title, ':,')}::{_escape(message)}"
+
+
+def _escape(text: str, signs: str = "") -> str:
+    return "".join(f"%{ord(sign):02X}" if sign in f"%\r\n{signs}" else sign for sign in text)

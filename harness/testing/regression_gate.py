@@ -15,7 +15,7 @@ from harness.compare.margins import margin_of
 from harness.core.fields import build
 from harness.core.files import content_key
 from harness.core.progress import ProgressCallback
-from harness.core.python_process import THREAD_VARIABLES
+from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario

@@ -14,7 +14,7 @@ from harness.experiment.isolation import Isolation
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
 from harness.mocap.shared_motion import find_shared_motion
-from harness.results.loaded_run import load_run
+from harness.results.reader import load_run
 
 _METHODS = ("ik:previous", "harness.testing.results_checks:Exit")
 _METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3")

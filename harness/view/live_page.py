@@ -6,9 +6,10 @@ from importlib.resources import files
 
 from harness.core.skeleton import Skeleton
 from harness.report.kit.document import page_style
-from harness.report.kit.markup import Markup, tag
+from harness.report.kit.markup import tag
 from harness.report.kit.motion_player import describe_body, player_element, player_script
-from harness.view.server import COMMAND_HEADER, Resource
+from harness.view.page import viewer_page
+from harness.view.server import Resource
 
 
 class LiveContent:
@@ -18,7 +19,7 @@ class LiveContent:
         script = files(__package__).joinpath("live.js").read_text(encoding="utf-8")
         body = {**describe_body(skeleton), "stations": list(stations)}
         self._resources = {
-            "/": Resource("text/html; charset=utf-8", _page(title, token).encode()),
+            "/": Resource("text/html; charset=utf-8", _page(title, token)),
             "/viewer.css": Resource("text/css; charset=utf-8", page_style().encode()),
             "/live.js": Resource("text/javascript; charset=utf-8", f"{player_script()}\n{script}".encode()),
             "/body.json": Resource("application/json", json.dumps(body).encode()),
@@ -29,16 +30,7 @@ class LiveContent:
         return self._resources.get(path)
 
 
-def _page(title: str, token: str) -> str:
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", f"{title}: harness live"),
-        tag("link", rel="icon", href="data:,"),
-        tag("link", rel="stylesheet", href="/viewer.css"),
-        tag("style", Markup(_STYLE)),
-    )
+def _page(title: str, token: str) -> bytes:
     charts = [
         tag("figure", tag("figcaption", text), id_=name, class_="line-chart")
         for name, text in (
@@ -48,23 +40,21 @@ def _page(title: str, token: str) -> str:
             ("quality", "quality of each station"),
         )
     ]
-    body = tag(
-        "body",
-        tag(
-            "header", tag("p", "harness live", class_="kicker"), tag("h1", title), tag("p", id_="alarm", role="status")
-        ),
+    return viewer_page(
+        title,
+        "harness live",
+        _STYLE,
         player_element("The body and its stations in 3-D; drag to turn"),
         tag("p", tag("button", "Record", id_="record", type_="button"), tag("output", id_="said"), class_="controls"),
         tag("ul", id_="stations"),
         tag("div", *charts, id_="charts"),
-        tag("script", src="/live.js", data_token=token, data_header=COMMAND_HEADER, id_="viewer"),
+        script="/live.js",
+        token=token,
+        header=tag("p", id_="alarm", role="status"),
     )
-    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
 
 
 _STYLE = """
-body { max-width: 100rem; padding: 0.8rem clamp(0.6rem, 2vw, 1.6rem); }
-header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 0.2rem 1rem; }
 h1 { margin: 0; font-size: 1.2rem; }
 #alarm { min-height: 1.6em; margin: 0; color: #c2182b; font-weight: 600; }
 .motion-player .stage { height: max(19rem, calc(100vh - 21rem)); }

@@ -14,7 +14,7 @@ from harness.body.rendering import RenderScene
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.files import atomic_path
-from harness.core.plain_import import plain_import
+from harness.core.working_folder import plain_import
 from harness.view.movie import DRAWN_SUFFIX
 
 with plain_import():

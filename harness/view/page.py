@@ -83,7 +83,7 @@ class ViewerContent:
         }
         viewer = files(__package__).joinpath("viewer.js").read_text(encoding="utf-8")
         self._resources = {
-            "/": Resource("text/html; charset=utf-8", _page(motion, token).encode()),
+            "/": Resource("text/html; charset=utf-8", _page(motion, token)),
             "/viewer.css": Resource("text/css; charset=utf-8", page_style().encode()),
             "/viewer.js": Resource(_JAVASCRIPT, f"{player_script()}\n{viewer}".encode()),
             "/motion.json": Resource(_JSON, json.dumps(description).encode()),
@@ -113,29 +113,38 @@ class ViewerContent:
         return Resource(_JSON, json.dumps(packed).encode())
 
 
-def _page(motion: ViewedMotion, token: str) -> str:
+def viewer_page(
+    title: str, kicker: str, style: str, *parts: Markup | None, script: str, token: str, header: Markup | None = None
+) -> bytes:
+    """The page of a viewer: parts below a header, and a script that carries the token of its commands."""
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", f"{motion.title}: harness view"),
+        tag("title", f"{title}: {kicker}"),
         tag("link", rel="icon", href="data:,"),
         tag("link", rel="stylesheet", href="/viewer.css"),
-        tag("style", Markup(_WINDOW_STYLE)),
+        tag("style", Markup(_BODY_STYLE + style)),
     )
     body = tag(
         "body",
-        tag("header", tag("p", "harness view", class_="kicker"), tag("h1", motion.title)),
-        tag("p", motion.note) if motion.note else None,
-        player_element("Bodies and stations in 3-D; drag to turn"),
-        tag("script", src="/viewer.js", data_token=token, data_header=COMMAND_HEADER, id_="viewer"),
+        tag("header", tag("p", kicker, class_="kicker"), tag("h1", title), header),
+        *parts,
+        tag("script", src=script, data_token=token, data_header=COMMAND_HEADER, id_="viewer"),
     )
-    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
+    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n".encode()
 
 
-_WINDOW_STYLE = """
+def _page(motion: ViewedMotion, token: str) -> bytes:
+    note = tag("p", motion.note) if motion.note else None
+    player = player_element("Bodies and stations in 3-D; drag to turn")
+    return viewer_page(motion.title, "harness view", _STYLE, note, player, script="/viewer.js", token=token)
+
+
+_BODY_STYLE = """
 body { max-width: 100rem; padding: 0.8rem clamp(0.6rem, 2vw, 1.6rem); }
-header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 0.2rem 1rem; }
+header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 0.2rem 1rem; }"""
+_STYLE = """
 h1 { margin: 0 0 0.4rem; font-size: 1.2rem; }
 .motion-player .stage { height: max(19rem, calc(100vh - 17rem)); }
 """

@@ -38,8 +38,8 @@ def test_one_performer_without_errors() -> None:
 
 def test_the_same_again_and_others_for_another_seed() -> None:
     one, again, other = clean(3), measure_calibration_accuracy(1, miss_rad=0.0, noise="clean", seed=3), clean(4)
-    np.testing.assert_array_equal(one.done[0].length_m, again.done[0].length_m)
-    assert np.abs(one.done[0].mount_m - other.done[0].mount_m).max() > 1e-9
+    np.testing.assert_array_equal(one.done[0]["length_m"], again.done[0]["length_m"])
+    assert np.abs(one.done[0]["mount_m"] - other.done[0]["mount_m"]).max() > 1e-9
 
 
 def test_who_is_refused_is_named() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from harness.bench.cpu_time import overbooked
 from harness.bench.wire import LineRun, _last_clock_reset, _losses_and_latency, _pose_times, line_rows
-from harness.bench.wire_cases import CASES
+from harness.bench.wire_device import CASES
 from harness.errors import Outcome
 from harness.results.benchmark_statement import outcome_of
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.bench.cpu_time import overbooked
 from harness.bench.wire import start_device
-from harness.bench.wire_cases import SCENARIO
+from harness.bench.wire_device import SCENARIO
 from harness.core.child_process import PythonProcess
 from harness.errors import HarnessError
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit

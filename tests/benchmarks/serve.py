@@ -24,8 +24,8 @@ from harness.core.child_process import PythonProcess
 from harness.live.scheduling_jitter import JitterProbe
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.codec import commands
-from harness.stream.codec.blocks import RECEIVED
 from harness.stream.codec.items import STANDARD_LIST
+from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recording import read_recording
 
 STATIONS, RATE_HZ = 4, 75.0
@@ -118,7 +118,7 @@ def _read_client(link: Path, seconds: float) -> tuple[bytes, list[int], list[flo
         tty.setraw(port)
         os.write(port, commands.BINARY + commands.CENTIMETRES)
         for station in range(STATIONS):
-            os.write(port, commands.set_output_list(str(station + 1), STANDARD_LIST))
+            os.write(port, commands.station_command("O", str(station + 1), STANDARD_LIST))
         os.write(port, commands.ZERO_CLOCK + commands.STREAM)
         data, ends, received_s = bytearray(), [], []
         until_s = time.monotonic() + seconds

@@ -10,13 +10,13 @@ from harness.body import anatomy, humanoid, mounts
 from harness.body.mounts import DEFAULT_MOUNTS, Mount
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats
-from harness.core.skeleton import Skeleton
+from harness.core.skeleton import BodyGeom, Skeleton
 from harness.errors import BadInput, UnknownName
 
 STANDARD = humanoid24.standard_skeleton()
 
 
-def depth(shape: anatomy.BodyGeom, point_m: Floats) -> float:
+def depth(shape: BodyGeom, point_m: Floats) -> float:
     """Negative inside a geom, 0 on its surface; in metres for a capsule, relative for an ellipsoid."""
     local = rotations.rotate(rotations.inverse(shape.bone_from_shape), point_m - shape.centre_m)
     if shape.kind == "capsule":

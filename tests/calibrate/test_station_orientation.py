@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.calibrate.station_orientation import rotation_text
+from harness.calibrate.pose_checks import rotation_text
 from harness.core.arrays import Floats
 
 

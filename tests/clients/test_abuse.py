@@ -203,33 +203,6 @@ def test_joined_and_split_commands_with_every_line_end(port: str, end: bytes, sp
     terminal.close()
 
 
-@pytest.mark.parametrize("name", ["A", "a"])
-def test_stations_in_either_case(tmp_path: Path, name: str) -> None:
-    with run_device(tmp_path, stations=10) as device:
-        terminal = Terminal(device.port)
-        terminal.send(f"O{name},40,2,1\r\nO{name}\r\nl{name},0\r\nl*\r\nl{name}\r\nMs{name}\r\nMp{name}\r\n".encode())
-        received = terminal.read_until(rb"3Ap.*\r\n")
-        states = b"21l" + b"1" * 9 + b"0" * 23 + b"\r\n2Al0111\r\n"
-        assert re.fullmatch(rb"2AO40 2 1\r\n" + states + rb"3As...\r\n3Ap..\r\n", received), received
-        terminal.close()
-
-
-def test_unknown_commands_get_an_error_record_and_change_nothing(port: str) -> None:
-    terminal = Terminal(port)
-    terminal.send(b"\rc")
-    terminal.read_rest()
-    for bad_command in (b"O1,2,99,1", b"O", b"Oz,2,4,1", b"Mp1,51", b"e1,0", b"T", b"hello", b"A1,0,0,0", b"x" * 300):
-        terminal.send(b"O1,2,4,1\r" + bad_command + b"\rO1\r")
-        received = terminal.read_until(rb"21O[ \d]*\r\n")
-        _, replies = split_records_and_replies(received, {})
-        assert [reply[:3] for reply in replies] == [b"2 E", b"21O"], received
-        assert replies[1] == b"21O 2 4 1\r\n"
-    for ignored_command in (b"x0.2,0.2,0.8,0.8", b"v0.2,0.2,0.8,0.8"):
-        terminal.send(ignored_command + b"\rO1\r")
-        assert terminal.read_until(rb"21O[ \d]*\r\n") == b"21O 2 4 1\r\n"
-    terminal.close()
-
-
 def query_while_streaming(port: str, binary: bool, seconds: float) -> None:
     """Send all queries, joined, split and at random times; only whole records and whole replies arrive."""
     draw = random.Random(2)  # noqa: S311  # random times, nothing secret
@@ -272,18 +245,3 @@ def test_queries_never_split_a_record(port: str, binary: bool) -> None:
 @pytest.mark.parametrize("binary", [True, False])
 def test_queries_never_split_a_record_for_a_minute(port: str, binary: bool) -> None:
     query_while_streaming(port, binary, 60.0)
-
-
-def test_p_sends_one_record_per_active_station(port: str) -> None:
-    """The records are in ascending sequence of stations, each time."""
-    terminal = Terminal(port)
-    terminal.send(b"\rcFUO1,2,4,1\rO2,2,4,1\rO3,2,4,1\rO4,2,4,1\rl3,0\r")
-    terminal.read_rest()
-    terminal.send(b"PPP")
-    received = terminal.read_until(re.compile(rb"(04 .{42}\r\n.*){3}", re.DOTALL)) + terminal.read_rest()
-    records, replies = split_records_and_replies(received, {b"1": 47, b"2": 47, b"4": 47})
-    assert [record[1:2] for record in records] == [b"1", b"2", b"4"] * 3
-    assert not replies
-    terminal.send(b"l3,1\r")
-    terminal.read_rest()
-    terminal.close()

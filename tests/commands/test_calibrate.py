@@ -1,11 +1,7 @@
 """`harness calibrate`, and what it found put to use, as a user meets them."""
 
 import csv
-import json
 import shlex
-import signal
-import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -33,7 +29,8 @@ from harness.reconstruct.methods.ik import PREVIOUS
 from harness.stream.emulator.server import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.replay import RecordingStream
-from tests.interrupts import heeding_interrupts
+from tests.command import Command
+from tests.interrupts import interrupt, start_harness
 
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
@@ -61,14 +58,11 @@ def calibrated(recording: Path) -> Path:
     return path
 
 
-def test_eight_poses_of_a_recording(
-    recording: Path, tmp_path: Path, model: Playback, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_eight_poses_of_a_recording(recording: Path, tmp_path: Path, model: Playback, command: Command) -> None:
     """The bounds are those of docs/calibration.md for a miss of 5 deg; this performer's are off by 2.5."""
     path = tmp_path / "me.toml"
-    assert main(["calibrate", str(recording), "--scenario", "demo", "--out", str(path), "--json"]) == 0
-    said = capsys.readouterr()
-    content = json.loads(said.out)
+    said = command("calibrate", recording, "--scenario", "demo", "--out", path, "--json")
+    content = said.content
     assert content["outcome"] == "pass"
     assert list(content["stations"]) == list(STATIONS)
     assert set(content["bones"]) == set(BONES)
@@ -96,72 +90,25 @@ def test_the_report_has_a_row_for_each_bone_and_station(calibrated: Path) -> Non
     assert lines[-2:] == [f"{calibrated}: written", "pass"]
 
 
-def test_a_file_is_not_written_over_unasked(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_is_not_written_over_unasked(recording: Path, tmp_path: Path, command: Command) -> None:
     path = tmp_path / "me.toml"
     path.write_text("mine")
-    assert main(["calibrate", str(recording), "--out", str(path), "--kind", "tpose"]) == 2
-    assert "--force" in capsys.readouterr().err
+    assert "--force" in command("calibrate", recording, "--out", path, "--kind", "tpose", code=2).err
     assert path.read_text() == "mine"
-    assert main(["calibrate", str(recording), "--out", str(path), "--kind", "tpose", "--force"]) == 0
+    command("calibrate", recording, "--out", path, "--kind", "tpose", "--force")
     kept = read_calibration(path)
     assert (kept.calibration.kind, kept.performer) == ("tpose", CLIP.split("_")[1])
     assert kept.skeleton is not None
 
 
-def test_poses_that_are_missing_are_told_and_nothing_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_poses_that_are_missing_are_told_and_nothing_is_written(tmp_path: Path, command: Command) -> None:
     recording = tmp_path / "short.rec"
     words = ["record", "sim:demo", str(recording), "--clip", CLIP, "--stations", "4", "--poses", "--seconds", "12"]
-    assert main(words) == 0
-    assert main(["calibrate", str(recording), "--out", str(tmp_path / "me.toml")]) == 2
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("harness:")]
+    command(*words)
+    line = command("calibrate", recording, "--out", tmp_path / "me.toml", code=2).line("harness:")
     assert "3 of 8 poses were held" in line
     assert repr(POSES[3].name) in line
     assert list(tmp_path.iterdir()) == [recording]
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ([], "No source of poses"),
-        (["--port", "x", "--simulate", "3"], "2 sources: port, simulate"),
-        (["a.rec", "--port", "x"], "2 sources: recording, port"),
-        (["a.rec"], "--out is missing"),
-        (["a.rec", "--out", "me.toml", "--rate", "40"], "--rate with recording. It applies to port"),
-        (["--simulate", "3", "--out", "me.toml"], "--out with simulate. It applies to recording or port"),
-        (["--simulate", "3", "--kind", "tpose"], "--kind with simulate. It applies to recording or port"),
-        (["--simulate", "3", "--miss", "90"], "--miss 90"),
-        (["--simulate", "3", "--noise", "loud"], "loud"),
-        (["--simulate", "0"], "not a positive whole number"),
-        (["--out", "me.toml", "--scenario", "demo"], "No source of poses"),
-        (["--out", "me.toml", "--port", "x"], "--port without --scenario"),
-        (["--out", "me.toml", "--port", "x", "--pictures", "there"], "--pictures without --view frames"),
-        (["--out", "me.toml", "--port", "no_such_port", "--scenario", "demo"], "no such port"),
-        (["no_such.rec", "--out", "me.toml", "--scenario", "demo"], "no_such.rec"),
-        (["a.rec", "--out", "no/such/me.toml"], "folder does not exist"),
-        (["a.rec", "--kind", "npose"], "invalid choice"),
-    ],
-)
-def test_refusals(
-    words: list[str],
-    says: str,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    try:
-        code = main(["calibrate", *words])
-    except SystemExit as ended:  # argparse's way
-        code = int(str(ended.code))
-    said = capsys.readouterr()
-    assert code == 2
-    assert said.out.splitlines()[-1] == "refused"
-    assert says in said.err.splitlines()[-1]
-    assert not list(tmp_path.iterdir())
 
 
 def test_stations_without_names_are_told_by_the_user(recording: Path, tmp_path: Path) -> None:
@@ -185,40 +132,32 @@ def test_a_tpose_of_a_tracker_that_streams(model: Playback, tmp_path: Path) -> N
 
 
 @pytest.mark.long
-def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_next_command_wears_the_calibrated_stations(tmp_path: Path, command: Command) -> None:
     """`--stations 6` was left out, so that the printed command wore four of the six."""
     model, out = prepare_playback("demo", clip=CLIP, stations=6, posing=True), tmp_path / "my calibration.toml"
     with serve_emulator(model.samples, pty=tmp_path / "a port") as device:
         words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose", "--stations", "6"]
-        assert main(["calibrate", *words, "--out", str(out)]) == 0
-        (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("next: ")]
-        program, *following = shlex.split(line.removeprefix("next: "))
+        program, *following = shlex.split(command("calibrate", *words, "--out", out).line("next: "))
         assert program == "harness"
-        assert main([*following, "--method", "ik", "--seconds", "1", "--json"]) == 0
-        said = capsys.readouterr()
-        content = json.loads(said.out)
+        content = command(*following, "--method", "ik", "--seconds", "1", "--json").content
         assert content["stations"] == list(model.calibration.stations)
         words = shlex.split(content["next"])[1:]
         assert words == ["record", device.name, "take.rec", "--stations", ",".join(content["stations"])]
         forgotten = [word for word in following if word not in ("--stations", "6")]
-        assert main([*forgotten, "--method", "ik", "--seconds", "1"]) == 2
-        assert f"worn are {', '.join(model.calibration.stations[:4])}." in capsys.readouterr().err
+        said = command(*forgotten, "--method", "ik", "--seconds", "1", code=2).err
+        assert f"worn are {', '.join(model.calibration.stations[:4])}." in said
 
 
 def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
-        words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
-        command = [sys.executable, "-m", "harness.cli", "calibrate", *words]
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
-        ) as program:
+        words = ("--port", device.name, "--scenario", "demo", "--out", tmp_path / "me.toml")
+        with start_harness("calibrate", *words) as program:
             assert program.stderr is not None
             while "pose 1 of 8" not in program.stderr.readline():
                 assert program.poll() is None
-            program.send_signal(signal.SIGINT)
-            said, talk = program.communicate(timeout=120.0)
+            code, said, talk = interrupt(program)
         assert not device.emulator.device.streaming
-    assert program.returncode == 130
+    assert code == 130
     assert said.splitlines()[-1] == "interrupted"
     assert "Traceback" not in talk
     assert not list(tmp_path.iterdir())
@@ -304,15 +243,13 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
         np.testing.assert_array_equal(qpos, session.step(frame).qpos)
 
 
-def test_a_recording_is_judged_by_a_file(calibrated: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_recording_is_judged_by_a_file(calibrated: Path, tmp_path: Path, command: Command) -> None:
     """Calibrating costs something, and less than a body does that is nobody's."""
     take = tmp_path / "take.rec"
-    assert main(["record", "sim:demo", str(take), "--clip", CLIP, "--stations", "4", "--seconds", "4"]) == 0
-    capsys.readouterr()
+    command("record", "sim:demo", take, "--clip", CLIP, "--stations", "4", "--seconds", "4")
     errors_mm = {}
     for name, words in {"exact": [], "poses": ["--calibration", str(calibrated)]}.items():
-        assert main(["replay", str(take), "--methods", "ik:previous", "--json", *words]) == 0
-        (judged,) = json.loads(capsys.readouterr().out)["methods"]
+        (judged,) = command("replay", take, "--methods", "ik:previous", "--json", *words).content["methods"]
         errors_mm[name] = judged["metrics"]["mpjpe_mm"]
     assert errors_mm["poses"] != errors_mm["exact"]
     assert errors_mm["poses"] < errors_mm["exact"] + 40.0
@@ -320,28 +257,18 @@ def test_a_recording_is_judged_by_a_file(calibrated: Path, tmp_path: Path, capsy
 
 @pytest.mark.parametrize("verb", ["live", "replay"])
 def test_a_station_that_was_not_calibrated_is_named(
-    verb: str, calibrated: Path, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    verb: str, calibrated: Path, recording: Path, tmp_path: Path, command: Command
 ) -> None:
     three = tmp_path / "three.toml"
     kept = read_calibration(calibrated)
     write_calibration(three, CalibrationFile(kept.select(STATIONS[:3]).calibration, kept.skeleton))
     words = {"live": ["--port", "no_such_port", "--scenario", "demo"], "replay": [str(recording)]}[verb]
-    assert main([verb, *words, "--calibration", str(three)]) == 2
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("harness:")]
+    line = command(verb, *words, "--calibration", three, code=2).line("harness:")
     assert "Station 'right_ankle' is not in the calibration, which has left_hand, right_hand, left_ankle" in line
 
 
-def test_a_calibration_that_is_no_file_nor_kind(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["live", "--port", "no_such_port", "--scenario", "demo"]
-    assert main([*words, "--calibration", "tposes"]) == 2
-    assert "Did you mean 'tpose'" in capsys.readouterr().err
-    assert main([*words, "--calibration", "no_such.toml"]) == 2
-    assert "no_such.toml: no such file" in capsys.readouterr().err
-
-
-def test_simulated_performers(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["calibrate", "--simulate", "1", "--miss", "1", "--noise", "clean", "--json"]) == 0
-    content = json.loads(capsys.readouterr().out)
+def test_simulated_performers(command: Command) -> None:
+    content = command("calibrate", "--simulate", "1", "--miss", "1", "--noise", "clean", "--json").content
     assert (content["performers"], content["noise"], content["miss_deg"]) == (1, "clean", pytest.approx(1.0))
     assert content["errors"]["bone lengths"]["rms"] < content["errors"]["bone lengths"]["mean_skeleton"]
 

@@ -1,6 +1,5 @@
 """What `harness list` says."""
 
-import json
 from importlib.metadata import EntryPoint
 
 import numpy as np
@@ -8,10 +7,10 @@ import pytest
 
 from harness.body.humanoid import build_body
 from harness.body.places import NAMED_PLACES
-from harness.cli import main
 from harness.commands.catalogue import build_catalogue
 from harness.reconstruct import registry
 from harness.reconstruct.methods.mean_pose import MeanPose
+from tests.command import Command
 
 
 class Theirs(MeanPose):
@@ -60,22 +59,17 @@ def test_a_scenario_says_what_it_varies() -> None:
     assert "noise default" in build_catalogue()["scenarios"]["demo"]
 
 
-def test_scenarios_that_only_choose_constants_come_with_all(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list", "scenarios", "--json"]) == 0
-    users = json.loads(capsys.readouterr().out)["scenarios"]
-    assert main(["list", "scenarios", "--all", "--json"]) == 0
-    every = json.loads(capsys.readouterr().out)["scenarios"]
+def test_scenarios_that_only_choose_constants_come_with_all(command: Command) -> None:
+    users = command("list", "scenarios", "--json").content["scenarios"]
+    every = command("list", "scenarios", "--all", "--json").content["scenarios"]
     hidden = every.keys() - users.keys()
     assert {"demo", "boxing", "lab"} <= users.keys() < every.keys()
     assert {name.partition("_")[0] for name in hidden} == {"tune", "validate"}
 
 
-def test_one_kind_is_listed_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list", "places"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_one_kind_is_listed_alone(command: Command) -> None:
+    lines = command("list", "places").lines
     assert lines[0] == "places:"
     assert lines[1:-1] == [f"  {place.name:<15}  {place.text}; bone {place.bone}" for place in NAMED_PLACES.values()]
-    assert main(["list", "motion", "--json"]) == 0
-    assert next(iter(json.loads(capsys.readouterr().out))) == "motion of the built-in performer"
-    assert main(["list", "place"]) == 2
-    assert "Did you mean 'places'?" in capsys.readouterr().err
+    assert next(iter(command("list", "motion", "--json").content)) == "motion of the built-in performer"
+    assert "Did you mean 'places'?" in command("list", "place", code=2).err

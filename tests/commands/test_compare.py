@@ -1,12 +1,11 @@
 """`harness compare` and `harness baseline` as a user meets them: every exit code, JSON, the page, advice."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from harness.cli import main
 from harness.results.reader import ResultSet
+from tests.command import Command
 from tests.compare.sides import manifest, side, write_run
 from tests.compare.test_comparison import ANGLE, STEADY, TORN
 
@@ -65,11 +64,8 @@ def here(runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("main two --methods ik", 0, "pass", "no worse"),
     ],
 )
-def test_exit_codes_and_words(
-    words: str, code: int, word: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["compare", "--metrics", ANGLE, *words.split()]) == code
-    lines = capsys.readouterr().out.splitlines()
+def test_exit_codes_and_words(words: str, code: int, word: str, said: str, here: Path, command: Command) -> None:
+    lines = command("compare", "--metrics", ANGLE, *words.split(), code=code).lines
     assert lines[-1] == word
     assert said in "\n".join(lines)
 
@@ -86,52 +82,45 @@ def test_exit_codes_and_words(
         ("main faster --allow traker", "Did you mean 'tracker'"),
     ],
 )
-def test_what_is_refused_says_why(words: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", *words.split()]) == 2
-    ended = capsys.readouterr()
+def test_what_is_refused_says_why(words: str, said: str, here: Path, command: Command) -> None:
+    ended = command("compare", *words.split(), code=2)
     assert ended.out.splitlines() == ["refused"]
     assert said in ended.err
     assert len(ended.err.splitlines()) == 1
 
 
-def test_an_interrupt_says_so(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_says_so(here: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("harness.compare.comparison.compare_results", interrupted)
-    assert main(["compare", "main", "again"]) == 130
-    assert capsys.readouterr().out.splitlines() == ["interrupted"]
+    assert command("compare", "main", "again", code=130).lines == ["interrupted"]
 
 
-def test_a_baseline_is_saved_and_compared_by_its_name(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["baseline", "save", "yesterday", "main"]) == 0
-    assert capsys.readouterr().out.splitlines() == ["baseline: results/baselines/yesterday", "pass"]
-    assert main(["compare", "yesterday", "again", "--metrics", ANGLE]) == 0
-    assert main(["compare", "yesterday", "worse", "--metrics", ANGLE]) == 1
-    capsys.readouterr()
-    assert main(["baseline", "save", "yesterday", "worse"]) == 2
-    assert "--force" in capsys.readouterr().err
-    assert main(["baseline", "save", "yesterday", "worse", "--force", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {
+def test_a_baseline_is_saved_and_compared_by_its_name(here: Path, command: Command) -> None:
+    assert command("baseline", "save", "yesterday", "main").lines == ["baseline: results/baselines/yesterday", "pass"]
+    command("compare", "yesterday", "again", "--metrics", ANGLE)
+    command("compare", "yesterday", "worse", "--metrics", ANGLE, code=1)
+    assert "--force" in command("baseline", "save", "yesterday", "worse", code=2).err
+    assert command("baseline", "save", "yesterday", "worse", "--force", "--json").content == {
         "baseline": "results/baselines/yesterday",
         "next": "harness compare yesterday worse",
         "outcome": "pass",
     }
-    assert main(["compare", "yesterday", "worse", "--metrics", ANGLE]) == 0
-    assert main(["baseline", "save", "../yesterday", "main"]) == 2
-    assert main(["baseline", "save", "holes", "holes"]) == 2
+    command("compare", "yesterday", "worse", "--metrics", ANGLE)
+    command("baseline", "save", "../yesterday", "main", code=2)
+    command("baseline", "save", "holes", "holes", code=2)
     assert [path.name for path in (here / "results" / "baselines").iterdir()] == ["yesterday"]
 
 
-def test_json_has_every_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "main", "worse", "--metrics", ANGLE, "--json"]) == 1
-    said = json.loads(capsys.readouterr().out)
+def test_json_has_every_line(here: Path, command: Command) -> None:
+    said = command("compare", "main", "worse", "--metrics", ANGLE, "--json", code=1).content
     assert said["outcome"] == "regressed"
     (line,) = [line for line in said["differences"] if line["gated"]]
     assert (line["verdict"], line["metric"], len(line["clips"])) == ("worse", ANGLE, 8)
 
 
-def test_a_page_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "main", "worse", "--metrics", ANGLE, "--html", "pages/worse.html"]) == 1
-    assert "page: pages/worse.html" in capsys.readouterr().out
+def test_a_page_is_written(here: Path, command: Command) -> None:
+    said = command("compare", "main", "worse", "--metrics", ANGLE, "--html", "pages/worse.html", code=1)
+    assert "page: pages/worse.html" in said.out
     assert "B is worse than A" in (here / "pages" / "worse.html").read_text()

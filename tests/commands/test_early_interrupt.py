@@ -1,6 +1,5 @@
 """Verbs that run until Ctrl-C: an interrupt before they did anything is `interrupted`, and nothing half done stays."""
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -9,13 +8,13 @@ from typing import Any, NoReturn
 
 import pytest
 
-from harness.cli import main
-from harness.commands.common import progress_note, recording_note
+from harness.commands.output import progress_note, recording_note
 from harness.experiment import playback
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording import command_recording, line_server, recorder, recording
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
+from tests.command import Command
 from tests.stream.wire import FOUR, device_bytes, in_chunks, stamps_s
 
 
@@ -23,23 +22,16 @@ def interrupt(*_: object, **__: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def last_words(capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
-    said = capsys.readouterr()
-    return said.out.splitlines()[-1], said.err
-
-
 def test_a_simulated_recording_that_is_stopped_before_it_writes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.setattr(playback, "prepare_playback", interrupt)
     path = tmp_path / "a.rec"
-    assert main(["record", "sim:demo", str(path)]) == 130
-    word, talk = last_words(capsys)
-    assert word == "interrupted"
-    assert f"Nothing was recorded into {path}" in talk
+    said = command("record", "sim:demo", path, code=130)
+    assert said.lines[-1] == "interrupted"
+    assert f"Nothing was recorded into {path}" in said.err
     assert not path.exists()
-    assert main(["record", "sim:demo", str(path), "--json"]) == 130
-    assert json.loads(capsys.readouterr().out)["outcome"] == "interrupted"
+    assert command("record", "sim:demo", path, "--json", code=130).content["outcome"] == "interrupted"
 
 
 @pytest.mark.parametrize("existing", [False, True])
@@ -83,14 +75,11 @@ def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_
 )
 def test_a_recording_of_a_device_that_is_stopped_before_the_device_was_set_up(
     module: Any, name: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    command: Command) -> None:  # fmt: skip
     monkeypatch.setattr(module, name, interrupt)
     path = tmp_path / "a.rec"
     words = [str(tmp_path / "link") if word == "LINK" else word for word in options]
-    assert main(["record", "tcp://127.0.0.1:9", str(path), *words]) == 130
-    word, _ = last_words(capsys)
-    assert word == "interrupted"
+    assert command("record", "tcp://127.0.0.1:9", path, *words, code=130).lines[-1] == "interrupted"
     assert not path.exists()
 
 
@@ -111,28 +100,27 @@ class _Device:
 
 @pytest.mark.parametrize(("records", "code"), [(0, 130), (1, 0)])
 def test_a_recording_is_good_from_its_first_record_on(
-    records: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    records: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     @contextmanager
     def opened(port: str, config: object, *, observer: RecordingWriter, on_event: object) -> Iterator[_Device]:
         yield _Device(observer, records)
 
     monkeypatch.setattr(recorder, "open_tracker", opened)
-    assert main(["record", "tcp://127.0.0.1:9", str(tmp_path / "a.rec")]) == code
-    assert last_words(capsys)[0] == ("pass" if records else "interrupted")
+    said = command("record", "tcp://127.0.0.1:9", tmp_path / "a.rec", code=code)
+    assert said.lines[-1] == ("pass" if records else "interrupted")
 
 
 @pytest.mark.parametrize(
     "words", [["emulate", "demo", "--tcp", "127.0.0.1:0"], ["live", "--port", "x", "--scenario", "demo"]]
 )
 def test_emulate_and_live_that_are_stopped_while_they_prepare(
-    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: list[str], monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.setattr(playback, "prepare_playback", interrupt)
-    assert main(words) == 130
-    word, talk = last_words(capsys)
-    assert word == "interrupted"
-    assert "resumes" not in talk
+    said = command(*words, code=130)
+    assert said.lines[-1] == "interrupted"
+    assert "resumes" not in said.err
 
 
 @pytest.mark.parametrize("recorded", [False, True])

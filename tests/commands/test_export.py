@@ -1,6 +1,5 @@
 """`harness export` as a user meets it: every format, filters, and refusals with the names that are known."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from harness.commands import export
 from harness.core.humanoid24 import standard_skeleton
 from harness.mocap.write.export import FORMATS
 from harness.results.storage import read_cells
+from tests.command import Command
 from tests.mocap.write.glb_file import read_glb
 from tests.short_demo import short_demo
 
@@ -30,12 +30,9 @@ def test_help_names_every_format() -> None:
 
 
 @pytest.mark.parametrize("fmt", FORMATS)
-def test_every_format_is_written_for_the_chosen_cells(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], fmt: str
-) -> None:
+def test_every_format_is_written_for_the_chosen_cells(run: Path, tmp_path: Path, command: Command, fmt: str) -> None:
     words = ["--clip", "walking_*,golf_p1_01", "--clip", "boxing_p?_01", "--method", "ik", "--json"]
-    assert main(["export", str(run), "--format", fmt, "--out", str(tmp_path / "out"), *words]) == 0
-    files = json.loads(capsys.readouterr().out)["files"]
+    files = command("export", run, "--format", fmt, "--out", tmp_path / "out", *words).content["files"]
     assert len(files) == {"glb": 3, "tum": 36}.get(fmt, 6)
     assert sorted(files) == sorted(str(file) for file in (tmp_path / "out").iterdir())
     assert all(Path(file).suffix == f".{fmt}" for file in files)
@@ -53,10 +50,9 @@ def test_every_format_is_written_for_the_chosen_cells(
     ],
 )
 def test_what_matches_nothing_is_refused(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+    run: Path, tmp_path: Path, command: Command, words: list[str], said: str
 ) -> None:
-    assert main(["export", str(run), "--format", "csv", "--out", str(tmp_path / "out"), *words]) == 2
-    assert said in capsys.readouterr().err
+    assert said in command("export", run, "--format", "csv", "--out", tmp_path / "out", *words, code=2).err
     assert not (tmp_path / "out").exists()
 
 

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main
 from harness.report.sweep import page
 from harness.results.index import CellIndex
 from harness.results.integrity import compute_digests
+from tests.command import Command
 from tests.planted import Plan, planted_run
 
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_a_damaged_cell_of_a_sweep_is_refused(
-    damaged: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    damaged: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     out = planted_run(tmp_path / "sweep", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0}))
     with CellIndex(out) as index:
@@ -23,5 +23,4 @@ def test_a_damaged_cell_of_a_sweep_is_refused(
     if damaged:
         (frames,) = out.glob("cells/*/frames.npz")
         frames.write_bytes(frames.read_bytes()[:-1])
-    assert main(["report", str(out)]) == (2 if damaged else 0)
-    assert ("frames.npz: damaged or edited" in capsys.readouterr().err) is damaged
+    assert ("frames.npz: damaged or edited" in command("report", out, code=2 if damaged else 0).err) is damaged

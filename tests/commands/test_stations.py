@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.cli import main
-from harness.commands.common import parse_station_map
+from harness.commands.flags import parse_station_map
 from harness.errors import HarnessError
 from harness.stream.emulator import serve_emulator
 from harness.stream.recording.replay import RecordingStream
+from tests.command import Command
 from tests.stream.driver.bench import make_samples
 
 LIVE = ["live", "--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik", "--port", "tcp://127.0.0.1:1"]
@@ -39,7 +39,7 @@ def test_names_come_in_the_order_of_the_device() -> None:
 )
 @pytest.mark.parametrize("verb", ["record", "live", "calibrate"])
 def test_wrong_maps_are_refused_before_a_port_is_opened(
-    verb: str, text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    verb: str, text: str, words: str, tmp_path: Path, command: Command
 ) -> None:
     with pytest.raises(HarnessError):
         parse_station_map(text)
@@ -49,31 +49,19 @@ def test_wrong_maps_are_refused_before_a_port_is_opened(
         "calibrate": ["calibrate", "--port", "tcp://127.0.0.1:1", "--scenario", "demo", "--out"],
     }
     commands["calibrate"].append(str(tmp_path / "me.toml"))
-    assert main([*commands[verb], "--stations", text]) == 2
-    assert words in capsys.readouterr().err
+    assert words in command(*commands[verb], "--stations", text, code=2).err
 
 
-def test_a_name_that_the_scenario_lacks_is_told_with_those_it_has(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*LIVE, "--stations", "nose=3,torso=1"]) == 2
-    assert "no station called 'nose'" in capsys.readouterr().err
-
-
-def test_a_verb_without_a_device_takes_names_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["record", "sim:demo", "never.rec", "--stations", "head=3"]) == 2
-    assert "'head=3' names stations of a device" in capsys.readouterr().err
-
-
-def test_rows_are_those_of_the_named_stations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_are_those_of_the_named_stations(tmp_path: Path, command: Command) -> None:
     """The device has four stations, at heights 0, 0.1, 0.2 and 0.3 m; the third is the head, the first the torso."""
     path = tmp_path / "two.rec"
     with serve_emulator(make_samples(4), tcp="127.0.0.1:0") as emulator:
-        assert main(["record", emulator.name, str(path), "--seconds", "0.6", "--stations", "head=3,torso=1"]) == 0
-        assert "stations 1 torso, 3 head" in capsys.readouterr().err
+        said = command("record", emulator.name, path, "--seconds", "0.6", "--stations", "head=3,torso=1").err
+        assert "stations 1 torso, 3 head" in said
         assert [station.active for station in emulator.emulator.device.settings.stations[:5]] == [True] * 4 + [False]
-        assert main(["record", emulator.name, str(tmp_path / "x.rec"), "--stations", "head=7,torso=1"]) == 2
-        assert "the device has no station 7 (head); it has 1, 2, 3, 4. Plug it in" in capsys.readouterr().err
-        assert main([*LIVE[:-1], emulator.name, "--stations", "head=7,torso=1"]) == 2
-        said = capsys.readouterr().err
+        said = command("record", emulator.name, tmp_path / "x.rec", "--stations", "head=7,torso=1", code=2).err
+        assert "the device has no station 7 (head); it has 1, 2, 3, 4. Plug it in" in said
+        said = command(*LIVE[:-1], emulator.name, "--stations", "head=7,torso=1", code=2).err
     assert "no station 7 (head)" in said
     assert "learning" not in said
     stream = RecordingStream(path)
@@ -83,20 +71,12 @@ def test_rows_are_those_of_the_named_stations(tmp_path: Path, capsys: pytest.Cap
     np.testing.assert_allclose([frame.position_m[:, 2] for frame in frames], [[0.0, 0.2]] * len(frames), atol=1e-5)
 
 
-def test_a_named_station_that_is_off_is_on_for_the_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_named_station_that_is_off_is_on_for_the_session(tmp_path: Path, command: Command) -> None:
     with serve_emulator(make_samples(4), tcp="127.0.0.1:0") as emulator:
         device = emulator.emulator.device
         device.receive(b"l3,0\r", 0.0)
-        command = ["record", emulator.name, str(tmp_path / "x.rec"), "--seconds", "0.3", "--stations", "head=3"]
-        assert main(command) == 0, capsys.readouterr().err
+        command("record", emulator.name, tmp_path / "x.rec", "--seconds", "0.3", "--stations", "head=3")
         assert not device.settings.station("3").active
         assert device.settings.station("1").active
     (frame, *_) = RecordingStream(tmp_path / "x.rec")
     assert frame.position_m[0, 2] == pytest.approx(0.2, abs=1e-5)
-
-
-def test_a_number_of_thousands_of_digits_is_no_defect(capsys: pytest.CaptureFixture[str]) -> None:
-    """`int` refuses more than 4,300 digits with a ValueError."""
-    words = ["--port", "no_such_port", "--scenario", "demo", "--stations", "9" * 5000]
-    assert main(["live", *words]) == 2
-    assert "no station called '999" in capsys.readouterr().err

@@ -3,15 +3,11 @@
 import http.client
 import json
 import re
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from harness.cli import main
 from harness.commands.viewed_motion import open_motion, view_clip
 from harness.core import rotations
 from harness.experiment.playback import prepare_playback
@@ -21,6 +17,8 @@ from harness.report.kit.motion_player import NO_ESTIMATE
 from harness.results.storage import read_cells
 from harness.score.pair import compute_poses
 from harness.view.page import ViewedMotion
+from tests.command import Command
+from tests.interrupts import interrupt, start_harness
 from tests.planted import Plan, planted_run
 from tests.report.conftest import renders as renders
 
@@ -35,13 +33,6 @@ def opened(what: Path | str, methods: list[str] | None = None, **playback: str |
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = Plan(methods={"ik": 2.0, "map": 1.0, "far": 9.0}, duration_s=3.0)
     return planted_run(tmp_path_factory.mktemp("view") / "run", plan)
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recorded") / "a.rec"
-    assert main(["record", "sim:demo", str(path), "--clip", CLIP, "--stations", "4", "--seconds", "1.49"]) == 0
-    return path
 
 
 def test_a_built_in_take_is_shown_on_its_own_skeleton() -> None:
@@ -75,8 +66,8 @@ def test_a_run_has_its_methods_the_best_first_or_the_chosen_ones(run: Path) -> N
     np.testing.assert_array_equal(clip.estimates[0].joints_m, poses.joints_m)
 
 
-def test_a_recording_has_readings_truth_and_estimates(recorded: Path) -> None:
-    motion = opened(recorded, ["ik"], scenario="demo", clip=CLIP)
+def test_a_recording_has_readings_truth_and_estimates(simulated: Path) -> None:
+    motion = opened(simulated, ["ik"], scenario="demo", clip=CLIP)
     clip = motion.clip(0)
     assert clip.truth is not None
     assert clip.stations is not None
@@ -92,10 +83,10 @@ def test_a_recording_has_readings_truth_and_estimates(recorded: Path) -> None:
 
 
 def test_a_recording_of_an_unknown_room_shows_its_stations(
-    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("harness.stream.recording.recording.Recording.note", {})
-    motion = opened(recorded)
+    motion = opened(simulated)
     clip = motion.clip(0)
     assert "The room is not known" in motion.note
     assert clip.truth is None
@@ -105,7 +96,7 @@ def test_a_recording_of_an_unknown_room_shows_its_stations(
     np.testing.assert_allclose(np.linalg.norm(clip.stations.world_from_station, axis=2), 1.0)
     assert set(clip.stations.states.ravel().tolist()) <= {0, 1, 2}
     with pytest.raises(Exception, match="Name the scenario with --scenario"):
-        opened(recorded, ["ik"])
+        opened(simulated, ["ik"])
 
 
 @pytest.mark.parametrize(
@@ -127,61 +118,51 @@ def test_a_recording_of_an_unknown_room_shows_its_stations(
     ],
 )
 def test_what_cannot_be_shown_is_refused(
-    words: list[str],
-    said: str,
-    run: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    words: list[str], said: str, run: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(MOCAP_VARIABLE, raising=False)
     files = {"text": tmp_path / "text.rec", "empty": tmp_path / "empty", "markers": tmp_path / "a.c3d"}
     files["text"].write_text("no recording", encoding="utf-8")
     files["empty"].touch()
     files["markers"].touch()
-    assert main(["view", "--no-browser", *(word.format(run=run, tmp=tmp_path, **files) for word in words)]) == 2
-    assert said in capsys.readouterr().err.replace("\n", " ")
+    given = (word.format(run=run, tmp=tmp_path, **files) for word in words)
+    assert said in command("view", "--no-browser", *given, code=2).err.replace("\n", " ")
 
 
-def test_a_run_without_estimates_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_without_estimates_is_refused(tmp_path: Path, command: Command) -> None:
     plan = Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0, silent=("ik",))
-    assert main(["view", str(planted_run(tmp_path / "run", plan))]) == 2
-    assert "no frames with an estimate" in capsys.readouterr().err
+    assert "no frames with an estimate" in command("view", planted_run(tmp_path / "run", plan), code=2).err
 
 
-def test_a_damaged_recording_is_refused(recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_recording_is_refused(simulated: Path, tmp_path: Path, command: Command) -> None:
     """What is left holds no configuration of the device."""
     damaged = tmp_path / "damaged.rec"
-    damaged.write_bytes(recorded.read_bytes()[:60])
-    assert main(["view", str(damaged)]) == 2
-    assert "the device was never configured in it" in capsys.readouterr().err
+    damaged.write_bytes(simulated.read_bytes()[:60])
+    assert "the device was never configured in it" in command("view", damaged, code=2).err
 
 
-def test_a_page_is_written(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_is_written(run: Path, tmp_path: Path, command: Command) -> None:
     page = tmp_path / "page.html"
     words = ["view", str(run), "--methods", "map,ik", "--out", str(page), "--json"]
-    assert main(words) == 0
-    assert json.loads(capsys.readouterr().out)["page"] == str(page)
+    assert command(*words).content["page"] == str(page)
     text = page.read_text(encoding="utf-8")
     assert '"shown":["map","ik"]' in text
     assert '"name":"far"' not in text
-    assert main(words) == 2
-    assert main([*words, "--force"]) == 0
+    command(*words, code=2)
+    command(*words, "--force")
 
 
 @pytest.mark.long
-def test_a_movie_is_written(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], renders: None) -> None:
+def test_a_movie_is_written(run: Path, tmp_path: Path, command: Command, renders: None) -> None:
     movie = tmp_path / "a.gif"
-    assert main(["view", str(run), "--clip", CLIP, "--save", str(movie), "--from", "1", "--to", "1.2"]) == 0
-    said = capsys.readouterr()
+    said = command("view", run, "--clip", CLIP, "--save", movie, "--from", "1", "--to", "1.2")
     assert "a.gif: 3 frames" in said.out
     assert f"drawing {CLIP} with map" in said.err
     assert movie.read_bytes().startswith(b"GIF89a")
 
 
 def test_the_server_shows_the_run_until_ctrl_c(run: Path) -> None:
-    command = [sys.executable, "-m", "harness", "view", str(run), "--no-browser"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with start_harness("view", run, "--no-browser") as process:
         assert process.stderr is not None
         line = process.stderr.readline()
         address = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
@@ -191,7 +172,6 @@ def test_the_server_shows_the_run_until_ctrl_c(run: Path) -> None:
         clip = json.load(connection.getresponse())
         connection.close()
         assert [track["name"] for track in clip["tracks"]] == ["truth", "map", "ik", "far"]
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
+        code, out, _ = interrupt(process)
+    assert code == 0
     assert out.endswith("pass\n")

@@ -19,7 +19,8 @@ from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
 from tests.core.leftovers import leave_behind
-from tests.results.finish import finish_run, make_run
+from tests.results.finish import make_run
+from tests.results.finish import write_run as write_cells
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
@@ -90,9 +91,7 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
     content = manifest()
     make_run(run_folder, content)
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]
-    for cell in cells:
-        storage.write_cell(run_folder, cell)
-    finish_run(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
+    write_cells(run_folder, cells, failures={"ik on walk_3": "no"})
     found = load_results(run_folder)
     assert [cell.clip for cell in found.cells] == ["walk_2", "walk_1"]
     assert found.cells[0].metrics == cells[0].metrics
@@ -174,38 +173,28 @@ def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
     [
         ({"schema": 1}, "schema 1; expected schema 2"),
         ({"schema": None}, "schema None"),
-        ({"parts": {}}, "damaged"),
-        ({"cells": [1]}, "damaged"),
-        ({"metrics": []}, "damaged"),
-        ({"metrics": None}, "damaged"),
-        ({"cells": None}, "damaged"),
+        *(({name: value}, "damaged") for name, value in (("parts", {}), ("cells", [1]), ("metrics", []))),
+        *(({name: None}, "damaged") for name in ("metrics", "cells")),
         ({"planned": 17}, "16 cells of 17"),
+        *(({"clip": None}, "clip is"), ({"seed": "1"}, "seed is"), ({"varied": None}, "varied is")),
+        ({"performer": 3}, "performer is"),
+        *(({"mpjpe_mm": value}, "mpjpe_mm is") for value in (float("nan"), -3.0)),
+        *(({"frames_matched": None}, "frames_matched is"), ({"fps": "fast"}, "fps is")),
     ],
 )
 def test_damaged_baselines_are_refused(run: Path, baselines: Path, damage: dict[str, Any], why: str) -> None:
-    rewrite_json(write_baseline(run, "main") / "cells.json", **damage)
-    with pytest.raises(BadFile, match=why):
-        load_results("main")
-
-
-@pytest.mark.parametrize(("field", "value"), [("clip", None), ("seed", "1"), ("varied", None), ("performer", 3)])
-def test_damaged_cells_are_refused(run: Path, baselines: Path, field: str, value: object) -> None:
-    path = write_baseline(run, "main") / "cells.json"
-    cells = json.loads(path.read_text())["cells"]
-    rewrite_json(path, cells=[{**cells[0], field: value}, *cells[1:]])
-    with pytest.raises(BadFile, match=f"{field} is"):
-        load_results("main")
-
-
-@pytest.mark.parametrize(
-    ("metric", "value"), [("mpjpe_mm", float("nan")), ("frames_matched", None), ("fps", "fast"), ("mpjpe_mm", -3.0)]
-)
-def test_damaged_figures_are_refused(run: Path, baselines: Path, metric: str, value: object) -> None:
+    """Keys of the file, of its first cell, and figures of that."""
     path = write_baseline(run, "main") / "cells.json"
     content = read_json(path)
-    content["cells"][0]["metrics"][content["metrics"].index(metric)] = value
+    first, ((name, value),) = content["cells"][0], damage.items()
+    if name in content:
+        content[name] = value
+    elif name in content["metrics"]:
+        first["metrics"][content["metrics"].index(name)] = value
+    else:
+        first[name] = value
     rewrite_json(path, **content)
-    with pytest.raises(BadFile, match=f"{metric} is"):
+    with pytest.raises(BadFile, match=why):
         load_results("main")
 
 

@@ -10,7 +10,7 @@ from harness.compare.comparison import EVERYTHING, Comparison, compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
 from harness.report.comparison.page import comparison_page, comparison_text
-from harness.report.comparison.wording import describe_parts, sentence
+from harness.report.comparison.wording import comparison_sentence, describe_parts
 from harness.report.kit.page_html import page_html
 from harness.results.reader import ResultSet
 from harness.score.metrics import DEFINITIONS
@@ -286,7 +286,7 @@ def test_circumstances_that_differ_are_listed() -> None:
 def test_the_headline_states_how_many_units_it_is_about(known: list[dict[str, str] | None], said: str) -> None:
     sides = [side(title, clips=3) for title in "AB"]
     a, b = (replace(s, manifest=replace(s.manifest, performers=who)) for s, who in zip(sides, known, strict=True))
-    assert said in sentence(found(b, a))
+    assert said in comparison_sentence(found(b, a))
 
 
 def test_every_margin_is_of_a_metric_and_what_has_no_worse_is_refused() -> None:

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from harness.core.arrays import freeze, immutable
+from harness.core.arrays import find_runs, freeze, immutable
 from harness.errors import ShapeError
 
 
@@ -92,3 +94,16 @@ def test_numbers_of_other_precision_are_converted() -> None:
     for values in (np.array([0.5, np.inf], np.float32), np.array([0.5, np.inf], np.longdouble), [0.5, np.inf]):
         np.testing.assert_array_equal(immutable(values), [0.5, np.inf])
     assert immutable([]).dtype == np.float64
+
+
+@given(st.lists(st.booleans(), max_size=40))
+def test_runs_are_those_of_a_plain_loop(condition: list[bool]) -> None:
+    expected: list[list[int]] = []
+    for n, holds in enumerate(condition):
+        if holds and expected and expected[-1][1] == n:
+            expected[-1][1] += 1
+        elif holds:
+            expected.append([n, n + 1])
+    found = find_runs(np.array(condition, dtype=bool))
+    assert found.shape == (len(expected), 2)
+    assert found.tolist() == expected

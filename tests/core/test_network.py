@@ -13,7 +13,7 @@ from harness.errors import BadInput
 from harness.live.vmc import VmcOutput
 from harness.stream.driver.transport import open_transport
 from harness.stream.emulator.tcp_port import TcpPort
-from harness.stream.emulator.udp_port import UdpPort
+from harness.stream.emulator.udp_broadcast import UdpPort
 from tests.live.posing import configuration, live_pose
 
 IPV4, IPV6 = socket.AF_INET, socket.AF_INET6

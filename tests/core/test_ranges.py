@@ -1,27 +1,131 @@
-"""Every number that a scenario, a study or an option may set has a declared range, and other numbers are refused."""
+"""Names that no folder can have, or that break a line, are refused in one line of bounded length."""
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
 
+from harness.cli import main
+from harness.compare.baseline import write_baseline
 from harness.core.fields import build, replace_fields
-from harness.core.ranges import Range, check_fields, constraints_of
+from harness.core.ranges import Label, Range, check_fields, check_words, constraints_of
 from harness.errors import BadInput, HarnessError
-from harness.experiment.scenario import Scenario
-from harness.experiment.sweep_config import Sweep
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.sweep_config import Sweep, load_sweep
 from harness.reconstruct import registry
 from harness.simulate.noise import Noise
 from harness.study.placement.config import PlacementStudy
+
+LONGEST_LINE = 1100
+BAD = {"empty": "", "long": "x" * 1001, "null": "a\\u0000b", "newline": "a\\nb", "bell": "a\\u0007b"}
+"""Values in TOML's escapes."""
+NO_FILE = BAD | {"parent": "..", "path": "../other", "backslash": "a\\\\b"}
+SCENARIO = """
+name = "{name}"
+methods = ["{method}"]
+[motion]
+source = "builtin"
+behaviours = ["{behaviour}"]
+test = ["{test}"]
+[stations]
+"{station}" = {{ bone = "head" }}
+[vary]
+"{vary}" = ["clean"]
+"""
+GOOD = {
+    "name": "mine",
+    "method": "ik",
+    "behaviour": "walking",
+    "test": "walking_p1_01",
+    "station": "head",
+    "vary": "noise",
+}
+
+
+def one_line(text: str) -> bool:
+    return text.isprintable() and 0 < len(text) < LONGEST_LINE
+
+
+def test_good_names_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SCENARIO.format(**GOOD))
+    assert load_scenario(path).name == "mine"
+
+
+@pytest.mark.parametrize("bad", NO_FILE)
+@pytest.mark.parametrize("key", GOOD)
+def test_a_bad_name_in_a_scenario_is_refused(tmp_path: Path, key: str, bad: str) -> None:
+    if bad not in BAD and key != "name":
+        return  # only folders get names that must be no path
+    path = tmp_path / "s.toml"
+    path.write_text(SCENARIO.format(**{**GOOD, key: NO_FILE[bad]}))
+    with pytest.raises(HarnessError) as caught:
+        load_scenario(path)
+    assert one_line(str(caught.value).replace(str(tmp_path), ""))
+
+
+@pytest.mark.parametrize("bad", NO_FILE)
+def test_a_bad_name_of_a_sweep_is_refused(tmp_path: Path, bad: str) -> None:
+    path = tmp_path / "sweep.toml"
+    path.write_text(f'name = "{NO_FILE[bad]}"\nscenarios = ["demo"]\n')
+    with pytest.raises(HarnessError) as caught:
+        load_sweep(path)
+    assert one_line(str(caught.value).replace(str(tmp_path), ""))
+
+
+@pytest.mark.parametrize("name", ["", "x" * 300, "a\0b", "a\nb", "..", "../x"])
+def test_a_bad_name_of_a_baseline_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        write_baseline(tmp_path, name, tmp_path)
+    assert one_line(str(caught.value))
+
+
+WORDS = ("", "x" * 300, "a\0b", "a\nb", "x" * 300 + "/run")
+COMMANDS = (
+    ["run", "demo", "--out", "WORD"],
+    ["run", "WORD"],
+    ["run", "demo", "--methods", "WORD", "--out", "out"],
+    ["sweep", "WORD"],
+    ["placement", "WORD"],
+    ["baseline", "save", "WORD", "run"],
+    ["baseline", "save", "main", "WORD"],
+    ["compare", "WORD", "run"],
+    ["report", "WORD"],
+    ["status", "WORD"],
+    ["check", "WORD"],
+    ["inspect", "WORD"],
+)
+
+
+@pytest.mark.parametrize(
+    ("command", "word"), [*((COMMANDS[0], word) for word in WORDS), *((command, WORDS[3]) for command in COMMANDS[1:])]
+)
+def test_a_bad_word_of_the_command_line_is_refused(
+    command: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([word if part == "WORD" else part for part in command]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == "refused\n"
+    assert one_line(shown.err.removesuffix("\n"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_ordinary_words_are_accepted() -> None:
+    check_words(["13_17", Path("../results") / ("x" * 255), None, 5, ("ä ö", Path("/a/b"))])
+    assert Label(of_file=True).accepts("builtin walking 2.5")
+    assert not Label().accepts(" head")
+
 
 METHODS = {type(registry.resolve(name)) for name in (*registry.methods(), "mean_pose+ik")}
 ENDLESS = {"jump_m", "to_s"}
 """Fields that may be as large as you like; `inf` switches the outlier gate off, or lasts to the end."""
 NOT_CHOSEN = {"schema"}
 CHECKED_TOGETHER = {"Emitter"}
-"""Records of the protocol, which `simulate.physics.emitter_checks` checks where a scenario names them."""
+"""Records of the protocol, which `simulate.physics.emitters` checks where a scenario names them."""
 
 
 def types_in(hint: Any) -> Iterator[type]:

@@ -8,9 +8,15 @@ import pytest
 from harness.body.humanoid import build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.hinges import hinge_angles, hinge_rotation
-from harness.core.humanoid24 import QPOS_OF_DOF, standard_skeleton
-from harness.core.skeleton import forward_kinematics, unwrap_angles
+from harness.core.humanoid24 import BONES, QPOS_OF_DOF, limits_rad, pack, standard_skeleton, unpack
+from harness.core.skeleton import (
+    are_gimbal,
+    equivalent_euler_angles,
+    forward_kinematics,
+    hinge_angles,
+    hinge_rotation,
+    unwrap_angles,
+)
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.score.angles import wrap_difference
 
@@ -156,3 +162,76 @@ def test_a_long_clip_takes_no_time(rng: np.random.Generator) -> None:
     start_s = time.process_time()
     unwrap_angles(standard_skeleton(), angles)
     assert time.process_time() - start_s < 2.0  # a loop over frames takes 8 s
+
+
+@pytest.mark.parametrize("bone", ["lfemur", "lhand", "lclavicle", "rtibia", "lwrist", "lhipjoint"])
+def test_angles_of_any_bone_come_back(bone: str, rng: np.random.Generator) -> None:
+    skeleton = standard_skeleton()
+    axes = skeleton.axes[skeleton.dof_of_bone[skeleton.index(bone)]]
+    angles = rng.uniform(-1.5, 1.5, size=(200, len(axes)))
+    found = hinge_angles(axes, hinge_rotation(axes, angles))
+    assert found.shape == angles.shape
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angles), atol=1e-9)
+
+
+@pytest.mark.parametrize("bone", ["lfemur", "lhand", "rclavicle", "rtibia", "lwrist"])
+def test_no_other_angles_come_nearer(bone: str, rng: np.random.Generator) -> None:
+    skeleton = standard_skeleton()
+    axes = skeleton.axes[skeleton.dof_of_bone[skeleton.index(bone)]]
+    wanted = rotations.exp(rng.normal(size=(40, 3)))
+    best = hinge_angles(axes, wanted)
+    error = rotations.angle_between_rad(hinge_rotation(axes, best), wanted)
+    for _ in range(300):
+        other = best + rng.normal(size=best.shape) * rng.choice([0.01, 0.3, 3.0])
+        assert np.all(rotations.angle_between_rad(hinge_rotation(axes, other), wanted) > error - 1e-9)
+
+
+@pytest.mark.parametrize("middle_rad", [np.pi / 2, -np.pi / 2])
+def test_gimbal_lock_still_gives_the_rotation(middle_rad: float) -> None:
+    axes = np.eye(3)
+    locked = hinge_rotation(axes, np.array([[0.4, middle_rad, -0.7]]))
+    again = hinge_rotation(axes, hinge_angles(axes, locked))
+    assert rotations.angle_between_rad(again, locked).max() < 1e-7
+
+
+def test_twins_are_one_rotation(rng: np.random.Generator) -> None:
+    angles = rng.uniform(-3.0, 3.0, size=(50, 3))
+    apart = rotations.angle_between_rad(
+        *(hinge_rotation(np.eye(3), a) for a in (angles, equivalent_euler_angles(angles)))
+    )
+    assert apart.max() < 1e-7
+
+
+def test_three_square_hinges_are_a_gimbal() -> None:
+    skew = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    assert are_gimbal(np.eye(3)[[2, 0, 1]])
+    assert not are_gimbal(np.eye(3)[:2])
+    assert not are_gimbal(skew)
+
+
+@pytest.mark.parametrize("shape", [(), (7,), (3, 4)])
+def test_unpack_undoes_pack(shape: tuple[int, ...], rng: np.random.Generator) -> None:
+    parts = tuple(rng.normal(size=(*shape, size)) for size in (3, 4, 48))
+    qpos = pack(*parts)
+    assert qpos.shape == (*shape, 55)
+    for found, given in zip(unpack(qpos), parts, strict=True):
+        np.testing.assert_array_equal(found, given)
+
+
+def test_hinges_of_a_bone_run_outermost_first() -> None:
+    names = np.array(standard_skeleton().dof_names)[QPOS_OF_DOF]
+    assert names[:4].tolist() == ["lowerback.rz", "lowerback.ry", "lowerback.rx", "upperback.rz"]
+    assert names[-4:].tolist() == ["rfemur.rx", "rtibia.rx", "rfoot.rz", "rfoot.rx"]
+    np.testing.assert_array_equal(QPOS_OF_DOF[QPOS_OF_DOF], np.arange(48))
+
+
+def test_the_skeleton_is_that_of_the_paper() -> None:
+    skeleton = standard_skeleton()
+    assert (len(BONES), len(skeleton.axes)) == (24, 48)
+    np.testing.assert_allclose(np.linalg.norm(skeleton.axes, axis=1), 1.0, atol=1e-12)
+    low, high = limits_rad().T
+    assert np.all(low < 0.0)
+    assert np.all(high > 0.0)
+    mirrored = skeleton.bone_m[[skeleton.index(n) for n in BONES if n.startswith("l") and "r" + n[1:] in BONES]]
+    right = skeleton.bone_m[[skeleton.index(n) for n in BONES if n.startswith("r")]]
+    np.testing.assert_allclose(mirrored * [1, -1, 1], right, atol=1e-12)

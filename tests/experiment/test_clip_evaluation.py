@@ -21,7 +21,7 @@ from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.ik import PREVIOUS
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import WhiteNoise
 
 SCENARIO = Scenario(
     name="small",

@@ -24,7 +24,7 @@ from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment import cells, engine
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station, load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
-from harness.report.comparison.wording import sentence
+from harness.report.comparison.wording import comparison_sentence
 from harness.report.run.text import run_table
 from harness.results.expected_orders import ExpectedOrder
 from harness.results.manifest import Manifest
@@ -70,12 +70,12 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     performers = {"walking_p1_01": "p1", "boxing_p2_01": "p2"}
     assert Manifest.read(out / "manifest.json").performers == performers
     assert read_summary(out)["performers"] == performers
-    assert "on 2 performers:" in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
+    assert "on 2 performers:" in comparison_sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
     engine.run(replace(SMALL, unit="clip"), out)  # the cells are the same, and what is said of them is not
     assert {row["key"] for row in rows(out)} == {row["key"] for row in found.values()}
     assert (Manifest.read(out / "manifest.json").unit, read_summary(out)["unit"]) == ("clip", "clip")
     counted = "on 2 clips of 2 performers, these performers only:"
-    assert counted in sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
+    assert counted in comparison_sentence(compare_runs(out, methods=("mean_pose", "mean_pose")))
 
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:

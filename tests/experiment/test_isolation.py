@@ -119,25 +119,16 @@ def processes_with(argument: str) -> list[str]:
 @pytest.mark.long
 def test_a_method_that_hangs_is_ended_at_the_limit(tmp_path: Path) -> None:
     names = [method_name(kind) for kind in HANGING]
-    found = run(tmp_path / "run", *names, "mean_pose", isolation=Isolation(time_limit_s=12.0))
+    found = run(tmp_path / "run", *names, "mean_pose", isolation=Isolation(time_limit_s=3.0))
     assert set(found) == {"mean_pose"}
     failures = read_summary(tmp_path / "run")["failures"]
     assert len(failures) == len(names)
-    assert all("gave no answer within 12 s" in text for text in failures.values())
-
-
-@pytest.mark.long
-def test_workers_keep_methods_apart_too(tmp_path: Path, alone: dict[str, Cell]) -> None:
-    evil = [method_name(kind) for kind in FAILING if kind.__name__ in ("Exits", "Crashes", "RaisesKeyboardInterrupt")]
-    found = run(tmp_path / "run", *evil, *BYSTANDERS, jobs=2)
-    assert set(found) == set(BYSTANDERS)
-    for name in BYSTANDERS:
-        assert_same(found[name], alone[name])
+    assert all("gave no answer within 3 s" in text for text in failures.values())
 
 
 @pytest.mark.long
 def test_methods_of_the_package_have_the_same_results_in_processes_of_their_own(tmp_path: Path) -> None:
-    names = ("mean_pose", "ik:previous", "dynamic_map+ik")
+    names = ("mean_pose", "ik:previous")
     here = run(tmp_path / "here", *names)
     apart = run(tmp_path / "apart", *names, isolation=Isolation(every_method=True))
     for name in names:

@@ -8,8 +8,8 @@ import pytest
 
 from harness.cli import main
 from harness.compare.comparison import compare_runs
-from harness.core.line_loss import describe_line_loss, excess_loss
 from harness.core.split import ClipPart
+from harness.core.stream_health import describe_line_loss, excess_loss
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.clip_evaluation import ClipEvaluation

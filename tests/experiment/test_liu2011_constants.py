@@ -12,7 +12,7 @@ from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.scenario import load_scenario
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.synthetic import sample_skeletons
-from harness.simulate.mounting import perturb_mounts
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig
 

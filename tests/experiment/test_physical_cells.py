@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from harness.core.split import ClipPart
@@ -18,7 +17,6 @@ from harness.experiment.recorded_take import recorded_take
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
-from harness.results.cell import Cell, read_cell
 from harness.results.storage import read_summary
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
@@ -58,25 +56,6 @@ def test_conditions_have_the_causes_that_act() -> None:
     assert not acting["room"]["echoes"]
     assert conditions(replace(PHYSICAL, noise="clean"))["physics"]["sound"]["range_noise_m"] == 0.0
     assert conditions(replace(PHYSICAL, noise="default"))["physics"]["sound"]["bursts_per_min"] > 0.0
-
-
-def cells_of(scenario: Scenario, out: Path, jobs: int) -> dict[str, Cell]:
-    engine.run(scenario, out, jobs=jobs)
-    cells = [read_cell(folder) for folder in sorted((out / "cells").iterdir())]
-    return {cell.key: cell for cell in cells}
-
-
-@pytest.mark.long
-def test_cells_are_the_same_with_any_number_of_processes(tmp_path: Path) -> None:
-    scenario = replace(PHYSICAL, noise="default", vary={"physics.constellation.name": ["cave", "hall"]})
-    one, two = (cells_of(scenario, tmp_path / f"{jobs}", jobs) for jobs in (1, 2))
-    assert len(one) == 4
-    assert set(one) == set(two)
-    for key, cell in one.items():
-        np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
-        np.testing.assert_array_equal(cell.quality, two[key].quality)
-        assert cell.health == two[key].health
-    assert len({cell.estimate_qpos.tobytes() for cell in one.values() if cell.method == "ik:previous"}) == 2
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequ
         for turn_s in turns_s:
             device.receive(commands.STOP, now_s)
             for station in wire.characters.decode():
-                device.receive(commands.set_output_list(station, wire.items), now_s)
+                device.receive(commands.station_command("O", station, wire.items), now_s)
             device.receive(commands.BINARY + commands.CENTIMETRES + commands.ZERO_CLOCK, now_s)
             device.advance(now_s)
             writer.on_configured(wire, now_s, now_s)

@@ -52,7 +52,7 @@ def test_recovery_is_measured_by_a_run(tmp_path: Path) -> None:
     summary = read_summary(out)
     rows = {row["disturbance"]: row for row in summary["recovery"]}
     assert set(rows) == {"all_lost", "start_off"}
-    found = {name: (row["judged"], row["status_right"]) for name, row in rows.items()}
+    found = {name: (row["evaluated_frames"], row["status_right"]) for name, row in rows.items()}
     assert found == {"all_lost": (40, 1.0), "start_off": (40, 1.0)}
     assert all(row["ratio"] == pytest.approx(row["disturbed_deg"] / row["undisturbed_deg"]) for row in rows.values())
     assert "all_lost" in run_table(summary).split("recovery: ")[1]

@@ -17,8 +17,8 @@ from harness.experiment.scenario import (
     variants,
 )
 from harness.results.cell import varied_text
-from harness.simulate.components.echo import Echo
-from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.faults import LostStation
+from harness.simulate.components.transient import Echo
 from harness.simulate.noise import noise_preset
 
 MINIMAL = """

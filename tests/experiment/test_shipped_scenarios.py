@@ -11,9 +11,8 @@ from harness.core.motion import Clip
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart
 from harness.experiment import clip_evaluation
-from harness.experiment.cells import check_names
+from harness.experiment.cells import check_names, plan_tasks
 from harness.experiment.clip_evaluation import Subject
-from harness.experiment.planning import plan_tasks
 from harness.experiment.scenario import expand_clips, load_scenario
 from harness.mocap.shared_motion import SharedMotion, find_shared_motion
 from harness.mocap.sources import MotionSource, open_motion_source
@@ -24,6 +23,10 @@ SCENARIOS = [
     for path in sorted(FOLDER.rglob("*.toml"))
     if "motion" in read_toml(path, "a scenario", "") and path.parent.name != "placement"
 ]
+
+
+_COMPARED: set[tuple[object, ...]] = set()
+"""What other scenarios have compared already: they share test clips and examples."""
 
 
 def library_of(name: str, request: pytest.FixtureRequest) -> Path | None:
@@ -70,8 +73,9 @@ def test_no_shipped_scenario_is_refused_for_a_copy(
     scenario = expand_clips(load_scenario(FOLDER / name), folder)
     motion = scenario.motion
     source = open_source(motion.source, folder, scenario.seed, motion.rate_hz or None)
-    parts = [ClipPart.parse(text) for text in motion.test]
-    behaviours = motion.behaviours * (1 if len(motion.behaviours) > 1 else len(parts))
-    for part, behaviour in zip(parts, behaviours, strict=True):
-        subject = Subject(motion, scenario.seed, scenario.tracker.rate_hz, source, part, behaviour)
-        assert len(subject.example_clips) == len(subject.example_names)
+    for clip, behaviour in motion.tested:
+        subject = Subject(motion, scenario.seed, scenario.tracker.rate_hz, source, ClipPart.parse(clip), behaviour)
+        asked = clip, motion.split, source, subject.held_out_parts, tuple(subject.example_names)
+        if asked not in _COMPARED:
+            _COMPARED.add(asked)
+            assert len(subject.example_clips) == len(subject.example_names)

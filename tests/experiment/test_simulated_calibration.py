@@ -230,21 +230,6 @@ def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
     assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()} == made
 
 
-@pytest.mark.parametrize(
-    "kinds", [("exact", "tpose"), pytest.param(("poses",), marks=pytest.mark.slow)], ids=["tpose", "poses"]
-)
-def test_one_worker_or_two_are_told_the_same(tmp_path: Path, kinds: tuple[str, ...]) -> None:
-    scenario = side_by_side("walking_p1_01", "boxing_p2_01", kinds=kinds)
-    for jobs in (1, 2):
-        assert engine.run(scenario, tmp_path / str(jobs), jobs=jobs) is Outcome.PASS
-    one, two = (list(read_cells(tmp_path / jobs)) for jobs in ("1", "2"))
-    assert len(one) == len(two) == 2 * len(kinds)
-    for cell, other in zip(one, two, strict=True):
-        np.testing.assert_array_equal(cell.estimate_qpos, other.estimate_qpos)
-        np.testing.assert_array_equal(cell.estimate_bone_m, other.estimate_bone_m)
-        assert (cell.clip, cell.calibration_errors) == (other.clip, other.calibration_errors)
-
-
 def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
     exact = setting()
     tpose = exact.with_conditions(replace(SMALL, calibration="tpose"))

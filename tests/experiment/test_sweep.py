@@ -19,13 +19,12 @@ from harness.core.files import TEMPORARY
 from harness.core.interrupts import REPEAT_S
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
-from harness.experiment.cells import ClipTask
+from harness.experiment.cells import ClipTask, cell_names, plan_tasks
 from harness.experiment.engine import run_cells, run_sweep
 from harness.experiment.executors import R, TaskExecutor, run_in_process
-from harness.experiment.planning import cell_names, plan_tasks
 from harness.experiment.scenario import load_scenario
 from harness.experiment.sweep_config import expand_sweep, load_sweep
-from harness.results.lock import folder_lock
+from harness.results.folder_kind import folder_lock
 from harness.results.storage import read_cell
 from harness.results.table import TIME_COLUMNS
 from tests.experiment.made_up import FAILING, judge, made_up, sweep_file

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.core.training_data import training_note
+from harness.core.split import training_note
 from harness.reconstruct import registry
 from harness.report.run.data import last_varied, read_summary_only, series_name
 from harness.results.manifest import Manifest

@@ -4,7 +4,7 @@ import io
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.body.humanoid import build_body
 from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
-from harness.commands.status import _status_lines
+from harness.commands.sweep import _status_lines
 from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_runs
 from harness.core.calibration import Calibration
@@ -20,10 +20,10 @@ from harness.core.files import content_key, to_json_types, write_text
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
-from harness.experiment.planning import cell_names
+from harness.experiment.cells import cell_names
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import find_playback
-from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
 from harness.experiment.status import read_status
 from harness.experiment.sweep_config import expand_sweep, load_sweep
 from harness.mocap.file_inspection import inspect_file
@@ -36,23 +36,22 @@ from harness.report.kit.page_html import page_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
+from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
+from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.report.sweep.reader import read_sweep
 from harness.results.findings import read_findings
 from harness.results.index import INDEX_FILE
-from harness.results.loaded_run import load_run
 from harness.results.placement_findings import read_placement
+from harness.results.reader import load_run
 from harness.results.storage import read_summary
-from harness.simulate.physics.mcf_file import read_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
-from harness.stream.recording.frame_table import format_csv_row, frame_rows
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.summary import StreamSummary
-from harness.study.placement.config import base_scenario, load_placement_study, load_scenario_beside
+from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
+from harness.study.placement.config import base_scenario, load_placement_study
 from harness.study.placement.placement_study import run_placement
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
@@ -143,7 +142,10 @@ def _read_sweep(folder: Path) -> object:
 
 def _read_placement(folder: Path) -> object:
     study = load_placement_study(folder / "x.toml")
-    load = partial(load_scenario_beside, beside=folder)
+
+    def load(name: str) -> Scenario:
+        return load_scenario(find_scenario(name, folder))
+
     return [base_scenario(study, load, condition) for condition in (None, *study.condition)]
 
 

@@ -7,7 +7,7 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
-from harness.core.toml_digest import insert_toml_digest
+from harness.core.toml_file import insert_toml_digest
 from harness.results.digests import insert_digest
 from harness.results.index import _content_digest
 from harness.results.integrity import compute_digests

@@ -20,11 +20,11 @@ from harness.core import rotations
 from harness.errors import BadFile
 from harness.live.browser_process import BrowserConfig
 from harness.live.browser_view import BrowserOutput, _run_process
-from harness.live.pose_ring import PoseRing
+from harness.live.shared_memory import PoseRing
 from harness.live.viewer import _run_viewer_process
 from harness.stream.codec.reader import WireFormat
+from harness.stream.recording.recorder import RecordingSwitch
 from harness.stream.recording.recording import read_recording
-from harness.stream.recording.recording_switch import RecordingSwitch
 from harness.view.server import COMMAND_HEADER
 from tests.live.posing import configuration, live_pose
 

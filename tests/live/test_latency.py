@@ -1,8 +1,11 @@
 """Latencies of many frames: quantiles to 0.01 ms, exact maxima, and counts of missed deadlines."""
 
+import threading
+
 import numpy as np
 import pytest
 
+from harness.live.capture import DroppingQueue
 from harness.live.latency import DurationHistogram, StageLatencies
 
 
@@ -36,3 +39,47 @@ def test_stages_add_up_and_only_the_late_are_late() -> None:
     maxima_ms = {name: durations.as_dict()["max_ms"] for name, durations in stages.by_name().items()}
     wanted_ms = {"last byte to taken": 3.0, "taken to pose": 7.1, "pose to outputs": 2.0, "last byte to pose": 10.1}
     assert maxima_ms == pytest.approx(wanted_ms, abs=1e-6)
+
+
+def test_the_oldest_gives_way_and_is_counted() -> None:
+    queue: DroppingQueue[int] = DroppingQueue(3)
+    for number in range(10):
+        queue.put(number)
+    queue.end()
+    assert [queue.take() for _ in range(4)] == [7, 8, 9, None]
+    assert queue.dropped == 7
+    assert queue.take() is None  # for ever
+
+
+def test_what_waits_can_be_let_go() -> None:
+    queue: DroppingQueue[int] = DroppingQueue(3)
+    queue.put(1)
+    queue.put(2)
+    queue.drop_all()
+    assert queue.dropped == 2
+    queue.put(3)
+    assert queue.take() == 3
+    queue.put(4)
+    queue.end()
+    queue.drop_all()
+    assert (queue.dropped, queue.take()) == (3, None)
+
+
+def test_between_threads_nothing_is_lost_but_what_is_counted() -> None:
+    queue: DroppingQueue[int] = DroppingQueue(5)
+    taken: list[int] = []
+
+    def take() -> None:
+        while (item := queue.take()) is not None:
+            taken.append(item)
+
+    thread = threading.Thread(target=take)
+    thread.start()
+    for number in range(20_000):
+        queue.put(number)
+        assert len(queue) <= 5
+    queue.end()
+    thread.join()
+    assert taken == sorted(set(taken))
+    assert taken[-1] == 19_999
+    assert len(taken) + queue.dropped == 20_000

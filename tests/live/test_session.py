@@ -148,22 +148,6 @@ def test_what_breaks_is_raised_after_all_is_closed() -> None:
     assert output.closed == 2
 
 
-def test_an_output_that_fails_is_left_out_and_the_others_go_on() -> None:
-    good, bad, said = Kept(), Kept(fails_at=2), list[str]()
-    done = run_session(
-        Paced(frames(5), 0.005),
-        BODY,
-        Counting(),
-        WORN,
-        [bad, good],
-        LiveOptions(100.0, queue_frames=9),
-        say=said.append,
-    )
-    assert (len(good.poses), len(bad.poses), bad.closed) == (5, 2, 1)
-    assert done.failed == {"kept": "no room"}
-    assert said == ["kept: no room; the session goes on without it"]
-
-
 def test_any_error_of_an_output_leaves_it_out() -> None:
     class Unclosable(Kept):
         name = told = "unclosable"

@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.calibrate.performer_preview import PerformerPose
+from harness.calibrate.poses import POSES
+from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile, BadInput
-from harness.live.viewer import ViewerOutput, _prepare_folder
+from harness.live.viewer import SHEET_NAME, ViewerOutput, _prepare_folder, draw_poses
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
@@ -41,6 +44,9 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
         for number in range(1, 2001):
             shown.send(live_pose(qpos, number, kinematics=kinematics))
         found = wait_for(2, tmp_path / "frames")
+        shown._process.kill()
+        with pytest.raises(OSError, match="ended"):
+            shown.send(live_pose(qpos))
     finally:
         shown.close()
     found = sorted((tmp_path / "frames").glob("*.png"))
@@ -65,14 +71,6 @@ def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
     _prepare_folder(tmp_path, force=False)
 
 
-def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
-    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
-    shown._process.kill()
-    with pytest.raises(OSError, match="ended"):
-        shown.send(live_pose(humanoid.tpose(OWN)))
-    shown.close()
-
-
 def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadInput, match="needs a folder"):
         ViewerOutput("frames", OWN, force=False)
@@ -84,19 +82,6 @@ def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "file").write_text("")
     with pytest.raises(BadFile, match="cannot be created"):
         ViewerOutput("frames", OWN, tmp_path / "file", force=False)
-
-
-def test_a_pose_is_shown_until_the_next(tmp_path: Path) -> None:
-    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
-    try:
-        for number in (1, 2):
-            shown.show_pose(number, np.array(humanoid.tpose(OWN)))
-            until_s = time.monotonic() + 60.0
-            while not (tmp_path / f"{number:08d}.png").exists() and time.monotonic() < until_s:
-                time.sleep(0.02)
-    finally:
-        shown.close()
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["00000001.png", "00000002.png"]
 
 
 def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:
@@ -140,3 +125,19 @@ def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:
     assert np.abs(pair[580:] - later[580:]).max() > 0.3 * pair.max()
     assert np.abs(alone - next_alone).max() < 0.02 * alone.max()
     assert np.abs(pair - next_pair).max() < 0.02 * pair.max()
+
+
+pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
+
+
+def test_each_pose_and_all_on_a_sheet(tmp_path: Path) -> None:
+    drawn = draw_poses(POSES[:2], standard_skeleton(), tmp_path, force=False)
+    assert [path.name for path in drawn] == ["pose_1.png", "pose_2.png", SHEET_NAME]
+    assert sorted(tmp_path.iterdir()) == drawn
+    pictures = [Image.open(path).convert("RGB") for path in drawn]
+    assert pictures[0].size == pictures[1].size == (640, 640)
+    assert pictures[0].tobytes() != pictures[1].tobytes()
+    assert pictures[2].size == (1280, 354)
+    (tmp_path / "00000001.png").write_text("of a session")
+    with pytest.raises(BadFile, match="there are 1 pictures in it"):
+        draw_poses(POSES[:2], standard_skeleton(), tmp_path, force=False)

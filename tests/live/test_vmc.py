@@ -15,8 +15,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.live.pose import LivePose
-from harness.live.unity import HIPS, UNITY_BONES, UnityPose
-from harness.live.vmc import VmcOutput, parse_address
+from harness.live.vmc import HIPS, UNITY_BONES, UnityPose, VmcOutput, parse_address
 from harness.mocap.sources import SyntheticSource
 from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose
@@ -74,7 +73,7 @@ def real_poses() -> tuple[Body, list[Floats]]:
     body, poses = None, list[Floats]()
     for clip in ("walking_p1_01", "boxing_p1_01", "golf_p1_01"):
         body, motion = retarget_to_own_body(SyntheticSource(1).load(clip))
-        poses += list(motion.qpos[:: len(motion.qpos) // 20])
+        poses += list(motion.qpos[:: len(motion.qpos) // 7])
     assert body is not None
     return body, poses
 
@@ -94,7 +93,7 @@ def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator, real_poses: tu
     body, poses = real_poses
     skeleton = body.skeleton
     lower, upper = (skeleton.bone_m[skeleton.index(name)] for name in ("lowerneck", "upperneck"))
-    for pose, messages in sent(body, [*poses, *(configuration(rng) for _ in range(20))]):
+    for pose, messages in sent(body, [*poses, *(configuration(rng) for _ in range(8))]):
         found = rebuilt(messages)
         far_end = joint_centres_m(skeleton, pose.estimate.qpos[None])[0, 1:]
         for name, (bone, _) in UNITY_BONES.items():
@@ -120,7 +119,7 @@ def test_bones_keep_their_distances(rng: np.random.Generator, real_poses: tuple[
     """The head's position moved by up to 28 mm, as the upper neck bent, and receivers stretched the neck."""
     body, poses = real_poses
     fixed = []
-    for _, messages in sent(body, [*poses, *(configuration(rng) for _ in range(20))]):
+    for _, messages in sent(body, [*poses, *(configuration(rng) for _ in range(8))]):
         local = {str(values[0]): values[1:4] for address, values in messages if address == "/VMC/Ext/Bone/Pos"}
         fixed.append([at_m for name, at_m in local.items() if name != HIPS])
     assert np.ptp(np.array(fixed, float), axis=0).max() == 0.0

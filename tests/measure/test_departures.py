@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from harness.core.interval import Interval
-from harness.errors import BadInput
+from harness.core.number_format import Interval
 from harness.measure.departures import compare_with_expected
 
 
@@ -26,12 +25,3 @@ def test_the_interval_of_the_expected_number_counts() -> None:
 def test_the_side_of_a_skewed_interval_counts() -> None:
     skewed = Interval(1.0, 0.9, 3.0)
     assert skewed.deviation_towards(2.0) == pytest.approx(20.0 * skewed.deviation_towards(0.5))
-
-
-def test_an_interval_contains_its_estimate() -> None:
-    with pytest.raises(BadInput, match="interval"):
-        Interval(1.0, 2.0, 3.0)
-    with pytest.raises(BadInput, match="interval"):
-        Interval(math.nan, 0.0, 1.0)
-    assert not Interval.missing("no static stretch").is_measured
-    assert Interval.normal(0.1, 0.1, least=0.0).low == 0.0

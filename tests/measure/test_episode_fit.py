@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from harness.measure.episode_fit import EPISODE_KEYS, fit_episodes
-from harness.measure.excursions import ExcursionNoise
+from harness.measure.episode_fit import EXCURSION_RATE, fit_episodes
+from harness.measure.gauss_markov import ErrorProcess
 from harness.simulate.noise import noise_preset
 from tests.measure.resting_stations import QUIET, at_rest
 
-NOISE = ExcursionNoise(0.00075, 0.0015, 1.0)
+NOISE = ErrorProcess(0.00075, 0.0015, 1.0)
 
 
 def test_noise_alone_has_no_episodes() -> None:
     fit = fit_episodes(at_rest(QUIET, 1, stations=("a", "b")), NOISE)
-    for key in (EPISODE_KEYS[0], "components.echo.share", "components.dropout.share"):
+    for key in (EXCURSION_RATE, "components.echo.share", "components.dropout.share"):
         assert fit.parameters[key].value == 0.0
         assert fit.parameters[key].high > 0.0
     assert not any(one.disturbed.any() for one in fit.found)
@@ -27,7 +27,7 @@ def test_rates_and_sizes_of_the_preset_are_found(rate: float) -> None:
     assert preset.excursion
     noise = replace(preset, session=None, excursion=replace(preset.excursion, onsets_per_min=rate))
     fit = fit_episodes(at_rest(noise, 3, seconds=600.0, stations=tuple("abcdef")), NOISE)
-    found = fit.parameters[EPISODE_KEYS[0]]
+    found = fit.parameters[EXCURSION_RATE]
     assert found.contains(rate) or found.value == pytest.approx(rate, rel=0.2)
     assert fit.parameters["components.echo.share"].value == pytest.approx(0.03, rel=0.2)
     assert fit.parameters["components.echo.burst_records.1"].value == 8

@@ -60,22 +60,6 @@ def test_an_excursion_has_its_duration_and_its_largest_error() -> None:
     assert not found.truncated.any()
 
 
-@pytest.mark.parametrize(("merge_s", "number"), [(0.29, 2), (0.3, 2), (0.31, 1)])
-def test_excursions_less_than_the_limit_apart_are_one(merge_s: float, number: int) -> None:
-    error_m = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0])
-    found = find_excursions(np.arange(7) / 10.0, error_m, 0.5, merge_s=merge_s)
-    assert len(found.peak) == number
-    assert found.peak[-1] == 2.0
-
-
-def test_an_unknown_error_ends_an_excursion() -> None:
-    error_m = np.array([0.0, 1.0, np.nan, np.nan, 1.0, 0.0])
-    assert len(find_excursions(np.arange(6.0), error_m, 0.5, merge_s=0.0).peak) == 2
-    merged = find_excursions(np.arange(6.0), error_m, 0.5, merge_s=3.0)
-    assert merged.duration_s.tolist() == [4.0]
-    assert merged.peak.tolist() == [1.0]
-
-
 def test_gaps_are_where_quality_is_zero() -> None:
     quality = np.array([0.0, 0.0, 1.0, 1e-3, 0.0, 1.0, 0.0])
     found = find_gaps(np.arange(7) / 4.0, quality)

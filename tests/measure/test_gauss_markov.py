@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
-from harness.measure.gauss_markov import series_log_likelihood
+from harness.measure.gauss_markov import (
+    ErrorProcess,
+    fit_process,
+    kalman_gains,
+    series_log_likelihood,
+    transpose_whiten,
+    whiten,
+)
+from tests.measure.moving_bodies import gauss_markov
 
 
 def dense_covariance(used: Bools, rate_hz: float, white: float, drift: float, correlation_s: float) -> Floats:
@@ -66,3 +74,35 @@ def test_long_series_keep_the_likelihood_when_the_variance_is_steady() -> None:
 @pytest.mark.parametrize("seen", [0, 1])
 def test_a_constant_takes_the_only_reading(seen: int) -> None:
     assert series_log_likelihood(np.ones((5, 1)), np.arange(5) < seen, 0.5, 1.0, 1.0) == 0.0
+
+
+def test_whitening_is_the_inverse_of_the_cholesky_factor() -> None:
+    rng = generator(4, "whiten")
+    values, used = rng.normal(size=(80, 2)), rng.uniform(size=80) > 0.3
+    found = ErrorProcess(0.7, 1.5, 0.8).whiten(np.where(used[:, None], values, np.nan), used, 0.1)
+    factor = np.linalg.cholesky(dense_covariance(used, 10.0, 0.7, 1.5, 0.8))
+    np.testing.assert_allclose(found[used], np.linalg.solve(factor, values[used]), atol=1e-10)
+    assert not found[~used].any()
+
+
+def test_the_transpose_has_the_same_products() -> None:
+    rng = generator(9, "transpose")
+    valid = rng.uniform(size=200) > 0.2
+    gain, deviation = kalman_gains(valid, 0.97, 2.25, 0.56)
+    one, other = rng.normal(size=(2, 200, 3))
+    forward, backward = whiten(one, valid, gain, deviation, 0.97), transpose_whiten(other, valid, gain, deviation, 0.97)
+    assert np.sum(forward * other) == pytest.approx(np.sum(one * backward), rel=1e-12)
+
+
+PERIOD_S = 0.025
+
+
+@pytest.mark.parametrize(("white", "drift", "correlation_s"), [(0.5, 2.0, 1.0), (1.0, 1.0, 0.3)])
+def test_fit_finds_the_process(white: float, drift: float, correlation_s: float, rng: np.random.Generator) -> None:
+    count = 20_000
+    errors = drift * gauss_markov(rng, count, float(np.exp(-PERIOD_S / correlation_s)))
+    errors += white * rng.normal(size=errors.shape)
+    found = fit_process(errors, rng.random(count) > 0.1, PERIOD_S)
+    assert found.white == pytest.approx(white, rel=0.05)
+    assert found.drift == pytest.approx(drift, rel=0.1)
+    assert found.correlation_s == pytest.approx(correlation_s, rel=0.15)

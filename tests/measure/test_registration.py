@@ -11,8 +11,8 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
-from harness.core.interval import Interval
 from harness.core.motion import BodyMotion
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
@@ -52,12 +52,20 @@ def list_errors(
         ("scale", values["scale"], tracker.scale),
         ("heading_rad", values["heading_rad"], tracker.heading_rad),
         *(("tracker_origin_m", values[f"tracker_origin_m.{a}"], float(tracker.origin_m[a])) for a in range(3)),
-        *(("room", one, 0.0) for one in found.room_turn_from(rotations.inverse(tracker.room))),
+        *(("room", one, 0.0) for one in _room_turns(found, tracker)),
     ]
     for name, (mount_m, mount) in mounts.items():
         out += [(f"{name} position", found.mounts[name].position(a), float(mount_m[a])) for a in range(3)]
         out += [(f"{name} turn", one, 0.0) for one in found.mounts[name].turn_from(mount)]
     return out
+
+
+def _room_turns(found: Registration, tracker: Tracker) -> list[Interval]:
+    """Rotation vector from the room of the tracker to the measured one, in the tracker's axes."""
+    measured = rotations.multiply(rotations.inverse(found.world_from_tracker), rotations.inverse(tracker.room))
+    deviation = np.sqrt(np.diag(found.room_covariance[:3, :3]))
+    turns = zip(rotations.log(measured).tolist(), deviation.tolist(), strict=True)
+    return [Interval.normal(value, one, found.blocks) for value, one in turns]
 
 
 def test_exact_readings_give_exact_values(rng: np.random.Generator) -> None:

@@ -64,8 +64,8 @@ def test_errors_have_their_size_in_every_class_of_speed() -> None:
 
 @pytest.mark.long
 def test_the_interval_of_the_time_covers_it() -> None:
-    covered = [measure(0.002, noise_m=0.003, seconds=60.0, seed=seed).ahead_s.contains(0.002) for seed in range(200)]
-    assert 0.90 <= np.mean(covered) <= 0.99
+    covered = [measure(0.002, noise_m=0.003, seconds=60.0, seed=seed).ahead_s.contains(0.002) for seed in range(80)]
+    assert 0.88 <= np.mean(covered) <= 0.99
 
 
 def test_echoes_are_left_out() -> None:

@@ -9,12 +9,11 @@ from harness.core import rotations
 from harness.core.arrays import Ints
 from harness.core.seeds import generator
 from harness.measure.static_series import StaticSeries, find_rest, static_series
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.echo import Echo
-from harness.simulate.components.excursion import Excursion
+from harness.simulate.components.stationary import DriftNoise
+from harness.simulate.components.transient import Echo, Excursion
 from harness.simulate.noise import Noise, noise_preset
 from harness.stream.recording.station_readings import StationReadings
-from tests.measure.static_readings import simulate_static, station_readings
+from tests.measure.resting_stations import simulate_static, station_readings
 
 
 def whole_series(readings: StationReadings, rate_hz: float = 40.0) -> StaticSeries:

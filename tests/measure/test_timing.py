@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.seeds import generator
-from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share
-from harness.simulate.components.clock import Clock
+from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share, robust_slope
+from harness.simulate.components.stationary import Clock, gauss_markov
 from harness.simulate.noise import Noise, noise_preset
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
-from tests.measure.static_readings import simulate_static, station_readings
+from tests.measure.resting_stations import simulate_static, station_readings
 
 STATIONS = ("one", "two", "three", "four", "five", "six")
 Delay = Callable[[np.random.Generator, int], Floats]
@@ -188,19 +188,46 @@ def clocks(rounds: int, seconds: float, delay: Delay, *, ppm: float, age_s: floa
 @pytest.mark.long
 @pytest.mark.parametrize("delay", [exponential, host])
 def test_the_clock_s_interval_contains_the_truth_behind_a_busy_host(delay: Delay) -> None:
-    found = clocks(60, 300.0, delay, ppm=80.0)
+    found = clocks(25, 300.0, delay, ppm=80.0)
     assert np.mean([one.contains(80.0) for one in found]) >= 0.88, [one.value for one in found]
     assert not any(one.contains(20.0) for one in found)
-
-
-@pytest.mark.long
-def test_the_clock_s_interval_of_a_minute_allows_for_a_delay_that_wanders() -> None:
-    found = clocks(60, 60.0, host, ppm=80.0)
-    assert np.mean([one.contains(80.0) for one in found]) >= 0.88, [one.value for one in found]
 
 
 @pytest.mark.long
 def test_the_clock_s_interval_contains_the_truth_with_coarse_stamps() -> None:
-    found = clocks(40, 300.0, exponential, ppm=80.0, age_s=18_000.0)
+    found = clocks(20, 300.0, exponential, ppm=80.0, age_s=18_000.0)
     assert np.mean([one.contains(80.0) for one in found]) >= 0.88
     assert not any(one.contains(20.0) for one in found)
+
+
+def test_a_line_has_its_slope_and_no_width() -> None:
+    at = np.arange(40.0)
+    assert robust_slope(at, 3.0 - 0.25 * at) == pytest.approx((-0.25, -0.25, -0.25))
+
+
+def test_outliers_of_one_side_do_not_turn_the_line() -> None:
+    at = np.arange(60.0)
+    late = np.where(generator(1, "late").uniform(size=60) < 0.15, 20.0, 0.0)
+    slope, low, high = robust_slope(at, 0.1 * at + late)
+    assert slope == pytest.approx(0.1, abs=1e-9)
+    assert low <= 0.1 <= high
+
+
+def test_a_few_values_have_the_interval_of_sen() -> None:
+    from scipy import stats
+
+    at, values = np.arange(7.0), np.array([0.0, 1.2, 1.9, 3.1, 3.8, 5.3, 6.0])
+    expected = stats.theilslopes(values, at, 0.95)
+    assert robust_slope(at, values) == pytest.approx((expected[0], expected[2], expected[3]))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("correlation", [0.0, 0.8])
+def test_intervals_contain_the_slope_with_correlated_errors(correlation: float) -> None:
+    at, rounds = np.arange(60.0), 50
+    inside = 0
+    for seed in range(rounds):
+        errors = gauss_markov(generator(seed, "errors").normal(size=(60, 1)), correlation)[:, 0]
+        _, low, high = robust_slope(at, 0.5 * at + errors)
+        inside += low <= 0.5 <= high
+    assert inside >= 44

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
-from harness.measure.unit_file import UnitFile, read_unit_file, unit_value, write_unit_file
+from harness.measure.unit_file import UnitFile, read_unit_file, write_unit_file
 from tests.core.digested_toml import as_earlier_version, declare_edited
 
 UNIT = UnitFile(
@@ -123,11 +123,3 @@ def test_a_damaged_file_is_read_or_refused(data: st.DataObject, tmp_path_factory
     path.write_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
     with suppress(BadFile):  # any other error fails the test
         read_unit_file(path)
-
-
-def test_values_are_found_by_dotted_keys() -> None:
-    assert unit_value(UNIT, "components.white.position_m") == 0.0007
-    assert unit_value(UNIT, "components.echo.size_m.1") == 0.3
-    assert unit_value(UNIT, "tracker.rate_hz") == 40.0
-    assert unit_value(UNIT, "components.echo.size_m") is None
-    assert unit_value(UNIT, "components.nothing.share") is None

@@ -88,8 +88,9 @@ fetch.fetch_cmu(["92"], sys.argv[1], base_url="http://localhost")
 
 
 def test_a_fetch_removes_what_dead_fetches_left_and_nothing_of_living_ones(site: Site, tmp_path: Path) -> None:
+    write_clip(site.folder / "subjects", replace(clip(name="92_01"), subject="92"))
     out = tmp_path / "out"
-    old = out / "90" / ".fetch-ab12cd"  # as the version before this rule left it
+    old = out / "90" / ".fetch-ab12cd"  # as an earlier version left it
     old.mkdir(parents=True)
     (old / "90_01.amc").write_text("half")
     command = [sys.executable, "-c", KILLED_FETCH, str(out)]
@@ -98,14 +99,14 @@ def test_a_fetch_removes_what_dead_fetches_left_and_nothing_of_living_ones(site:
         half = Path(process.stdout.readline().strip())
         assert half.read_bytes() == b"half"
         fetch_cmu(["91"], out, base_url=site.url)
+        fetch_cmu(["92"], out, base_url=site.url)
         assert half.is_file()
-        assert not old.exists()
-        assert MotionLibrary(out).names() == ("91_01", "91_02")
+        assert MotionLibrary(out).names() == ("91_01", "91_02", "92_01")
         process.kill()
     assert half.is_file()
-    fetch_cmu(["91"], out, base_url=site.url)
-    assert _names(out) == ["91/91.asf", "91/91_01.amc", "91/91_02.amc", "manifest.csv"]
-    assert not half.parent.exists()
+    (out / "92" / "92.asf").unlink()
+    fetch_cmu(["92"], out, base_url=site.url)
+    assert not half.exists()
 
 
 def test_what_is_there_is_not_fetched_again(site: Site, tmp_path: Path) -> None:
@@ -277,6 +278,7 @@ def test_real_files_pass_as_cmus(mocap: Path, tmp_path: Path, monkeypatch: pytes
     """Two real files pass the checks of a download."""
     for name in ("13.asf", "13_30.amc"):
         (tmp_path / name).write_bytes((mocap / "cmu" / "13" / name).read_bytes())
-        fetch._check_file(tmp_path / name, name, shipped_sha256()[f"13/{name}"], tmp_path)
+        fetch._check_file(tmp_path / name, name, shipped_sha256()[f"13/{name}"], tmp_path / name)
+    file = tmp_path / "13_30.amc"
     with pytest.raises(BadFile, match="SHA-256"):
-        fetch._check_file(tmp_path / "13_30.amc", "13_30.amc", shipped_sha256()["13/13_17.amc"], tmp_path)
+        fetch._check_file(file, "13_30.amc", shipped_sha256()["13/13_17.amc"], file)

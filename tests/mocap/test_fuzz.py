@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
 from harness.mocap.read import amass, bvh, mvnx
-from harness.mocap.read.acclaim import read_amc, read_asf
+from harness.mocap.read.amc import read_amc
+from harness.mocap.read.asf import read_asf
 from harness.mocap.read.c3d import read_c3d
 from harness.mocap.read.joint_clip import JointClip
 from tests.mocap.c3d_bytes import c3d_bytes

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import combinations, permutations
 from pathlib import Path
 
@@ -13,7 +14,13 @@ from harness.core.split import ClipPart, allowed_frames, forbidden_frames
 from harness.mocap import synthetic
 from harness.mocap.clip_file import read_clip
 from harness.mocap.library import MotionLibrary
-from harness.mocap.shared_motion import SAME_MOTION, SharedMotion, find_shared_motion, least_difference, least_loss
+from harness.mocap.shared_motion import (
+    SAME_MOTION,
+    SharedMotion,
+    best_match_of_clips,
+    compare_poses,
+    find_shared_motion,
+)
 from tests.mocap.clip_copies import COPIES, EDITS, mirrored, resampled, take_rows
 
 TAKES = [("walking", "p1", 1), ("boxing", "p2", 1), ("jumping", "p3", 2), ("golf", "p1", 2), ("table_tennis", "p2", 1)]
@@ -27,6 +34,21 @@ def shared(first: Clip, second: Clip) -> SharedMotion | None:
     return find_shared_motion(first, complete(first), second, complete(second))
 
 
+def least_difference(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
+    """Least difference of two clips over a second that moves, as `SAME_MOTION` bounds it; inf if it is large."""
+    comparisons = compare_poses(first, first_runs, second, second_runs)
+    return min((float(c.difference[c.moving].min(initial=np.inf)) for c in comparisons), default=np.inf)
+
+
+def least_loss(
+    first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range], limit: float
+) -> float:
+    """Least loss of correlation, relative to the largest one of a copy; inf if none is below the limit."""
+    match = best_match_of_clips(first, first_runs, second, second_runs, limit)
+    return match.share if match else np.inf
+
+
+@cache
 def generated(behaviour: str, performer: str, take: int, seed: int = 1) -> Clip:
     return synthetic.generate(behaviour, performer, take, seed=seed, duration_s=10.0)
 
@@ -173,11 +195,11 @@ FIFTHS = [(start / 5, (start + 1) / 5) for start in range(5)]
     "behaviour", [b if b == "golf" else pytest.param(b, marks=pytest.mark.long) for b in synthetic.BEHAVIOURS]
 )
 def test_takes_of_the_motion_generator_are_apart(behaviour: str) -> None:
-    """Takes and seeds of seven people: copies differ by less than half the threshold, takes by more than twice."""
-    others = [(performer, 1, 1) for performer in ("p6", "p19", "p30", "p44", "p51", "p57")]
+    """Takes and seeds of four people: copies differ by less than half the threshold, takes by more than twice."""
+    others = [(performer, 1, 1) for performer in ("p6", "p30", "p57")]
     clips = [
         replace(synthetic.generate(behaviour, performer, take, seed=seed), name=f"{performer}_{take} of seed {seed}")
-        for performer, take, seed in (*(("p1", take, seed) for take in (1, 2, 5) for seed in (1, 2)), *others)
+        for performer, take, seed in (*(("p1", take, seed) for take in (1, 2) for seed in (1, 2)), *others)
     ]
     copies, takes, blocks = most_of_copies(clips[:2]), least_of_takes(clips), least_of_blocks(clips, FIFTHS)
     losses = least_losses(clips)

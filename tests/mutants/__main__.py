@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.commands.common import positive_int
+from harness.commands.flags import positive_int
 from harness.core.interrupts import accept_interrupts
 from harness.errors import Outcome
 from tests.mutants.campaign import RedReference, Result, run_campaign, share_caught

@@ -94,10 +94,10 @@ def test_no_bytecode_of_earlier_source_is_used(tmp_path: Path) -> None:
 def test_no_compiled_code_of_earlier_source_is_used(tmp_path: Path) -> None:
     """A compiled function is compiled anew for a mutation, and loaded again without it."""
     (tmp_path / "copy").mkdir()
-    copy, module = CheckoutCopy.make(ROOT, tmp_path / "copy"), "harness/reconstruct/features/smoothing.py"
+    copy, module = CheckoutCopy.make(ROOT, tmp_path / "copy"), "harness/reconstruct/features/pose_space.py"
     ask = (
         "-c",
-        "import numpy as np; from harness.reconstruct.features.smoothing import smooth; "
+        "import numpy as np; from harness.reconstruct.features.pose_space import smooth; "
         "print(smooth(np.array([1.0]), np.array([10.0]), np.array([100.0]), 0.3, 0.4)[0])",
     )
     minus = "return share * now + share_before * before - share_earlier * earlier"

@@ -1,6 +1,6 @@
 """Scenes: synthetic motions and the frames of exact trackers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
-from harness.reconstruct.contract import Method
+from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.solver.normal_equations import normal_rows
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
@@ -32,17 +32,23 @@ class Scene:
     frames: list[TrackerFrame]
     examples: list[BodyMotion]
     """Other takes of the performer and one of another performer; the take itself is not among them."""
+    fits: dict[tuple[str, int], Reconstructor] = field(default_factory=dict, repr=False)
+    """What methods learnt from the scene's examples: sessions share it, and so do tests."""
+
+    def fit(self, method: Method, examples: list[BodyMotion] | None = None) -> Reconstructor:
+        """The method after learning from the scene's examples, or from others."""
+        if examples is not None or not method.needs_examples:
+            return method.fit(self.body, examples or [], np.random.default_rng(1))
+        key = repr(method), id(self.examples)
+        if key not in self.fits:
+            self.fits[key] = method.fit(self.body, self.examples, np.random.default_rng(1))
+        return self.fits[key]
 
     def run(
-        self,
-        method: Method,
-        frames: list[TrackerFrame] | None = None,
-        examples: list[BodyMotion] | None = None,
+        self, method: Method, frames: list[TrackerFrame] | None = None, examples: list[BodyMotion] | None = None
     ) -> list[Estimate]:
         """Estimates of the scene's frames, or of others, after learning from the scene's examples, or from others."""
-        if examples is None:
-            examples = self.examples if method.needs_examples else []
-        session = method.fit(self.body, examples, np.random.default_rng(1)).begin(self.calibration)
+        session = self.fit(method, examples).begin(self.calibration)
         return [session.step(frame) for frame in (self.frames if frames is None else frames)]
 
     def only(self, inputs: str) -> list[TrackerFrame]:

@@ -96,7 +96,7 @@ def test_every_option_of_dynamic_map_is_documented_or_shared() -> None:
     told = {option for method, option in documented() if method in ("dynamic_map", "ik")}
     left = set(leaves(registry.resolve("dynamic_map"))) - told
     assert left == {
-        *("name", "summary", "needs_examples", "index", "jump_m"),
+        *("name", "summary", "index", "jump_m"),
         *(f"regression.{name}" for name in ("window_weight", "lever_m", "directions", "ridge")),
     }
 

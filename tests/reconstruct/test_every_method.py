@@ -14,16 +14,16 @@ from harness.body.retargeting import retarget_to_common_body
 from harness.core.estimate import Status
 from harness.core.motion import BodyMotion
 from harness.core.workers import run_in_workers
+from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score.angles import wrap_difference
 from harness.testing import method_checks
-from harness.testing.contract_case import make_case
+from harness.testing.contract_case import make_case, require_identical
 from harness.testing.frames import exact_frames
 from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import require_identical
 from harness.testing.rules.reproducibility import estimate_qpos, works_in_another_process
 from tests.joint_centres import joint_centres_m
 from tests.reconstruct.conftest import Scene, moved, scene
@@ -95,6 +95,17 @@ def at_home(name: str) -> tuple[float, float]:
 def unseen(name: str) -> tuple[float, float]:
     """Errors with other takes as examples."""
     return errors(registry.resolve(name), walk().examples, walk())
+
+
+@pytest.mark.parametrize("name", [name for name in LEARNERS if not name.startswith("ik")])
+def test_examples_are_needed(name: str) -> None:
+    """A method that learns from windows of n frames needs n + 1."""
+    method, rng = registry.resolve(name), np.random.default_rng(0)
+    fewest = {"expert_map": 4, "dynamic_map": 4}.get(name, 3 if name.startswith(("dynamic_map:", "local_pca")) else 1)
+    short = replace(walk().take, qpos=walk().take.qpos[: fewest - 1])
+    for examples in ([], [short, short]) if fewest > 1 else ([],):
+        with pytest.raises(BadInput, match=f"examples of {fewest} frames" if fewest > 1 else "examples"):
+            method.fit(walk().body, examples, rng)
 
 
 @pytest.mark.parametrize("name", NAMES)

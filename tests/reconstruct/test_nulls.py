@@ -8,18 +8,11 @@ import pytest
 from harness.core import rotations
 from harness.core.humanoid24 import unpack
 from harness.core.motion import BodyMotion
-from harness.errors import BadInput
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
-
-
-@pytest.mark.parametrize("method", [MeanPose(), BestMatch()])
-def test_examples_are_needed(walk: Scene, method: MeanPose | BestMatch) -> None:
-    with pytest.raises(BadInput, match="examples"):
-        method.fit(walk.body, [], np.random.default_rng(0))
 
 
 def test_the_mean_pose_never_changes_but_follows(walk: Scene) -> None:

@@ -101,11 +101,7 @@ def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
     ],
 )
 def test_a_module_or_class_that_cannot_be_used(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    text: str,
-    name: str,
-    message: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, name: str, message: str
 ) -> None:
     module = f"somebodys_{tmp_path.name}"
     (tmp_path / f"{module}.py").write_text(text)

@@ -87,7 +87,7 @@ def test_every_module_of_the_own_package_counts_and_the_helpers_next_to_it(folde
     files = source_files(registry.resolve("lab.methods.mine:Mine"))
     assert files.folders == (folder,)
     assert {file.relative_to(folder).as_posix() for file in files.files} == {
-        *("lab/__init__.py", "lab/methods/mine.py", "lab/plugins/found_by_name.py", "shared.py"),
+        *("lab/__init__.py", "lab/methods/mine.py", "lab/plugins/found_by_name.py", "shared.py")
     }
 
 

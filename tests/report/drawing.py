@@ -57,5 +57,5 @@ def draw_page(page: Page) -> None:
     """Draw every chart of a page."""
     for section in page.sections:
         for block in section.blocks:
-            if isinstance(block, Drawing):
-                block.draw()
+            if isinstance(block, Drawing) and callable(block.chart):
+                block.chart()

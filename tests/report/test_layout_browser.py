@@ -19,7 +19,7 @@ from harness.report.paper.page import write_paper_page
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.page import write_physics_page
 from harness.report.placement import page as placement_page
-from harness.report.run.writer import write_run_page
+from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from harness.results.trust_findings import TrustFindings
 from tests.planted import Plan, planted_run, planted_sweep

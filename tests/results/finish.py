@@ -6,8 +6,8 @@ from typing import Any
 
 from harness.results import storage
 from harness.results.digests import write_result_json
+from harness.results.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
-from harness.results.lock import LOCK_FILE
 from harness.results.manifest import Manifest
 
 
@@ -21,6 +21,16 @@ def folder_bytes(out: Path) -> dict[str, bytes]:
     """Content of every file below a folder but the lock, by its path there."""
     files = (path for path in out.rglob("*") if path.is_file() and path.name != LOCK_FILE)
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def write_run(
+    out: Path, cells: Sequence[storage.Cell], *, planned: int | None = None, failures: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Write these cells and finish their run; the summary's content. By default nothing else was planned."""
+    for cell in cells:
+        storage.write_cell(out, cell)
+    every = len(cells) + len(failures or {}) if planned is None else planned
+    return finish_run(out, keys=[cell.key for cell in cells], planned=every, failures=failures)
 
 
 def finish_run(

@@ -38,7 +38,7 @@ def test_a_paper_is_no_placement(tmp_path: Path) -> None:
         (lambda c: c["tried"][0].update(mean="low"), r"tried\[0\].mean"),
         (lambda c: c["rankings"][0].update(mode="guess"), "guess"),
         (lambda c: c["best"][0].update(stations=["left_elbow"]), "left_elbow"),
-        (lambda c: c["worth"][0].update(candidate="nose"), "nose"),
+        (lambda c: c["contributions"][0].update(candidate="nose"), "nose"),
     ],
 )
 def test_damage_is_named(placement: PlacementFindings, tmp_path: Path, damage: Damage, said: str) -> None:

@@ -50,12 +50,11 @@ def test_the_ratio_is_that_of_the_second_from_one_second_after_the_last_bad_fram
         recoveries = RecoveryCollector()
         for cell in order:
             recoveries.add(cell)
-        (found,) = recoveries.pairs()
-        assert (found.disturbance, found.disturbed_deg, found.undisturbed_deg) == ("one_off", 2.5, 2.0)
-        assert found.ratio == 1.25
-        assert found.during == pytest.approx(30.0 / 9.0)
-        assert found.back_after_s == pytest.approx(1.025)
-        assert found.status_right == 1.0
+        (found,) = recoveries.rows()
+        assert (found["disturbance"], found["disturbed_deg"], found["undisturbed_deg"]) == ("one_off", 2.5, 2.0)
+        assert (found["ratio"], found["status_right"]) == (1.25, 1.0)
+        assert found["during"] == pytest.approx(30.0 / 9.0)
+        assert found["back_after_s"] == pytest.approx(1.025)
 
 
 @pytest.mark.parametrize(("back_s", "expected"), [(0.0, 1.0 / 40.0), (0.5, 0.525), (3.0, None)])
@@ -63,10 +62,10 @@ def test_how_long_it_took_to_come_back(bent: Callable[..., Cell], back_s: float,
     recoveries = RecoveryCollector()
     recoveries.add(bent("none", 2.0))
     recoveries.add(bent("all_lost", course(TIME_S, (0.0, 8.0), (LAST_BAD_S + back_s + 0.01, 2.0))))
-    (found,) = recoveries.pairs()
+    (found,) = recoveries.rows()
     # a mean over 0.25 s of which part is still bad is at most 1.5 times as large with one bad frame of ten at most
-    assert found.back_after_s == (None if expected is None else pytest.approx(expected, abs=1.0 / 40.0 + 1e-9))
-    assert found.ratio == pytest.approx(4.0 if back_s == 3.0 else 1.0)
+    assert found["back_after_s"] == (None if expected is None else pytest.approx(expected, abs=1.0 / 40.0 + 1e-9))
+    assert found["ratio"] == pytest.approx(4.0 if back_s == 3.0 else 1.0)
 
 
 def test_status_is_held_against_what_the_readings_call_for(bent: Callable[..., Cell]) -> None:
@@ -81,7 +80,7 @@ def test_status_is_held_against_what_the_readings_call_for(bent: Callable[..., C
         recoveries = RecoveryCollector()
         recoveries.add(bent("none", 2.0))
         recoveries.add(bent("all_lost", 2.0, status=said[name], **readings))
-        assert recoveries.pairs()[0].status_right == pytest.approx(share, abs=1.1 / judged.sum()), name
+        assert recoveries.rows()[0]["status_right"] == pytest.approx(share, abs=1.1 / judged.sum()), name
 
 
 def test_only_twins_are_paired(bent: Callable[..., Cell], make_cell: MakeCell) -> None:
@@ -91,7 +90,7 @@ def test_only_twins_are_paired(bent: Callable[..., Cell], make_cell: MakeCell) -
     recoveries.add(bent("one_lost", 3.0, method="mean_pose"))
     elsewhere = {"kind": "one_lost", "lasts_s": 1.0, "begins_s": 3.0, "ends_s": 4.0}
     recoveries.add(bent("one_lost", 3.0, defined_by={"clip": "walk_01", "disturbance": elsewhere}))
-    assert recoveries.pairs() == []
+    assert recoveries.rows() == []
 
 
 def test_a_take_that_ends_too_soon_tells_nothing(bent: Callable[..., Cell]) -> None:
@@ -99,7 +98,7 @@ def test_a_take_that_ends_too_soon_tells_nothing(bent: Callable[..., Cell]) -> N
     recoveries = RecoveryCollector()
     for kind in ("none", "one_lost"):
         recoveries.add(bent(kind, 2.0, defined_by={"clip": "walk_01", "disturbance": {"kind": kind, **late}}))
-    assert [found.judged for found in recoveries.pairs()] == [0]
+    assert [found["evaluated_frames"] for found in recoveries.rows()] == [0]
     (row,) = tabulate_recovery(json.loads(json.dumps(to_json_types(recoveries.rows()))))
     assert (row["clips"], row["after"]) == (0, {"one_lost": None})
 

@@ -18,12 +18,12 @@ from harness.core.files import TEMPORARY, to_json_types
 from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
-from harness.results.cell import as_row, read_row
+from harness.results.cell import as_row, cell_folder, read_row
 from harness.results.digests import file_digest
+from harness.results.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
 from harness.results.integrity import check_row
-from harness.results.lock import LOCK_FILE
-from tests.results.finish import finish_run, folder_bytes, make_run
+from tests.results.finish import finish_run, folder_bytes, make_run, write_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 
 MakeCell = Callable[..., storage.Cell]
@@ -94,10 +94,9 @@ def test_lag_and_standard_deviations_are_kept(run_folder: Path, make_cell: MakeC
 def test_rows_of_versions_without_lag_and_standard_deviations_are_read(run_folder: Path, make_cell: MakeCell) -> None:
     """A folder that such a version wrote has neither column in cell.json, index, summary.json and summary.csv."""
     cell = make_cell()
-    make_run(run_folder, manifest())
-    folder = storage.write_cell(run_folder, cell)
+    write_run(run_folder, [cell])
+    folder = cell_folder(run_folder, cell.key)
     assert not {"lag", "sigma_scores"} & set(read_json(folder / "cell.json"))
-    finish_run(run_folder, keys=[cell.key], planned=1)
     head, _ = (run_folder / "summary.csv").read_text().splitlines()
     assert not {"lag", "sigma_coverage_1"} & set(head.split(","))
 
@@ -119,30 +118,20 @@ def test_rows_of_versions_without_lag_and_standard_deviations_are_read(run_folde
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "found"),
+    ("part", "name", "value", "found"),
     [
-        ("sigma_coverage_1", 1.5, "sigma_coverage_1 is 1.5"),
-        ("sigma_width_deg", -1.0, "sigma_width_deg is -1.0"),
-        ("sigma_log_score", None, "sigma_log_score is None"),
+        ("sigma_scores", "sigma_coverage_1", 1.5, "sigma_coverage_1 is 1.5"),
+        ("sigma_scores", "sigma_width_deg", -1.0, "sigma_width_deg is -1.0"),
+        ("sigma_scores", "sigma_log_score", None, "sigma_log_score is None"),
+        ("defined_by", "lag", -2, "defined_by.lag: expected a number of frames, found -2"),
     ],
 )
-def test_impossible_scores_of_standard_deviations_are_refused(
-    run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], name: str, value: float | None, found: str
+def test_impossible_scores_of_standard_deviations_and_lags_are_refused(
+    run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], part: str, name: str, value: object, found: str
 ) -> None:
-    make_run(run_folder, manifest())
     folder = storage.write_cell(run_folder, stating(make_cell, judge))
-    scores = read_json(folder / "cell.json")["sigma_scores"]
-    rewrite_json(folder / "cell.json", sigma_scores={**scores, name: value})
+    rewrite_json(folder / "cell.json", **{part: {**read_json(folder / "cell.json")[part], name: value}})
     with pytest.raises(BadFile, match=found):
-        storage.read_cell(folder)
-
-
-def test_an_impossible_lag_is_refused(run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any]) -> None:
-    make_run(run_folder, manifest())
-    folder = storage.write_cell(run_folder, stating(make_cell, judge))
-    conditions = read_json(folder / "cell.json")["defined_by"]
-    rewrite_json(folder / "cell.json", defined_by={**conditions, "lag": -2})
-    with pytest.raises(BadFile, match=r"defined_by.lag: expected a number of frames, found -2"):
         storage.read_cell(folder)
 
 
@@ -158,10 +147,7 @@ def test_an_impossible_lag_is_refused(run_folder: Path, make_cell: MakeCell, jud
 def test_impossible_rows_of_a_summary_are_refused(
     run_folder: Path, make_cell: MakeCell, judge: Callable[..., Any], part: str, changes: dict[str, Any], found: str
 ) -> None:
-    cell = stating(make_cell, judge)
-    make_run(run_folder, manifest())
-    storage.write_cell(run_folder, cell)
-    finish_run(run_folder, keys=[cell.key], planned=1)
+    write_run(run_folder, [stating(make_cell, judge)])
     content = read_json(run_folder / "summary.json")
     content[part][0].update(changes)
     write_json(run_folder / "summary.json", content)
@@ -224,19 +210,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[MakeCell], storage.Cell], str]] = {
 
 
 @pytest.mark.parametrize(("make", "fault"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_what_could_not_be_read_is_not_written(
-    run_folder: Path, make_cell: MakeCell, make: Callable[[MakeCell], storage.Cell], fault: str
-) -> None:
-    make_run(run_folder, manifest())
-    cell = make(make_cell)
-    with pytest.raises(ValueError, match=f"ik on walk_01 cannot be stored: .*{fault}"):
-        storage.write_cell(run_folder, cell)
-    assert not storage.has_cell(run_folder, cell.key)
-    assert list((run_folder / "cells").iterdir()) == []
-
-
-@pytest.mark.parametrize(("make", "fault"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_what_is_not_written_is_not_read_either(
+def test_what_could_not_be_read_is_not_written_and_not_read_either(
     run_folder: Path,
     make_cell: MakeCell,
     make: Callable[[MakeCell], storage.Cell],
@@ -244,10 +218,14 @@ def test_what_is_not_written_is_not_read_either(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     make_run(run_folder, manifest())
+    cell = make(make_cell)
+    with pytest.raises(ValueError, match=f"ik on walk_01 cannot be stored: .*{fault}"):
+        storage.write_cell(run_folder, cell)
+    assert list((run_folder / "cells").iterdir()) == []
     with monkeypatch.context() as careless:
         for name in ("find_cell_fault", "_find_impossible_content", "_find_impossible_frames"):
             careless.setattr(f"harness.results.cell.{name}", lambda content: "")
-        folder = storage.write_cell(run_folder, make(make_cell))
+        folder = storage.write_cell(run_folder, cell)
     with pytest.raises(BadFile, match=fault):
         storage.read_cell(folder)
 
@@ -267,11 +245,8 @@ def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
 
 
 def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: MakeCell) -> None:
-    make_run(run_folder, manifest())
     cells = [make_cell(0.01), make_cell(0.03, clip="walk_02", stations=("head", "torso"))]
-    for cell in cells:
-        storage.write_cell(run_folder, cell)
-    finish_run(run_folder, keys=[c.key for c in cells], planned=2)
+    write_run(run_folder, cells)
     text = (run_folder / "summary.csv").read_text()
     assert text.startswith(ISSUE_COLUMNS + ",")
     rows = list(csv.reader(text.splitlines()))
@@ -284,11 +259,8 @@ def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: Mak
 
 def test_no_name_in_the_table_is_a_formula(run_folder: Path, make_cell: MakeCell) -> None:
     """A spreadsheet runs what begins with such a sign; numbers below 0 stay numbers."""
-    make_run(run_folder, manifest())
     names = {"clip": "=1+1", "method": "-2+3", "behaviour": "@SUM(A1)", "scenario": "+cmd"}
-    cell = make_cell(0.01, **names, varied={"-k": -0.5, "name": "=x"})
-    storage.write_cell(run_folder, cell)
-    finish_run(run_folder, keys=[cell.key], planned=1)
+    write_run(run_folder, [make_cell(0.01, **names, varied={"-k": -0.5, "name": "=x"})])
     (row,) = csv.DictReader((run_folder / "summary.csv").read_text().splitlines())
     assert {name: row[name] for name in names} == {name: f"'{text}" for name, text in names.items()}
     assert (row["vary.-k"], row["vary.name"], row["varied"]) == ("-0.5", "'=x", "'-k=-0.5 name==x")
@@ -296,10 +268,7 @@ def test_no_name_in_the_table_is_a_formula(run_folder: Path, make_cell: MakeCell
 
 
 def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: Path, make_cell: MakeCell) -> None:
-    cells = [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")]
-    for cell in cells:
-        storage.write_cell(run_folder, cell)
-    content = finish_run(run_folder, keys=[c.key for c in cells], planned=2)
+    content = write_run(run_folder, [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")])
     (method,) = content["methods"]
     mpjpe = method["metrics"]["mpjpe_mm"]
     assert mpjpe["mean"] == pytest.approx(30.0)
@@ -314,17 +283,14 @@ def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, ma
     cell = make_cell()
     uneven = {**cell.scores.per_frame, "joint_angle_rms_deg": np.where(np.arange(400) < 100, 2.0, 0.0)}
     scores = type(cell.scores)(cell.metrics, uneven, cell.scores.per_joint, cell.scores.scored)
-    storage.write_cell(run_folder, make_cell(scores=scores))
-    content = finish_run(run_folder, keys=[cell.key], planned=1)
+    content = write_run(run_folder, [make_cell(scores=scores)])
     assert content["methods"][0]["metrics"]["joint_angle_rms_deg"]["frame_weighted"] == pytest.approx(1.0)
 
 
 def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: MakeCell) -> None:
     cells = [make_cell(0.01 * n, clip=f"c{n}", inputs=i, split=p) for n, (i, p) in
              enumerate([("pos", "block"), ("pos", "subject"), ("pos+ori", "block")])]  # fmt: skip
-    for cell in cells:
-        storage.write_cell(run_folder, cell)
-    content = finish_run(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
+    content = write_run(run_folder, cells, failures={"ik on d": "boom"})
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert content["outcome"] == "incomplete"
     assert (content["cells_finished"], content["cells_planned"]) == (3, 4)
@@ -408,32 +374,24 @@ def test_a_folder_of_other_files_is_refused_untouched(tmp_path: Path) -> None:
         ("frames.npz", b""),
         ("frames.npz", b"PK\x03\x04cut"),
         ("frames.npz", None),
+        ("bone_m", "long"),
+        ("bone_m", [[1, 2]]),
+        ("notes", 3),
+        ("key", None),
     ],
 )
-def test_a_broken_cell_is_a_clear_refusal(
-    run_folder: Path, make_cell: MakeCell, file: str, content: bytes | None
+def test_a_broken_file_or_field_of_a_cell_is_a_clear_refusal(
+    run_folder: Path, make_cell: MakeCell, file: str, content: Any
 ) -> None:
     folder = storage.write_cell(run_folder, make_cell())
-    if content is None:
+    if "." not in file:
+        fields = {**read_json(folder / "cell.json"), file: content}
+        write_json(folder / "cell.json", {name: value for name, value in fields.items() if value is not None})
+    elif content is None:
         (folder / file).unlink()
     else:
         (folder / file).write_bytes(content)
     with pytest.raises(BadFile, match=r"cell\.json|frames\.npz|" + folder.name):
-        storage.read_cell(folder)
-
-
-@pytest.mark.parametrize(("field", "value"), [("bone_m", "long"), ("bone_m", [[1, 2]]), ("notes", 3), ("key", None)])
-def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
-    run_folder: Path, make_cell: MakeCell, field: str, value: object
-) -> None:
-    folder = storage.write_cell(run_folder, make_cell())
-    content = read_json(folder / "cell.json")
-    if value is None:
-        del content[field]
-    else:
-        content[field] = value
-    write_json(folder / "cell.json", content)
-    with pytest.raises(BadFile, match=folder.name):
         storage.read_cell(folder)
 
 
@@ -481,12 +439,21 @@ def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
 def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
     run_folder: Path, make_cell: MakeCell, change: dict[str, object], message: str
 ) -> None:
-    key = make_cell().key
-    storage.write_cell(run_folder, make_cell())
-    content = finish_run(run_folder, keys=[key], planned=1) | change
+    content = write_run(run_folder, [make_cell()]) | change
     write_json(run_folder / "summary.json", {name: value for name, value in content.items() if value is not None})
     with pytest.raises(BadFile, match=message):
         storage.read_summary(run_folder)
+
+
+def test_a_recovery_row_of_an_earlier_version_has_its_key_renamed(run_folder: Path, make_cell: MakeCell) -> None:
+    storage.write_cell(run_folder, make_cell())
+    content = finish_run(run_folder, keys=[make_cell().key], planned=1)
+    names = ("method", "inputs", "split", "behaviour", "clip", "disturbance")
+    numbers = ("disturbed_deg", "undisturbed_deg", "during", "ratio", "back_after_s", "status_right")
+    row = {**dict.fromkeys(names, "a"), **dict.fromkeys(numbers, 1.0), "judged": 40}
+    write_json(run_folder / "summary.json", content | {"recovery": [row]})
+    (read,) = storage.read_summary(run_folder)["recovery"]
+    assert (read["evaluated_frames"], "judged" in read) == (40, False)
 
 
 def test_a_run_without_an_index_is_refused_with_advice(run_folder: Path, make_cell: MakeCell) -> None:
@@ -534,9 +501,7 @@ def test_known_and_new_performers_and_varied_values_are_never_pooled(run_folder:
         make_cell(0.01, clip=f"c{n}", performer=who, varied={"components.echo.share": share, "noise": "clean"})
         for n, (who, share) in enumerate(zip(("known", "known", "new"), shares, strict=True))
     ]
-    for cell in cells:
-        storage.write_cell(run_folder, cell)
-    content = finish_run(run_folder, keys=[c.key for c in cells], planned=3)
+    content = write_run(run_folder, cells)
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert [row["varied"]["components.echo.share"] for row in content["behaviours"]] == shares
     assert [row["performer"] for row in content["cells"]] == ["known", "known", "new"]

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.cli import main
 from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
@@ -22,9 +21,9 @@ from harness.results.cell import read_row
 from harness.results.digests import file_digest
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.integrity import check_cells, check_folder
-from harness.results.loaded_run import load_run
-from harness.results.reader import load_results
+from harness.results.reader import load_results, load_run
 from harness.results.storage import read_cells
+from tests.command import Command
 from tests.planted import Plan, planted_run
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
@@ -236,10 +235,9 @@ def test_tampering_is_refused_by_every_reader(run: Path, name: str) -> None:
         ("plot", "run"),
     ],
 )
-def test_commands_refuse_in_one_line(run: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_refuse_in_one_line(run: Path, words: tuple[str, ...], command: Command) -> None:
     halve(run / "summary.json", "mean")
-    assert main(words) == Outcome.REFUSED.exit_code
-    said = capsys.readouterr()
+    said = command(*words, code=Outcome.REFUSED.exit_code)
     lines = said.err.strip().splitlines()
     assert len(lines) == 1 or lines[1:] == [Outcome.REFUSED.word], lines
     assert lines[0].startswith("harness: run/summary.json: damaged or edited")
@@ -249,12 +247,11 @@ def test_commands_refuse_in_one_line(run: Path, words: tuple[str, ...], capsys: 
 @pytest.mark.parametrize("words", [("table", "run"), ("plot", "run", "--out", "a.pdf"), ("view", "run")])
 @pytest.mark.parametrize("file", ["cell.json", "frames.npz"])
 def test_no_number_of_a_run_with_a_damaged_cell_is_printed(
-    run: Path, words: tuple[str, ...], file: str, capsys: pytest.CaptureFixture[str]
+    run: Path, words: tuple[str, ...], file: str, command: Command
 ) -> None:
     path = cells(run)[-1] / file
     path.write_bytes(path.read_bytes()[:-1])
-    assert main(words) == Outcome.REFUSED.exit_code
-    said = capsys.readouterr()
+    said = command(*words, code=Outcome.REFUSED.exit_code)
     assert said.out.strip() in ("", Outcome.REFUSED.word)
     assert f"{file}: " in said.err
     assert not Path("a.pdf").exists()

@@ -41,7 +41,7 @@ def test_the_doctor_finds_these_scores_sound(take: BodyMotion) -> None:
     checks = doctor.check_scores([take])
     assert all(check.ok for check in checks), [c for c in checks if not c.ok]
     assert len({check.name for check in checks}) == len(checks) >= 6
-    assert set(checks[0].as_dict()) == {"name", "ok", "detail"}
+    assert set(checks[0]._asdict()) == {"name", "ok", "detail"}
 
 
 @pytest.mark.usefixtures("_without_evo")

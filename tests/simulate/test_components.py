@@ -15,18 +15,10 @@ from scipy import stats
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput, UnknownName
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.echo import Echo
-from harness.simulate.components.excursion import Excursion
-from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.faults import LostStation, OrientationOffset, PositionOffset
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.orientation_offset import OrientationOffset
-from harness.simulate.components.position_offset import PositionOffset
-from harness.simulate.components.session_bias import SessionBias
-from harness.simulate.components.speed_error import SpeedError
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import Clock, DriftNoise, SessionBias, SpeedError, WhiteNoise
+from harness.simulate.components.transient import Dropout, Echo, Excursion
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.readings import SimulatedReadings
 from tests.simulate.conftest import Still

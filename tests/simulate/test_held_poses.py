@@ -11,9 +11,9 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.mocap import synthetic
+from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.held_poses import hold_poses, hold_times_s
 from harness.simulate.link import TrackerConfig
-from harness.simulate.mounting import perturb_mounts
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.simulation import simulate_tracker
 from harness.stream.frame import TrackerFrame

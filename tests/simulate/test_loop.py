@@ -11,9 +11,8 @@ from harness.core.motion import BodyMotion
 from harness.simulate.loop import looping_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import SHORT_LIST
-from harness.stream.codec.reader import FrameReader
+from harness.stream.codec.reader import ByteCapture, FrameReader
 from harness.stream.emulator.device import Device
 from tests.simulate.conftest import worn
 

@@ -9,9 +9,8 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.simulate.components.mount import MountOffset, MountSlip
+from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact
-from harness.simulate.components.strap_slip import StrapSlip
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import ConstellationSettings

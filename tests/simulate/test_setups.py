@@ -12,16 +12,10 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import DriftNoise
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.echo import Echo
-from harness.simulate.components.excursion import Excursion
-from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.faults import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.session_bias import SessionBias
-from harness.simulate.components.speed_error import SpeedError
-from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.components.stationary import Clock, DriftNoise, SessionBias, SpeedError, WhiteNoise
+from harness.simulate.components.transient import Dropout, Echo, Excursion
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.simulation import Simulation, simulate_tracker

@@ -15,15 +15,14 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.simulate.components.clock import Clock
-from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.faults import LostStation
 from harness.simulate.components.mount import MountSlip
+from harness.simulate.components.stationary import Clock
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import CaptureStream, FrameReader
+from harness.stream.codec.reader import ByteCapture, CaptureStream, FrameReader
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.experiment.playback import Playback
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.emulator import serve_emulator

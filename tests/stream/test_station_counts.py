@@ -3,6 +3,7 @@
 import numpy as np
 
 from harness.stream.frame import TrackerFrame
+from harness.stream.line_events import EventCounter, LineEvent, LineEventKind
 from harness.stream.station_counts import StationCounts
 
 
@@ -31,3 +32,14 @@ def test_a_reading_is_a_position_or_an_orientation_and_only_its_quality_counts()
     assert counts.suspect.tolist() == [0, 0, 2]
     assert counts.loss.tolist() == [0.0, 0.0, 1.0]
     assert counts.mean_quality.tolist() == [0.5, 1.0, 0.0]
+
+
+def test_garbage_is_shown_once_and_counted_and_changes_are_always_shown() -> None:
+    shown: list[str] = []
+    events = EventCounter(shown.append)
+    kinds: list[LineEventKind] = ["garbage", "unplugged", "connected", "garbage", "unplugged", "garbage"]
+    for k, kind in enumerate(kinds):
+        events(LineEvent(kind, float(k), float(k), f"{kind} {k}"))
+    assert shown == ["garbage 0", "unplugged 1", "connected 2", "unplugged 4"]
+    assert events.counts() == {"garbage": 3, "unplugged": 2, "connected": 1}
+    assert len(events.events) == 6

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 

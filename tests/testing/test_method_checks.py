@@ -1,6 +1,5 @@
 """The contract suite passes correct methods, and each rule alone detects a method with one fault."""
 
-import json
 import os
 import random
 import threading
@@ -15,7 +14,6 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body, tpose
-from harness.cli import main
 from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status
@@ -26,6 +24,7 @@ from harness.testing import method_checks
 from harness.testing.contract_case import make_case
 from harness.testing.method_checks import MethodContractError, RuleResult, check_method, check_rules
 from harness.testing.rules import RULES
+from tests.command import Command
 
 
 @dataclass(frozen=True)
@@ -495,9 +494,8 @@ def test_the_first_violation_is_raised_with_its_rule() -> None:
 
 
 @pytest.mark.long
-def test_the_verb_prints_a_line_for_each_rule(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", "mean_pose"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_the_verb_prints_a_line_for_each_rule(command: Command) -> None:
+    lines = command("check", "mean_pose").lines
     assert (lines[0], lines[-1]) == ("mean_pose", "pass")
     assert [line.split(": ")[0] for line in lines[1:-1]] == [f"  ok    {rule}" for rule in RULES]
     assert all(line.split(": ", 1)[1] for line in lines[1:-1])
@@ -505,7 +503,7 @@ def test_the_verb_prints_a_line_for_each_rule(capsys: pytest.CaptureFixture[str]
 
 @pytest.mark.usefixtures("_without_process_rule")
 def test_the_verb_reports_violations_of_a_users_method(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     """`module:Class` is imported from the working folder; a violation is `regressed`, an unknown class is refused."""
     (tmp_path / "always_solved.py").write_text(
@@ -513,10 +511,9 @@ def test_the_verb_reports_violations_of_a_users_method(
         "def Mine():\n    print('hello')\n    return Standing(AlwaysSolved)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert main(["check", "always_solved:Mine", "--json"]) == 1
-    content = json.loads(capsys.readouterr().out)
+    content = command("check", "always_solved:Mine", "--json", code=1).content
     assert content["outcome"] == "regressed"
     (violation,) = [result for result in content["methods"]["always_solved:Mine"] if not result["ok"]]
     assert violation["rule"] == "the status reports lost stations"
     assert "the status was SOLVED while 4 of 6 stations reported nothing" in violation["seen"]
-    assert main(["check", "always_solved:Yours"]) == 2
+    command("check", "always_solved:Yours", code=2)

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from harness.experiment.scenario import Scenario, load_scenario
 from harness.results import manifest
 from harness.results.manifest import Manifest
 from harness.results.reader import load_results
-from harness.testing.github_annotations import format_annotations
+from harness.testing.plugin import format_annotations
 from harness.testing.regression_gate import RegressionGate, scenario_from_manifest
 from tests.compare.sides import side, write_run
 from tests.testing import upright
@@ -74,21 +74,27 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
     return pytester
 
 
-def gated(project: pytest.Pytester, source: str = ONE.format(""), *options: str) -> pytest.RunResult:
+def gated(
+    project: pytest.Pytester, source: str = ONE.format(""), *options: str, says: Sequence[str] = (), **outcomes: int
+) -> pytest.RunResult:
+    """Run a test, which has these outcomes, by default passes, and prints lines that match these patterns."""
     project.makepyfile(source)
-    return project.runpytest_inprocess("-p", "harness.testing.plugin", "-p", "no:cacheprovider", *options)
+    result = project.runpytest_inprocess("-p", "harness.testing.plugin", "-p", "no:cacheprovider", *options)
+    result.assert_outcomes(**(outcomes or {"passed": 1}))
+    if says:
+        result.stdout.fnmatch_lines([*says])
+    return result
 
 
 def test_a_method_that_is_as_it_was_passes(project: pytest.Pytester) -> None:
-    gated(project).assert_outcomes(passed=1)
+    gated(project)
     assert os.environ["OMP_NUM_THREADS"] == "3"
 
 
 def test_a_worse_method_fails_with_the_table(project: pytest.Pytester) -> None:
     CHANGE["now"] = 1.2
-    result = gated(project)
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["B is worse than A in 3 of 3 gated lines on 8 takes: *", "A: baseline main"])
+    says = ["B is worse than A in 3 of 3 gated lines on 8 takes: *", "A: baseline main"]
+    result = gated(project, says=says, failed=1)
     result.stdout.fnmatch_lines(["*mine:Mine*mpjpe_mm*worse*8*"])
     result.stdout.no_fnmatch_line("*Traceback*")
     result.stdout.no_fnmatch_line("*gate.py*")
@@ -96,14 +102,13 @@ def test_a_worse_method_fails_with_the_table(project: pytest.Pytester) -> None:
 
 def test_a_better_method_passes_and_one_may_be_held_to_another(project: pytest.Pytester) -> None:
     CHANGE["now"] = 0.8
-    result = gated(project, ONE.replace("mine:Mine", "new:New").format(", baseline_method='ik'"))
-    result.assert_outcomes(passed=1)
+    gated(project, ONE.replace("mine:Mine", "new:New").format(", baseline_method='ik'"))
 
 
 def test_other_metrics_may_be_chosen(project: pytest.Pytester) -> None:
     CHANGE["now"] = 1.2
-    result = gated(project, ONE.format(", metrics=('mpjpe_mm',)"))
-    result.stdout.fnmatch_lines(["B is worse than A in 1 of 1 gated line on 8 takes: *"])
+    says = ["B is worse than A in 1 of 1 gated line on 8 takes: *"]
+    gated(project, ONE.format(", metrics=('mpjpe_mm',)"), says=says, failed=1)
 
 
 def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,9 +119,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
     monkeypatch.setattr(engine, "run", otherwise)
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
-    result = gated(project)
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*worse than A: inputs differ: tracker.rate_hz: 40* against 60*"])
+    result = gated(project, says=["*worse than A: inputs differ: tracker.rate_hz: 40* against 60*"], failed=1)
     result.stdout.fnmatch_lines(["::error file=test_*.py,line=1,title=not comparable::inputs differ: *"])
 
 
@@ -128,9 +131,7 @@ def test_cells_that_failed_are_told_with_their_traceback(
         return Outcome.INCOMPLETE
 
     monkeypatch.setattr(engine, "run", failing)
-    result = gated(project)
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*planned cells are missing*mine:Mine on walk_09*", "Traceback: no pose"])
+    gated(project, says=["*planned cells are missing*mine:Mine on walk_09*", "Traceback: no pose"], failed=1)
 
 
 @pytest.mark.parametrize(
@@ -143,26 +144,22 @@ def test_cells_that_failed_are_told_with_their_traceback(
     ],
 )
 def test_what_cannot_be_gated_fails_in_one_line(project: pytest.Pytester, call: str, told: str) -> None:
-    result = gated(project, f"def test_mine(harness_gate):\n    harness_gate({call})\n")
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines([f"harness: {told}"])
+    source = f"def test_mine(harness_gate):\n    harness_gate({call})\n"
+    result = gated(project, source, says=[f"harness: {told}"], failed=1)
     result.stdout.no_fnmatch_line("*exception*")
 
 
 def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> None:
     source = ONE.format(", scenario='demo'").replace("'main'", "'fresh'")
-    result = gated(project, source, "--harness-save")
-    result.assert_outcomes(skipped=1)
-    result.stdout.fnmatch_lines(
-        [
-            "harness: running mine:Mine, which takes minutes",
-            "harness: mine:Mine was saved as baseline *results/baselines/fresh; nothing was compared",
-        ]
-    )
+    says = [
+        "harness: running mine:Mine, which takes minutes",
+        "harness: mine:Mine was saved as baseline *results/baselines/fresh; nothing was compared",
+    ]
+    gated(project, source, "--harness-save", says=says, skipped=1)
     kept = load_results(project.path / "results/baselines/fresh")
     assert {cell.method for cell in kept.cells} == {"mine:Mine"}
     assert kept.manifest.inputs["name"] == "demo"
-    gated(project, source).assert_outcomes(passed=1)
+    gated(project, source)
 
 
 def test_a_baseline_is_renewed_on_its_own_scenario_but_loses_no_method(project: pytest.Pytester) -> None:
@@ -173,9 +170,8 @@ def test_a_baseline_is_renewed_on_its_own_scenario_but_loses_no_method(project: 
         "mine:Mine", "own"
     )
     assert load_results(replaced).manifest.inputs["name"] == "demo"
-    result = gated(project, ONE.format(""), "--harness-save")
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["harness: Baseline main also has ik, which would be lost.*"])
+    says = ["harness: Baseline main also has ik, which would be lost.*"]
+    gated(project, ONE.format(""), "--harness-save", says=says, failed=1)
 
 
 def test_folders_are_chosen_by_options_and_runs_are_kept_apart(project: pytest.Pytester) -> None:
@@ -184,8 +180,7 @@ def test_folders_are_chosen_by_options_and_runs_are_kept_apart(project: pytest.P
         f"def test_{name}(harness_gate):\n    harness_gate('{name}:Mine', baseline='main', baseline_method='ik')\n"
         for name in ("one", "two")
     )
-    result = gated(project, source, "--harness-baselines", "kept", "--harness-out", "runs")
-    result.assert_outcomes(passed=2)
+    gated(project, source, "--harness-baselines", "kept", "--harness-out", "runs", passed=2)
     assert len(list((project.path / "runs").glob("tiny-*/summary.json"))) == 2
     command = json.loads(next((project.path / "runs").glob("*/manifest.json")).read_text())["circumstances"]["command"]
     assert command.startswith("pytest test_folders")
@@ -193,7 +188,7 @@ def test_folders_are_chosen_by_options_and_runs_are_kept_apart(project: pytest.P
 
 def test_reports_are_told_every_gated_line(project: pytest.Pytester) -> None:
     CHANGE["now"] = 1.2
-    gated(project, ONE.format(""), "--junit-xml", "report.xml", "-W", "error").assert_outcomes(failed=1)
+    gated(project, ONE.format(""), "--junit-xml", "report.xml", "-W", "error", failed=1)
     found = ElementTree.parse(project.path / "report.xml").iter("property")  # noqa: S314, it is our own
     properties = {str(item.get("name")): str(item.get("value")) for item in found}
     assert properties["harness.outcome"] == "regressed"
@@ -206,13 +201,12 @@ def test_reports_are_told_every_gated_line(project: pytest.Pytester) -> None:
 
 def test_github_is_told_beside_the_test(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     CHANGE["now"] = 1.2
-    assert "::error" not in gated(project).stdout.str()
+    assert "::error" not in gated(project, failed=1).stdout.str()
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.setenv("GITHUB_WORKSPACE", str(project.path.parent))
     source = "def test_nothing():\n    pass\n\n" + ONE.format("")
-    result = gated(project, source)
-    place = f"::error file={project.path.name}/test_*.py,line=4"
-    result.stdout.fnmatch_lines([f"{place},title=mpjpe_mm worse::+* mm, 95 %25 interval *"])
+    says = [f"::error file={project.path.name}/test_*.py,line=4,title=mpjpe_mm worse::+* mm, 95 %25 interval *"]
+    result = gated(project, source, says=says, passed=1, failed=1)
     assert result.stdout.str().count("::error") == 3
 
 
@@ -260,7 +254,6 @@ def test_other_projects_pay_nothing_for_the_plugin() -> None:
 def test_a_project_without_gates_sees_no_change(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     result = gated(pytester, "def test_nothing():\n    pass\n", "-W", "error")
-    result.assert_outcomes(passed=1)
     assert "harness." not in result.stdout.str()
     assert "::" not in result.stdout.str()
 

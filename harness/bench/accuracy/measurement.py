@@ -27,20 +27,15 @@ from harness.bench.accuracy.conditions import (
 )
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
+from harness.bench.common import fresh_methods, run_benchmark_cells
 from harness.compare.ranking import MethodRanking
-from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.experiment.cells import check_names, clear_caches
-from harness.experiment.engine import run_cells
-from harness.experiment.executors import TaskExecutor
 from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.remote_method import close_methods, resolve_method
+from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import Scenario
-from harness.mocap.library import LibraryFolders
 from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell
 from harness.results.manifest import current_circumstances
-from harness.study.papers.paper_study import open_study
 
 _QUICK = "the quick form has one seed and few clips"
 
@@ -78,42 +73,23 @@ def measure_accuracy(
     *,
     seeds: Sequence[int] = SEEDS,
     quick: bool = False,
-    folder: LibraryFolders | None = None,
-    executor: TaskExecutor,
-    workers: int = 1,
-    command: str = "",
-    progress: ProgressCallback = lambda cell, done, planned: None,
+    **options: Any,
 ) -> AccuracyReport:
     """Run or resume the cells in `out`, and compare `method` with the stored errors and today's other methods.
 
-    `folder` is the library of real motion, by default HARNESS_MOCAP. BadInput without one, for a method with a lag,
-    for a folder that holds something else, and when clips or seeds differ from the stored ones.
+    `options` are those of `run_benchmark_cells`, whose errors are raised. BadInput for a method with a lag, and when
+    clips or seeds differ from the stored ones.
     """
     refuse_lag(method)
     seeds = seeds[:1] if quick else seeds
     earlier = stored.first_seeds(seeds)
-    clear_caches()  # files may have changed since the last run
-    try:
-        conditions = quick_conditions() if quick else CONDITIONS
-        scenarios = plan_scenarios(conditions, method, seeds, quick=quick)
+    with fresh_methods():
+        scenarios = plan_scenarios(quick_conditions() if quick else CONDITIONS, method, seeds, quick=quick)
         lagged, no_lag = _plan_supported_lag(method, seeds, quick)
-        check_names([*scenarios, *lagged], folder)
-        with open_study(out, {"benchmark": "accuracy"}):
-            (out / "cells").mkdir(exist_ok=True)
-            results = run_cells(
-                [*scenarios, *lagged],
-                out,
-                folder=folder,
-                executor=executor,
-                command=command,
-                progress=progress,
-                workers=workers,
-            )
-            if results.failures:
-                return AccuracyReport(method, stored.title, quick, results.failures)
-            by_method = collect_errors(results.rows, out)
-    finally:
-        close_methods()
+        results = run_benchmark_cells("accuracy", [*scenarios, *lagged], out, **options)
+    if results.failures:
+        return AccuracyReport(method, stored.title, quick, results.failures)
+    by_method = collect_errors(results.rows, out)
     lag = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
     if quick:
         earlier = _same_clips(earlier, by_method[method])

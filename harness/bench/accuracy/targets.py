@@ -35,27 +35,23 @@ class Target:
     metric: str = ANGLE
 
 
-def _noise_targets(name: str, least: Sequence[float], goal: Sequence[float]) -> list[Target]:
-    presets = ("clean", "noise", "default")
-    return [Target(f"{name} {p}", f"{name}, {p}", a, b) for p, a, b in zip(presets, least, goal, strict=True)]
-
-
-def _performer_targets(name: str, performer: str, least: Sequence[float], goal: Sequence[float]) -> list[Target]:
-    return [
-        Target(f"{name} {performer}, {preset}", f"{name}, {preset}", a, b, performer)
-        for preset, a, b in zip(("clean", "default"), least, goal, strict=True)
-    ]
+def _targets(name: str, performer: str, least: Sequence[float], goal: Sequence[float]) -> list[Target]:
+    """The targets of a scenario's noise presets; those of one kind of performers leave out the preset `noise`."""
+    presets = ("clean", "default") if performer else ("clean", "noise", "default")
+    title = f"{name} {performer}," if performer else name
+    limits = zip(presets, least, goal, strict=True)
+    return [Target(f"{title} {preset}", f"{name}, {preset}", a, b, performer) for preset, a, b in limits]
 
 
 TARGETS = (
-    *_noise_targets("boxing", (0.95, 0.84, 0.84), (0.83, 0.75, 0.75)),
+    *_targets("boxing", "", (0.95, 0.84, 0.84), (0.83, 0.75, 0.75)),
     Target("boxing, torso's orientation, clean", "boxing_inputs, clean, pos+torso_ori", 0.92, 0.84),
     Target("boxing, positions, clean", "boxing_inputs, clean, pos", 0.94, 0.75),
     Target("boxing, mixed, clean", "boxing_inputs, clean, mixed", 0.95, 0.88),
-    *_performer_targets("walking", "known", (0.90, 0.72), (0.78, 0.62)),
-    *_performer_targets("walking", "new", (1.00, 0.97), (0.87, 0.85)),
-    *_performer_targets("jumping", "known", (0.87, 0.74), (0.76, 0.65)),
-    *_performer_targets("jumping", "new", (0.96, 0.93), (0.85, 0.84)),
+    *_targets("walking", "known", (0.90, 0.72), (0.78, 0.62)),
+    *_targets("walking", "new", (1.00, 0.97), (0.87, 0.85)),
+    *_targets("jumping", "known", (0.87, 0.74), (0.76, 0.65)),
+    *_targets("jumping", "new", (0.96, 0.93), (0.85, 0.84)),
     Target(
         "right hand silent, during, default",
         "recovery_boxing, default, right_hand silent",

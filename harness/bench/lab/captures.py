@@ -20,16 +20,14 @@ from harness.errors import UnknownName
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.rig import generate_rig, stretch_marks
-from harness.simulate.components.dropout import Dropout
-from harness.simulate.components.session_bias import SessionBias
+from harness.mocap.synthetic.takes import generate_rig, stretch_marks
+from harness.simulate.components.stationary import SessionBias
+from harness.simulate.components.transient import Dropout
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
-from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.faulty_capture import add_byte_faults
+from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.emulator.faults import Fault, add_byte_faults
 from harness.stream.recording.recording import record_capture
 
 SCENARIO = "lab"
@@ -51,6 +49,8 @@ LOST_SHARE, REPEATED_SHARE, SCALE, LATENCY_S = 0.05, 0.01, 0.003, 0.02
 LEAST_DRAW = 0.05
 """Least size of the draw of a session's scale. With a smaller one no scenario plants the scale, and the next seed of
 the session is taken."""
+WANTED = 0.95
+"""Share of the captures in which a fault has to be named, or nothing where there is none, and an error be small."""
 _NEXT_SEED = 1_000_000
 _PERFORMER, _SESSION = "p1", "boxing_p1_01"
 """Performer of the boxing, and the take that names the session of all boxing."""
@@ -85,30 +85,17 @@ class PlantedFault:
     line: tuple[Fault, ...] = ()
 
 
+def _component_fault(title: str, component: str, take: str = FIVE_MINUTES, **values: float) -> PlantedFault:
+    """Other values of an error component, each of which `characterize` has to name."""
+    numbers = tuple(PlantedNumber(f"components.{component}.{key}", value) for key, value in values.items())
+    seconds = SHORT_S if take == FIVE_MINUTES else math.inf
+    return PlantedFault(title, "characterize", numbers, take=take, seconds=seconds, components={component: values})
+
+
 PLANTED_FAULTS: Mapping[str, PlantedFault] = {
-    "white": PlantedFault(
-        "white noise x2",
-        "characterize",
-        (
-            PlantedNumber("components.white.position_m", 0.0015),
-            PlantedNumber("components.white.orientation_rad", math.radians(0.1)),
-        ),
-        components={"white": {"position_m": 0.0015, "orientation_rad": math.radians(0.1)}},
-    ),
-    "excursions": PlantedFault(
-        "excursions x3",
-        "characterize",
-        (PlantedNumber("components.excursion.onsets_per_min", 3.0),),
-        take=TWENTY_MINUTES,
-        seconds=math.inf,
-        components={"excursion": {"onsets_per_min": 3.0}},
-    ),
-    "echoes": PlantedFault(
-        "echoes x3",
-        "characterize",
-        (PlantedNumber("components.echo.share", 0.09),),
-        components={"echo": {"share": 0.09}},
-    ),
+    "white": _component_fault("white noise x2", "white", position_m=0.0015, orientation_rad=math.radians(0.1)),
+    "excursions": _component_fault("excursions x3", "excursion", TWENTY_MINUTES, onsets_per_min=3.0),
+    "echoes": _component_fault("echoes x3", "echo", share=0.09),
     "lost": PlantedFault(
         "station lost 5 %", "characterize", (PlantedNumber("components.dropout.share", LOST_SHARE, STATION),)
     ),
@@ -118,12 +105,7 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
         (PlantedNumber("timing.duplicate_share", REPEATED_SHARE),),
         line=(Fault("repeated", share=REPEATED_SHARE),),
     ),
-    "clock": PlantedFault(
-        "clock 80 ppm",
-        "characterize",
-        (PlantedNumber("components.clock.drift_ppm", 80.0),),
-        components={"clock": {"drift_ppm": 80.0}},
-    ),
+    "clock": _component_fault("clock 80 ppm", "clock", drift_ppm=80.0),
     "stamps": PlantedFault(
         "stamps after 5 h",
         "characterize",
@@ -160,6 +142,11 @@ PLANTED_FAULTS: Mapping[str, PlantedFault] = {
     EARLIER: PlantedFault("an earlier capture of the session", "validate", take=BOXING),
 }
 """Faults by kind."""
+
+
+def needed_captures(count: int, share: float = WANTED) -> int:
+    """Least number of captures of `count` that is this share of them or more."""
+    return math.ceil(share * count - 1e-9)
 
 
 def planted_capture(kind: str, seed: int, folder: Path, *, seconds: float = math.inf) -> Path:

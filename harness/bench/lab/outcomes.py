@@ -1,20 +1,18 @@
 """What a lab's verbs find in planted captures: computed in processes, and stored as one small file for each capture."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from harness.bench.lab.captures import NO_FAULTS, PLANTED_FAULTS, planted_capture
-from harness.bench.lab.registration_errors import registration_errors
-from harness.bench.lab.validated_captures import validate_planted
-from harness.core.fields import build
+from harness.bench.lab.validated_captures import registration_errors, validate_planted
 from harness.core.progress import ProgressCallback
-from harness.errors import BadFile, HarnessError
+from harness.errors import HarnessError
 from harness.experiment.executors import TaskExecutor
 from harness.measure.departures import Departure
-from harness.results.digests import check_key, read_result_json, write_result_json
+from harness.results.digests import check_key, read_record, write_record
 from harness.results.manifest import source_hash
 from harness.study.trust.characterization import characterize_capture
 
@@ -107,7 +105,7 @@ def find_outcome(kind: str, seed: int, out: Path) -> CaptureOutcome:
             outcome = CaptureOutcome(kind, seed, source_hash(), failure=str(error).replace(folder, "FOLDER"))
     path = outcome_path(out, kind, seed)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_result_json(path, asdict(outcome))
+    write_record(path, outcome)
     return outcome
 
 
@@ -116,7 +114,7 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
         against = validate_planted(kind, seed, folder)
         exchanged = tuple(f"{station}: {body}" for station, body in sorted(against.exchanged.items()))
         errors = registration_errors(against, seed) if kind in NO_FAULTS else {}
-        checks = stored_checks(against.checks)
+        checks = stored_checks(against.report.checks)
         return CaptureOutcome(kind, seed, source_hash(), checks, errors=errors, exchanged=exchanged)
     found = characterize_capture(planted_capture(kind, seed, folder))
     parameters = tuple(
@@ -145,10 +143,6 @@ def _read_outcome(path: Path) -> CaptureOutcome | None:
     """A stored outcome of this version of the source; None without one. BadFile for one of another kind or seed."""
     if not path.exists():
         return None
-    content = read_result_json(path, _STORED, _ADVICE)
-    try:
-        outcome = build(CaptureOutcome, content, "outcome")
-    except (TypeError, ValueError, HarnessError) as error:
-        raise BadFile(path, f"unusable content ({error})", _STORED, _ADVICE) from error
+    outcome = read_record(CaptureOutcome, path, _STORED, _ADVICE)
     check_key(path, f"{outcome.kind}/{outcome.seed:04d}", f"{path.parent.name}/{path.stem}", _STORED, _ADVICE)
     return outcome if outcome.source == source_hash() else None

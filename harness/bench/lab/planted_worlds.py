@@ -9,12 +9,12 @@ from itertools import combinations
 
 import numpy as np
 
-from harness.bench.lab.planted_errors import METRIC, load_planted_errors
+from harness.bench.lab.captures import needed_captures
+from harness.bench.stored_errors import METRICS, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
-from harness.study.trust.equivalence import judge_equivalence
-from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_pairs
+from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_equivalence, judge_pairs
 
 CLIPS = 12
 SIMULATED_SEEDS = 5
@@ -42,15 +42,9 @@ def same_profile_row(seeds: Sequence[int]) -> BenchmarkStatement:
     without = sum(
         all(pair.verdict != "contradict" for pair in judge_pairs(*draw_world(seed, METHODS), LEVEL)) for seed in seeds
     )
-    needed = _share(0.95, seeds)
-    return state_verdict(
-        "trust, same profile on both sides: no pair contradicts",
-        f"in {needed} of {len(seeds)} plans or more",
-        f"in {without}",
-        without >= needed,
-        "",
-        f"{len(METHODS)} methods, {CLIPS} clips, one capture of each, {SIMULATED_SEEDS} seeds",
-    )
+    needed = needed_captures(len(seeds), 0.95)
+    note = f"{len(METHODS)} methods, {CLIPS} clips, one capture of each, {SIMULATED_SEEDS} seeds"
+    return _least_row("trust, same profile on both sides: no pair contradicts", without, needed, seeds, note)
 
 
 def swapped_row(seeds: Sequence[int]) -> BenchmarkStatement:
@@ -59,19 +53,17 @@ def swapped_row(seeds: Sequence[int]) -> BenchmarkStatement:
     found = sum(
         finds_swap(seed, pairs[generator(seed, "swapped pair").integers(len(pairs))], captures=1) for seed in seeds
     )
-    needed, scatter = _share(0.8, seeds), typical_scatter()
+    needed, scatter = needed_captures(len(seeds), 0.8), typical_scatter()
     note = (
         f"the difference of two methods scatters by {scatter:.0%} of the error from one draw of the tracker's noise to "
         f"the next, and {CLIPS} captures leave {scatter / np.sqrt(CLIPS):.1%}"
     )
-    return state_verdict(
-        "trust, two methods swapped by 5 %: the pair contradicts",
-        f"in {needed} of {len(seeds)} plans or more",
-        f"in {found}",
-        found >= needed,
-        "",
-        note,
-    )
+    return _least_row("trust, two methods swapped by 5 %: the pair contradicts", found, needed, seeds, note)
+
+
+def _least_row(name: str, found: int, needed: int, seeds: Sequence[int], note: str) -> BenchmarkStatement:
+    held_to = f"in {needed} of {len(seeds)} plans or more"
+    return state_verdict(name, held_to, f"in {found}", found >= needed, "", note)
 
 
 def typical_scatter() -> float:
@@ -104,22 +96,12 @@ def equivalence_rows(seeds: Sequence[int]) -> list[BenchmarkStatement]:
     declared = {
         shift: sum(declares_equivalence(seed, shift * (-1.0) ** seed) for seed in seeds) for shift in (1.0, 0.0)
     }
-    most = len(seeds) // 10
+    most, name = len(seeds) // 10, "trust, true difference at the margin's edge: equivalence declared"
+    held_to, note = f"in {most} of {len(seeds)} plans or fewer", f"{RELATED[0]}, margin {MARGIN:.0%} of its mean error"
     return [
-        state_verdict(
-            "trust, true difference at the margin's edge: equivalence declared",
-            f"in {most} of {len(seeds)} plans or fewer",
-            f"in {declared[1.0]}",
-            declared[1.0] <= most,
-            "",
-            f"{RELATED[0]}, margin {MARGIN:.0%} of its mean error",
-        ),
+        state_verdict(name, held_to, f"in {declared[1.0]}", declared[1.0] <= most, "", note),
         state_verdict("the same, no true difference", "", f"in {declared[0.0]} of {len(seeds)}", None),
     ]
-
-
-def _share(share: float, seeds: Sequence[int]) -> int:
-    return int(np.ceil(share * len(seeds) - 1e-9))
 
 
 def draw_world(
@@ -165,4 +147,4 @@ def declares_equivalence(seed: int, shift: float) -> bool:
     device, simulated = (clip_means(side[method]) for side in draw_world(seed, (method,)))
     margin = MARGIN * float(load_planted_errors()[method].mean())
     shifted = {clip: error + shift * margin for clip, error in simulated.items()}
-    return judge_equivalence(method, METRIC, device, shifted, margin, LEVEL).verdict == "equivalent"
+    return judge_equivalence(method, METRICS[0], device, shifted, margin, LEVEL).verdict == "equivalent"

@@ -1,8 +1,10 @@
-"""The truth table of a lab's verbs: in how many captures each planted fault is named, and with which size."""
+"""The truth table of a lab's verbs: in how many captures each planted fault is named, and with which size.
+
+In how many captures of a known unit each interval contains the true parameter, stands there too.
+"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from math import ceil
 from pathlib import Path
 
 from harness.bench.lab.captures import (
@@ -11,23 +13,24 @@ from harness.bench.lab.captures import (
     NO_FAULTS,
     PLANTED_FAULTS,
     PlantedNumber,
+    needed_captures,
     planted_motion,
     planted_numbers,
 )
-from harness.bench.lab.coverage import coverage_rows
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, collect_outcomes
 from harness.bench.lab.planted_worlds import trust_rows
-from harness.bench.lab.registration_errors import registration_rows
+from harness.bench.lab.validated_captures import registration_rows
 from harness.core.progress import ProgressCallback
 from harness.experiment.executors import TaskExecutor
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.study.trust.characterization import preset_values
 
 SEEDS = tuple(range(1, 101))
 """Seeds of the captures. Constants of the estimators were chosen on captures with seeds from 1001 on."""
-WANTED = 0.95
-"""Share of the captures in which a fault has to be named, or nothing where there is none."""
 TOLERANCE = 0.2
 """Relative error of a size that is as good as lying within its interval."""
+LEAST, MOST = 0.90, 0.99
+"""Shares of the captures between which the coverage of a 95 % interval has to lie."""
 KINDS = tuple(kind for kind in PLANTED_FAULTS if kind != EARLIER)
 """Kinds of captures, a row each."""
 
@@ -53,11 +56,6 @@ def lab_truth_rows(
     ]
 
 
-def needed_captures(count: int) -> int:
-    """Least number of captures of `count` that is `WANTED` of them or more."""
-    return ceil(WANTED * count - 1e-9)
-
-
 def fault_rows(seeds: Sequence[int], outcomes: Mapping[tuple[str, int], CaptureOutcome]) -> list[BenchmarkStatement]:
     """One row for each kind of capture, over its captures of these seeds."""
     return [fault_row(kind, [outcomes[kind, seed] for seed in seeds]) for kind in KINDS]
@@ -68,18 +66,15 @@ def fault_row(kind: str, outcomes: Sequence[CaptureOutcome]) -> BenchmarkStateme
     fault, count, needed = PLANTED_FAULTS[kind], len(outcomes), needed_captures(len(outcomes))
     minutes = min(planted_motion(kind, 1).duration_s, fault.seconds) / 60.0
     title, notes = f"{fault.verb}, {fault.title}, {minutes:.3g} min", _notes(kind, outcomes)
+    named, sized = ([judge(outcome) for outcome in outcomes] for judge in (_is_named, _is_sized))
+    what, found, measured = "named", sum(named), ""
     if kind in NO_FAULTS:
-        clean = sum(outcome.names_nothing for outcome in outcomes)
-        return state_verdict(title, f"none named in {needed} of {count}", f"in {clean}", clean >= needed, "", notes)
-    named = [_is_named(outcome) for outcome in outcomes]
-    sized = [_is_sized(outcome) for outcome in outcomes]
-    both = sum(n and s for n, s in zip(named, sized, strict=True))
-    if not fault.numbers:
-        met = sum(named) >= needed
-        return state_verdict(title, f"named in {needed} of {count}", f"in {sum(named)}", met, "", notes)
-    measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {both}"
-    held_to = f"named with its size in {needed} of {count}"
-    return state_verdict(title, held_to, measured, both >= needed, "", notes)
+        what, found = "none named", sum(outcome.names_nothing for outcome in outcomes)
+    elif fault.numbers:
+        what, found = "named with its size", sum(n and s for n, s in zip(named, sized, strict=True))
+        measured = f"named in {sum(named)}, its size in {sum(sized)}, both in {found}"
+    held_to = f"{what} in {needed} of {count}"
+    return state_verdict(title, held_to, measured or f"in {found}", found >= needed, "", notes)
 
 
 def is_sized(planted: PlantedNumber, check: StoredCheck) -> bool:
@@ -117,3 +112,31 @@ def _notes(kind: str, outcomes: Sequence[CaptureOutcome]) -> str:
     if refused := [outcome.failure for outcome in outcomes if outcome.failure]:
         parts.append(f"refused in {len(refused)}: {refused[0]}")
     return "; ".join(parts)
+
+
+def coverage_rows(outcomes: Sequence[CaptureOutcome]) -> list[BenchmarkStatement]:
+    """One row for each parameter that was measured in any of the captures without a fault.
+
+    The true parameters are those of the preset `default`, with which the captures were made.
+    """
+    known = {key: number.value for key, number in preset_values().items()}
+    found: dict[str, list[bool]] = {}
+    for outcome in outcomes:
+        for number in outcome.parameters:
+            if number.key in known:
+                found.setdefault(number.key, []).append(number.contains(known[number.key]))
+    return [coverage_row(key, covered, len(outcomes)) for key, covered in found.items()]
+
+
+def coverage_row(key: str, covered: Sequence[bool], captures: int) -> BenchmarkStatement:
+    """The row of a parameter whose interval contains the true value or not in the captures that measured it."""
+    count, share = sum(covered), sum(covered) / len(covered)
+    note = "" if len(covered) == captures else f"not measured in {captures - len(covered)} of {captures}"
+    return state_verdict(
+        f"coverage, {key}",
+        f"in {LEAST:.0%} to {MOST:.0%} of {len(covered)}",
+        f"in {count} ({share:.1%})",
+        LEAST <= share <= MOST,
+        "",
+        note,
+    )

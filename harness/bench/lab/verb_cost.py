@@ -9,7 +9,6 @@ boxing, of which `validate` needs the true motion.
 import json
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from harness.bench.peak_memory import peak_bytes
@@ -19,24 +18,18 @@ BOXING_KIND = "none_validated"
 """Kind of the planted captures that are validated."""
 
 
-@dataclass(frozen=True)
-class VerbCost:
-    """What a verb took."""
+def measure_verb(verb: str, capture: Path, seed: int = 0) -> tuple[float, int]:
+    """The cost of `characterize` or `validate` for a capture: CPU time [s] and peak memory [bytes].
 
-    processor_s: float
-    """Processor time of all threads, the start of the process included [s]."""
-    peak_bytes: int
-    """Peak resident memory [bytes]."""
-
-
-def measure_verb(verb: str, capture: Path, seed: int = 0) -> VerbCost:
-    """The cost of `characterize` or `validate` for a capture; RuntimeError when it fails."""
+    They are those of all threads, with the start of the process. RuntimeError when it fails.
+    """
     output = run_python("harness.bench.lab.verb_cost", verb, str(capture), str(seed))
-    return VerbCost(**json.loads(output.splitlines()[-1]))
+    cpu_s, peak_bytes = json.loads(output.splitlines()[-1])
+    return cpu_s, peak_bytes
 
 
-def run_verb(verb: str, capture: Path, seed: int) -> VerbCost:
-    """Run the library behind a verb in this process; returns the cost of the process so far."""
+def run_verb(verb: str, capture: Path, seed: int) -> None:
+    """Run the library behind a verb in this process."""
     if verb == "characterize":
         from harness.study.trust.characterization import characterize_capture
 
@@ -46,9 +39,8 @@ def run_verb(verb: str, capture: Path, seed: int) -> VerbCost:
         from harness.study.trust.validation import validate_capture
 
         validate_capture(capture, planted_truth(BOXING_KIND, seed))
-    return VerbCost(time.process_time(), peak_bytes())
 
 
 if __name__ == "__main__":
-    cost = run_verb(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))
-    print(json.dumps({"processor_s": cost.processor_s, "peak_bytes": cost.peak_bytes}))
+    run_verb(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))
+    print(json.dumps([time.process_time(), peak_bytes()]))

@@ -1,20 +1,29 @@
-"""Statistics of the position errors of simulated recordings, for the page of the tracker's physics."""
+"""Position errors of the physical simulation beside those of `noise = "default"`, on the same motion, for the page."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from harness.bench.physics.speed import MOUNTS, PHYSICAL
+from harness.body import retargeting
 from harness.core.arrays import Floats, Ints
+from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure.episodes import Episodes, find_excursions, find_gaps
-from harness.measure.spectrum import ErrorSpectrum, measure_spectrum, pool_spectra
+from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
+from harness.mocap import synthetic
 from harness.report.physics.error_comparison import ERROR_QUANTILES, TrackerErrorStatistics
+from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
+from harness.simulate.trajectory import Trajectory
 
 LIMIT_M, MERGE_S, SEGMENT_S = 0.01, 0.5, 10.0
 """Errors beyond this are excursions [m]; excursions less than this apart are one [s]; segment of a spectrum [s]."""
 _CLASSES = 10
 """Classes of quality."""
+_STATIONS, _SECONDS = 6, 60.0
+_TRACKER = TrackerConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,3 +115,34 @@ def _quantiles(size_m: Floats) -> Floats:
 
 def _pool(parts: Iterable[Floats]) -> Floats:
     return np.concatenate(list(parts))
+
+
+def compare_error_models(
+    seeds: Sequence[int], progress: ProgressCallback = lambda model, done, of: None
+) -> tuple[TrackerErrorStatistics, ...]:
+    """Statistics of both error models on built-in boxing, one take of each seed, with six stations."""
+    out = []
+    models = {"physics": PHYSICAL, 'noise = "default"': noise_preset("default")}
+    source = (
+        f"{len(seeds)} takes of built-in boxing of {_SECONDS:.0f} s, {_STATIONS} stations at {_TRACKER.rate_hz:g} Hz"
+    )
+    for done, (label, noise) in enumerate(models.items()):
+        progress(f"errors of {label}", done, len(models))
+        out.append(error_statistics(label, f"{source}.", _recordings(seeds, noise)))
+    progress("", len(models), len(models))
+    return tuple(out)
+
+
+def _recordings(seeds: Sequence[int], noise: Noise) -> Iterator[RecordedErrors]:
+    performers = synthetic.REFERENCE_PERFORMERS
+    for seed in seeds:
+        performer = performers[seed % len(performers)]
+        clip = synthetic.generate("boxing", performer, 1, seed=seed, duration_s=_SECONDS)
+        body, take = retargeting.retarget_to_own_body(clip)
+        trajectory, mounts = Trajectory(body, take), MOUNTS[:_STATIONS]
+        time_s = sampling_times_s(trajectory.duration_s, _TRACKER, _STATIONS)
+        found, true = (
+            simulate_readings(trajectory, mounts, _TRACKER, model, time_s, seed=seed, take=take.name)
+            for model in (noise, noise_preset("clean"))
+        )
+        yield RecordedErrors(np.asarray(time_s[:, 0]), found.position_m - true.position_m, found.quality)

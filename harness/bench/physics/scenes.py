@@ -1,7 +1,7 @@
 """Scenes for `harness bench physics --truth`: free stations and a performer under the default constellation."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -15,21 +15,15 @@ from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import load_constellation
-from harness.simulate.physics.filter_readings import FilterReadings
+from harness.simulate.physics.filter_state import RangingModel, range_variance
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
 from harness.simulate.physics.ranging import Ranges
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
 from harness.simulate.physics.room import Box, PlacedRoom
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
-from harness.simulate.simulation import (
-    WORLD_FROM_TRACKER,
-    TrackerConfig,
-    sampling_times_s,
-    simulate_readings,
-)
+from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 
 RATE_HZ = 40.0
@@ -42,14 +36,9 @@ BOARD = Box(centre_m=(0.2, 0.1, 1.9), size_m=(0.8, 0.8, 0.1))
 """A board that hangs above the free motion and shades a part of it, such as a lamp."""
 _TRACKER = TrackerConfig(rate_hz=RATE_HZ)
 _ORIGIN_M = np.array(_TRACKER.origin_m)
-_MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
+MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
 """The middle of the free motion in the tracker's frame [m]."""
 STATION = "station"
-
-
-def middle_m() -> Floats:
-    """(3,) the middle of the free motion in the tracker's frame [m]."""
-    return np.array(_MIDDLE_M)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +70,7 @@ class StationErrors:
 def rest_source(seconds: float, physics: Physics, *, pitch_rad: float = 0.0) -> FreeMotionSource:
     """A station that rests below the middle of the constellation, its z axis at an angle to the vertical [rad]."""
     turn = rotations.multiply(FACING_UP, rotations.exp(np.array([0.0, pitch_rad, 0.0])))
-    return resting_source(middle_m(), turn, seconds, physics)
+    return resting_source(np.array(MIDDLE_M), turn, seconds, physics)
 
 
 def resting_source(
@@ -106,7 +95,7 @@ def free_source(seed: int, seconds: float, speed_m_s: float, physics: Physics) -
         size_m=1.0,
         speed_m_s=speed_m_s,
         warm_up_s=lead_in_s(physics),
-        centre_m=_MIDDLE_M,
+        centre_m=MIDDLE_M,
     )
 
 
@@ -121,41 +110,29 @@ def without_shadow(physics: Physics) -> Physics:
 
 
 def track_free_station(
-    source: FreeMotionSource,
-    truth: FreeMotionSource,
+    make_source: Callable[[], FreeMotionSource],
     seconds: float,
     physics: Physics,
     seed: int,
     *,
     covered_s: tuple[float, float] | None = None,
 ) -> StationErrors:
-    """Errors of a free station. `truth` is an equal source; all emitters are covered in `covered_s` [s]."""
+    """Errors of a free station. `make_source` makes equal sources; all emitters are covered in `covered_s` [s]."""
     placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, _ORIGIN_M)
     shade = physics.room.shadow and bool(physics.room.furniture)
-    tracker = PhysicalTracker(
-        source,
-        physics,
-        load_constellation(physics.constellation),
-        placed,
-        Sight(None, placed) if shade else None,
-        seed=seed,
-        take=STATION,
-    )
+    constellation, sight = load_constellation(physics.constellation), Sight(None, placed) if shade else None
+    tracker = PhysicalTracker(make_source(), physics, constellation, placed, sight, seed=seed, take=STATION)
     if covered_s is not None:
         tracker.ranging = _CoveredEmitters(tracker.ranging, covered_s, tracker.schedule.slot_s)
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
-    readings = tracker.measure(time_s[:, None])
-    return _errors(time_s, readings, truth.advance(time_s))
+    readings, true = tracker.measure(time_s[:, None]), make_source().advance(time_s)
+    turns = readings.tracker_from_station, true.tracker_from_station
+    return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
 
 
 def join_errors(parts: Sequence[StationErrors]) -> StationErrors:
     """The errors of several recordings of a station as one; times begin anew with each."""
-    return StationErrors(
-        np.concatenate([part.time_s for part in parts]),
-        np.concatenate([part.error_m for part in parts]),
-        np.concatenate([part.tilt_rad for part in parts]),
-        np.concatenate([part.quality for part in parts]),
-    )
+    return StationErrors(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(StationErrors)))
 
 
 class _CoveredEmitters:
@@ -171,22 +148,14 @@ class _CoveredEmitters:
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))
 
 
-def _errors(time_s: Floats, readings: FilterReadings, true: TrackerMotion) -> StationErrors:
-    error_m = readings.position_m[:, 0] - true.position_m[:, 0]
-    return StationErrors(
-        time_s,
-        error_m,
-        _tilt_rad(readings.tracker_from_station[:, 0], true.tracker_from_station[:, 0]),
-        readings.quality[:, 0],
-    )
-
-
-def _tilt_rad(reported: Floats, true: Floats) -> Floats:
-    """(E,) angle between the vertical as two orientations (E, 4) have it [rad]."""
+def _errors(
+    time_s: Floats, positions_m: tuple[Floats, Floats], turns: tuple[Floats, Floats], quality: Floats
+) -> StationErrors:
+    """The errors of the only station, from positions (E, 1, 3) and turns (E, 1, 4) that are reported and true."""
     down = np.array([0.0, 0.0, 1.0])
-    one, other = (rotations.rotate(rotations.inverse(turn), down) for turn in (reported, true))
-    out: Floats = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
-    return out
+    one, other = (rotations.rotate(rotations.inverse(turn[:, 0]), down) for turn in turns)
+    tilt_rad = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
+    return StationErrors(time_s, positions_m[0][:, 0] - positions_m[1][:, 0], tilt_rad, quality[:, 0])
 
 
 def track_hand(seed: int, seconds: float, physics: Physics, *, behind: bool) -> StationErrors:
@@ -215,12 +184,7 @@ def track_hand(seed: int, seconds: float, physics: Physics, *, behind: bool) -> 
         simulate_readings(trajectory, mounts, _TRACKER, noise, at_s, seed=seed, take="hand")
         for noise in (Noise(physics=physics), noise_preset("clean"))
     )
-    return StationErrors(
-        at_s[:, 0],
-        found.position_m[:, 0] - true.position_m[:, 0],
-        _tilt_rad(found.turn[:, 0], true.turn[:, 0]),
-        found.quality[:, 0],
-    )
+    return _errors(at_s[:, 0], (found.position_m, true.position_m), (found.turn, true.turn), found.quality)
 
 
 _IN_FRONT = {"rclavicle.rz": 11.0, "rhumerus.rx": -13.0, "rhumerus.ry": 66.0, "rhumerus.rz": -77.0, "rradius.rx": 76.0}
@@ -240,21 +204,13 @@ def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats
     The ranges are those to all emitters within cone and reach, with the weights that the filter gives them.
     """
     constellation = load_constellation(physics.constellation)
-    sound = physics.sound
     ray_m = place_m - constellation.position_m
     distance_m = np.sqrt(np.sum(ray_m**2, axis=1))
     cosine = np.sum(ray_m * constellation.normal, axis=1) / distance_m
     heard = (distance_m <= constellation.range_m) & (cosine >= np.cos(constellation.cone_rad))
-    model = RangingModel(
-        constellation.position_m,
-        constellation.normal,
-        np.zeros((1, 3)),
-        1.0,
-        sound.absorption_db_per_m,
-        physics.fusion.range_noise_m,
-        physics.fusion.range_scale,
-        physics.fusion.survey_m,
-    )
+    noise = physics.fusion.range_noise_m, physics.fusion.range_scale, physics.fusion.survey_m
+    emitters = constellation.position_m, constellation.normal
+    model = RangingModel(*emitters, np.zeros((1, 3)), 1.0, physics.sound.absorption_db_per_m, *noise)
     rays = enumerate(zip(distance_m, ray_m / distance_m[:, None], strict=True))
     sigma_m = np.sqrt([range_variance(model, j, r, x, y, z, z) for j, (r, (x, y, z)) in rays])[heard]
     emitters_m, measured_m = constellation.position_m[heard], scale * distance_m[heard]

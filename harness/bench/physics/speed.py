@@ -13,29 +13,26 @@ from functools import cache, partial
 
 import numpy as np
 
+from harness.bench import common
 from harness.bench.cpu_time import time_cpu
 from harness.bench.peak_memory import peak_bytes
-from harness.body import mounts, retargeting
+from harness.body import retargeting
 from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount
+from harness.body.mounts import DEFAULT_MOUNTS, Mount
 from harness.core.child_process import run_python
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
-from harness.simulate.components.clock import Clock
+from harness.simulate.components.stationary import Clock
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics import physical_tracker
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
-STATIONS = (
-    *("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head"),
-    *("left_hand", "right_hand", "left_foot", "right_foot", "pelvis"),
-)
 MOUNTS = (
-    *(mounts.DEFAULT_MOUNTS[name] for name in STATIONS),
+    *common.MOUNTS,
+    *(DEFAULT_MOUNTS[name] for name in ("left_hand", "right_hand", "left_foot", "right_foot", "pelvis")),
     Mount("left_upper_arm", "lhumerus", 0.5, math.pi / 2.0),
 )
 """Twelve stations; the first six are those of `bench stream`."""
@@ -59,7 +56,7 @@ def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkStatement]:
         parts: tuple[Callable[[], object], ...] = (
             partial(simulate_stations, body, take, count, PHYSICAL, seed),
             partial(simulate_stations, body, take, count, noise_preset("default"), seed),
-            lambda: _pose_all(Kinematics(body), np.asarray(take.qpos)),
+            lambda: common.pose_all(body, np.asarray(take.qpos)),
         )
         parts[0]()
         seconds = np.array([[time_cpu(part) for part in parts] for _ in range(repeats)])
@@ -113,11 +110,6 @@ def _block_row(body: Body, take: BodyMotion, seed: int) -> BenchmarkStatement:
 
 def _measure_peak(kind: str, seconds: float, seed: int) -> int:
     return int(run_python("harness.bench.physics.speed", kind, str(seconds), str(seed)))
-
-
-def _pose_all(kinematics: Kinematics, poses: np.ndarray) -> None:
-    for qpos in poses:
-        kinematics.set(qpos)
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@
 Every row is computed with the default settings and the same seeds. A row that misses its figure says so.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +13,10 @@ import numpy as np
 from harness.bench.physics.scenes import (
     BOARD,
     BYSTANDER,
+    MIDDLE_M,
     StationErrors,
     free_source,
     join_errors,
-    middle_m,
     rest_source,
     resting_source,
     scaled_position_m,
@@ -26,7 +27,7 @@ from harness.bench.physics.scenes import (
 )
 from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
@@ -77,16 +78,13 @@ def rest_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     physics = Physics()
     spread_mm = np.array([1e3 * _spread_m(_rest(seed, physics)) for seed in seeds])
     middle = float(np.median(spread_mm))
-    return [
-        state_verdict(
-            "static, spread of 3-D position",
-            "1.0 to 2.0 mm",
-            f"median {middle:.2f} mm, {spread_mm.min():.2f} to {spread_mm.max():.2f} mm",
-            bool(1.0 <= middle <= 2.0),
-            "about 1.5 mm (Gilson et al. 2006)",
-            f"one station at rest for {_REST_S:.0f} s, {len(seeds)} seeds",
-        )
-    ]
+    measured = f"median {middle:.2f} mm, {spread_mm.min():.2f} to {spread_mm.max():.2f} mm"
+    published, note = (
+        "about 1.5 mm (Gilson et al. 2006)",
+        f"one station at rest for {_REST_S:.0f} s, {len(seeds)} seeds",
+    )
+    name, met = "static, spread of 3-D position", bool(1.0 <= middle <= 2.0)
+    return [state_verdict(name, "1.0 to 2.0 mm", measured, met, published, note)]
 
 
 def free_rows(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
@@ -136,16 +134,13 @@ def speed_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
         rms_mm[speed] = {str(seed): 1e3 * _at_speed(seed, speed).rms_m for seed in seeds}
     steps = [compare_paired(rms_mm[fast], rms_mm[slow]) for slow, fast in pairwise(SPEEDS_M_S)]
     means = ", ".join(f"{np.mean(list(by_seed.values())):.2f}" for by_seed in rms_mm.values())
-    return [
-        state_verdict(
-            "four speeds, rest to fast",
-            "error rises at each step, paired 95 % interval above 0",
-            f"{means} mm at {', '.join(f'{speed:g}' for speed in SPEEDS_M_S)} m/s; steps {_intervals(steps)} mm",
-            _all_above_zero(steps),
-            "error grows with speed (Gilson et al. 2006)",
-            "root mean square; no shadow",
-        )
-    ]
+    measured = f"{means} mm at {', '.join(f'{speed:g}' for speed in SPEEDS_M_S)} m/s; steps {_intervals(steps)} mm"
+    held_to, published = (
+        "error rises at each step, paired 95 % interval above 0",
+        "error grows with speed (Gilson et al. 2006)",
+    )
+    note = "root mean square; no shadow"
+    return [state_verdict("four speeds, rest to fast", held_to, measured, _all_above_zero(steps), published, note)]
 
 
 def turned_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
@@ -154,7 +149,10 @@ def turned_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     facing, turned = (
         {str(seed): 1e3 * _rest(seed, physics, pitch_rad=pitch).rms_m for seed in seeds} for pitch in (0.0, _TURNED_RAD)
     )
-    return [_twin_row("turned away by 100 deg", turned, facing)]
+    difference = compare_paired(dict(turned), dict(facing))
+    means = np.mean(list(turned.values())), np.mean(list(facing.values()))
+    measured = f"{means[0]:.2f} and {means[1]:.2f} mm; difference {_intervals([difference])} mm"
+    return [_twin_row("turned away by 100 deg", measured, difference, "root mean square of the error")]
 
 
 def hand_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
@@ -166,17 +164,9 @@ def hand_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     worse, better = ({seed: _rms_with_losses_m(e) for seed, e in errors.items()} for errors in (behind, front))
     difference = compare_paired(dict(worse), dict(better))
     lost = [np.mean([np.mean(e.quality == 0.0) for e in errors.values()]) for errors in (behind, front)]
-    return [
-        state_verdict(
-            "hand behind the back",
-            "worse than its twin, paired 95 % interval above 0",
-            f"lost for {lost[0]:.0%} of the time; in front of the body {lost[1]:.0%}, "
-            f"{1e3 * np.mean([e.rms_m for e in front.values()]):.2f} mm",
-            _all_above_zero([difference]),
-            "",
-            "compared with a lost reading as an error of 1 m",
-        )
-    ]
+    front_mm = 1e3 * np.mean([e.rms_m for e in front.values()])
+    measured = f"lost for {lost[0]:.0%} of the time; in front of the body {lost[1]:.0%}, {front_mm:.2f} mm"
+    return [_twin_row("hand behind the back", measured, difference, "compared with a lost reading as an error of 1 m")]
 
 
 def temperature_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
@@ -185,23 +175,20 @@ def temperature_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     sound = replace(physics.sound, temperature_c=physics.sound.assumed_c + _WARMER_K, temperature_sd_c=0.0)
     same = replace(physics, sound=replace(sound, temperature_c=physics.sound.assumed_c))
     warm = replace(physics, sound=sound)
-    place_m = middle_m()
+    place_m = np.array(MIDDLE_M)
     ratio = speed_of_sound_m_s(physics.sound.assumed_c) / speed_of_sound_m_s(sound.temperature_c)
     expected_m = scaled_position_m(place_m, ratio, physics) - place_m
     size_m = float(np.linalg.norm(expected_m))
     shifts = [_mean_error(_rest(seed, warm)) - _mean_error(_rest(seed, same)) for seed in seeds]
     along = np.array([shift @ expected_m / size_m for shift in shifts]) / size_m
     middle = float(np.median(along))
-    return [
-        state_verdict(
-            "3 K wrong",
-            "scale error of arithmetic within 20 %",
-            f"{middle:.2f} times the {1e3 * size_m:.1f} mm of arithmetic, {along.min():.2f} to {along.max():.2f}",
-            bool(abs(middle - 1.0) <= 0.2),
-            "0.17 % of a range per K (arithmetic)",
-            "displacement at rest; arithmetic is least squares with the same ranges",
-        )
-    ]
+    measured = f"{middle:.2f} times the {1e3 * size_m:.1f} mm of arithmetic, {along.min():.2f} to {along.max():.2f}"
+    published, note = (
+        "0.17 % of a range per K (arithmetic)",
+        "displacement at rest; arithmetic is least squares with the same ranges",
+    )
+    met = bool(abs(middle - 1.0) <= 0.2)
+    return [state_verdict("3 K wrong", "scale error of arithmetic within 20 %", measured, met, published, note)]
 
 
 def covered_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
@@ -209,10 +196,9 @@ def covered_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
     physics, until_s = Physics(), _COVERED_FROM_S + _COVERED_S
     ratios, silent, errors_mm = [], 0, []
     for seed in seeds:
-        seconds = until_s + 1.0
-        sources = [free_source(seed, seconds, _FREE_M_S, physics) for _ in range(2)]
+        source = partial(free_source, seed, until_s + 1.0, _FREE_M_S, physics)
         covered_s = (_COVERED_FROM_S, until_s)
-        errors = track_free_station(sources[0], sources[1], seconds, physics, seed, covered_s=covered_s)
+        errors = track_free_station(source, until_s + 1.0, physics, seed, covered_s=covered_s)
         first, last = (int(np.searchsorted(errors.time_s, at)) for at in (_COVERED_FROM_S, until_s - 1e-6))
         last = min(last, len(errors.time_s) - 1)
         leak_m = 0.5 * GRAVITY_M_S2 * np.sin(errors.tilt_rad[first]) * _COVERED_S**2
@@ -221,44 +207,29 @@ def covered_row(seeds: tuple[int, ...]) -> list[BenchmarkStatement]:
         errors_mm.append(1e3 * grown_m)
         silent += errors.quality[last] == 0.0
     middle = float(np.median(ratios))
+    name, held_to = "all emitters covered for 2 s: error", "median within a factor 2 of 0.5 g sin(own tilt) t²"
+    measured, published = (
+        f"median {middle:.2f} times; {np.median(errors_mm):.0f} mm",
+        "3.4 cm at a tilt of 0.1 deg (arithmetic)",
+    )
+    all_seeds = f"0 in {len(seeds)} of {len(seeds)} seeds"
     return [
-        state_verdict(
-            "all emitters covered for 2 s: error",
-            "median within a factor 2 of 0.5 g sin(own tilt) t²",
-            f"median {middle:.2f} times; {np.median(errors_mm):.0f} mm",
-            bool(0.5 <= middle <= 2.0),
-            "3.4 cm at a tilt of 0.1 deg (arithmetic)",
-        ),
-        state_verdict(
-            "the same: quality after 2 s",
-            f"0 in {len(seeds)} of {len(seeds)} seeds",
-            f"0 in {silent}",
-            bool(silent == len(seeds)),
-        ),
+        state_verdict(name, held_to, measured, bool(0.5 <= middle <= 2.0), published),
+        state_verdict("the same: quality after 2 s", all_seeds, f"0 in {silent}", bool(silent == len(seeds))),
     ]
 
 
-def _twin_row(name: str, worse: Mapping[str, float], better: Mapping[str, float]) -> BenchmarkStatement:
-    difference = compare_paired(dict(worse), dict(better))
-    means = np.mean(list(worse.values())), np.mean(list(better.values()))
-    return state_verdict(
-        name,
-        "worse than its twin, paired 95 % interval above 0",
-        f"{means[0]:.2f} and {means[1]:.2f} mm; difference {_intervals([difference])} mm",
-        _all_above_zero([difference]),
-        "",
-        "root mean square of the error",
-    )
+def _twin_row(name: str, measured: str, difference: PairedDifference, note: str) -> BenchmarkStatement:
+    held_to = "worse than its twin, paired 95 % interval above 0"
+    return state_verdict(name, held_to, measured, _all_above_zero([difference]), "", note)
 
 
 def _rest(seed: int, physics: Physics, *, pitch_rad: float = 0.0) -> StationErrors:
-    sources = [rest_source(_REST_S, physics, pitch_rad=pitch_rad) for _ in range(2)]
-    return track_free_station(sources[0], sources[1], _REST_S, physics, seed)
+    return track_free_station(lambda: rest_source(_REST_S, physics, pitch_rad=pitch_rad), _REST_S, physics, seed)
 
 
 def _free(seed: int, physics: Physics) -> StationErrors:
-    sources = [free_source(seed, _FREE_S, _FREE_M_S, physics) for _ in range(2)]
-    return track_free_station(sources[0], sources[1], _FREE_S, physics, seed)
+    return track_free_station(lambda: free_source(seed, _FREE_S, _FREE_M_S, physics), _FREE_S, physics, seed)
 
 
 def _at_speed(seed: int, speed_m_s: float) -> StationErrors:
@@ -266,14 +237,13 @@ def _at_speed(seed: int, speed_m_s: float) -> StationErrors:
     physics = without_shadow(Physics())
     if speed_m_s:
         seconds = _PATH_M / speed_m_s
-        sources = [free_source(seed, seconds, speed_m_s, physics) for _ in range(2)]
-        return track_free_station(sources[0], sources[1], seconds, physics, seed)
+        return track_free_station(lambda: free_source(seed, seconds, speed_m_s, physics), seconds, physics, seed)
     path = free_source(seed, _PATH_M, 1.0, physics).advance(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
     parts = []
     for place in range(_PLACES):
         pose = path.position_m[place, 0], path.tracker_from_station[place, 0]
-        sources = [resting_source(*pose, _PLACE_S, physics) for _ in range(2)]
-        parts.append(track_free_station(sources[0], sources[1], _PLACE_S, physics, seed))
+        source = partial(resting_source, *pose, _PLACE_S, physics)
+        parts.append(track_free_station(source, _PLACE_S, physics, seed))
     return join_errors(parts)
 
 

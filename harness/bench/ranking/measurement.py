@@ -8,20 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from harness.bench.common import fresh_methods, run_benchmark_cells
 from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, compare_rankings
 from harness.core.package_data import data_folder
-from harness.core.progress import ProgressCallback
 from harness.core.split import performer_of
 from harness.errors import Outcome
-from harness.experiment.cells import check_names, clear_caches
-from harness.experiment.engine import run_cells
-from harness.experiment.executors import TaskExecutor
-from harness.experiment.remote_method import close_methods
 from harness.experiment.scenario import Scenario, load_scenario, variants
 from harness.mocap import synthetic
-from harness.mocap.library import LibraryFolders
 from harness.results.expected_orders import METRIC
-from harness.study.papers.paper_study import open_study
 
 BEHAVIOURS = ("walking", "boxing", "jumping")
 MOST_BUILTIN = 12
@@ -91,37 +85,13 @@ def _shorten(scenario: Scenario) -> Scenario:
     return replace(scenario, motion=motion, methods=methods, vary=vary)
 
 
-def measure_rankings(
-    scenarios: Sequence[Scenario],
-    out: Path,
-    *,
-    folder: LibraryFolders | None = None,
-    executor: TaskExecutor,
-    workers: int = 1,
-    command: str = "",
-    progress: ProgressCallback = lambda cell, done, planned: None,
-) -> RankingReport:
+def measure_rankings(scenarios: Sequence[Scenario], out: Path, **options: Any) -> RankingReport:
     """Run or resume the cells of planned scenarios in `out`, and compare the sides.
 
-    `folder` is the library of real motion, by default HARNESS_MOCAP. BadInput without one, and for a folder that holds
-    something else.
+    `options` are those of `run_benchmark_cells`, whose errors are raised.
     """
-    clear_caches()  # files may have changed since the last run
-    try:
-        check_names(scenarios, folder)
-        with open_study(out, {"benchmark": "ranking"}):
-            (out / "cells").mkdir(exist_ok=True)
-            results = run_cells(
-                scenarios,
-                out,
-                folder=folder,
-                executor=executor,
-                command=command,
-                progress=progress,
-                workers=workers,
-            )
-    finally:
-        close_methods()
+    with fresh_methods():
+        results = run_benchmark_cells("ranking", scenarios, out, **options)
     return RankingReport(rank_rows(results.rows, scenarios), results.failures)
 
 

@@ -6,8 +6,7 @@ from typing import Any
 
 from harness.bench.ranking.agreement import RankingAgreement
 from harness.bench.ranking.measurement import METHODS, PLACES_METHOD, RankingReport
-from harness.core.interval import Interval
-from harness.core.number_format import count_noun, format_fixed, format_p_value
+from harness.core.number_format import Interval, count_noun, format_fixed, format_p_value
 from harness.core.text_table import Table
 from harness.results.trust_findings import PairAgreement, PairVerdict, SideDifference
 

@@ -32,8 +32,8 @@ _Line = tuple[int, str]
 
 def read_amc_clip(asf: Path | str, amc: Path | str, *, rate_hz: float) -> Clip:
     """Read an AMC file with its ASF file, in the unit of the latter; see `read_amc`."""
-    file = read_asf_file(asf)
-    return read_amc(amc, file.skeleton, rate_hz=rate_hz, unit_m=file.unit_m)
+    skeleton, unit_m = read_asf_file(asf)
+    return read_amc(amc, skeleton, rate_hz=rate_hz, unit_m=unit_m)
 
 
 def read_amc(path: Path | str, skeleton: Skeleton, *, rate_hz: float, unit_m: float = CMU_UNIT_M) -> Clip:

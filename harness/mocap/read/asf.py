@@ -52,24 +52,15 @@ class _AsfSections:
     parent_of: dict[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class AsfFile:
-    """Contents of an ASF file: the skeleton, and the unit of length that its motions share."""
-
-    skeleton: Skeleton
-    unit_m: float
-    """Length of 1 in this file and in the AMC files that belong to it [m]."""
-
-
 def read_asf(path: Path | str) -> Skeleton:
     """Read the skeleton of an ASF file with all its bones (CMU: 30), in metres and world axes; see `read_asf_file`."""
-    return read_asf_file(path).skeleton
+    return read_asf_file(path)[0]
 
 
-def read_asf_file(path: Path | str, *, unit_m: float | None = None) -> AsfFile:
-    """Read skeleton and unit of an ASF file; bones are depth first in the order of its hierarchy.
+def read_asf_file(path: Path | str, *, unit_m: float | None = None) -> tuple[Skeleton, float]:
+    """Read the skeleton of an ASF file, and the length of 1 in it and in the AMC files that belong to it [m].
 
-    `unit_m` replaces the unit of length in the file [m].
+    Bones are depth first in the order of the hierarchy. `unit_m` replaces the unit of length in the file [m].
 
     Raises BadFile with the line for anything that cannot be understood: units, unknown or repeated bones, a bone
     with two parents, none, or among its own ancestors.
@@ -189,7 +180,7 @@ def _parse_hierarchy(path: Path, draft: _AsfSections, words: list[str], line: in
         draft.parent_of[child] = words[0]
 
 
-def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> AsfFile:
+def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> tuple[Skeleton, float]:
     for missing, what in (
         (not draft.length_unit, ":units with a length"),
         (not draft.root_order, ":root with an order"),
@@ -212,8 +203,11 @@ def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> AsfFil
         hinges=tuple(b.dof for b in bones),
         axes=np.array([axis for b in bones for axis in _hinge_axes(b, draft.degrees)]).reshape(-1, 3),
     )
-    _check_longest(path, skeleton)
-    return AsfFile(skeleton, metres)
+    longest = float(skeleton.length_m.max())
+    if not 0.1 <= longest <= 1.0:  # a person's longest bone, thigh or shin, has 0.2 to 0.8 m
+        found = f"a longest bone of {longest:.3g} m"
+        raise BadFile(path, found, "0.1 to 1 m", "Correct length in :units (CMU: 0.45), or give --unit.")
+    return skeleton, metres
 
 
 def _depth_first(parent_of: dict[str, str]) -> tuple[str, ...]:
@@ -235,11 +229,3 @@ def _hinge_axes(bone: _BoneData, degrees: bool) -> list[Floats]:
     for angle, letter in zip(angles, bone.axis_order, strict=True):
         turn = rotations.to_matrix(rotations.exp(angle * np.eye(3)[_AXIS_INDEX[letter]])) @ turn
     return [WORLD_FROM_ASF @ turn[:, _AXIS_INDEX[channel[1].upper()]] for channel in bone.dof]
-
-
-def _check_longest(path: Path, skeleton: Skeleton) -> None:
-    """BadFile if the longest bone shows a wrong unit: a person's longest bone (thigh or shin) has 0.2 to 0.8 m."""
-    longest = float(skeleton.length_m.max())
-    if not 0.1 <= longest <= 1.0:
-        found = f"a longest bone of {longest:.3g} m"
-        raise BadFile(path, found, "0.1 to 1 m", "Correct length in :units (CMU: 0.45), or give --unit.")

@@ -19,7 +19,7 @@ from harness.core.motion import Clip
 from harness.errors import BadFile
 from harness.mocap.read.asf import INCH_M, WORLD_FROM_ASF
 from harness.mocap.read.bvh_text import BvhText, parse_bvh
-from harness.mocap.read.joint_clip import BoneMapping, JointClip, JointMap, to_clip
+from harness.mocap.read.joint_clip import BoneMapping, JointClip, JointMap, rest_positions, to_clip
 
 UNITS_M = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "inches": INCH_M, "ASF units": INCH_M / 0.45}
 HEIGHT_M = (1.2, 2.2)
@@ -157,9 +157,7 @@ def guess_unit(path: Path, height: float) -> tuple[float, str]:
 
 def _rest_height(path: Path, text: BvhText) -> float:
     """Height of the rest pose in the file's unit; BadFile unless y is up and x is left in it."""
-    at = np.zeros((len(text.joints), 3))
-    for j, joint in enumerate(text.joints):
-        at[j] = np.asarray(joint.offset) + (at[joint.parent] if joint.parent >= 0 else 0.0)
+    at = rest_positions([joint.parent for joint in text.joints], np.array([joint.offset for joint in text.joints]))
     size = np.ptp(at, axis=0)
     if size[1] <= 0.0 or size[1] < size[2]:
         found = "a rest pose that does not stand along y ({:.3g} x {:.3g} x {:.3g})".format(*size)

@@ -64,7 +64,8 @@ class BvhText:
 def parse_bvh(path: Path) -> BvhText:
     """Read and check a BVH file; BadFile with the line of the first error.
 
-    Of a live output whose process was killed (`harness.live.bvh`), the whole lines after the last save are frames too.
+    Of a live output whose process was killed (`harness.live.file_outputs`), the whole lines after the last save are
+    frames too.
     """
     all_lines = read_lines(path, _FORMAT, LIMIT_BYTES)
     lines = [(line, text.split()) for line, text in enumerate(all_lines, start=1) if text.strip()]

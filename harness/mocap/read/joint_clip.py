@@ -2,20 +2,19 @@
 
 A joint rotates everything below it; in the rest pose every joint's frame is parallel to the world. The fit goes from
 the root outwards. Each bone gets the hinge angles that bring its world orientation closest to that of the joint that
-it is mapped to (`core.hinges`).
+it is mapped to (`core.skeleton`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
-from harness.core.hinges import hinge_angles, hinge_rotation
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip
-from harness.core.skeleton import Skeleton, unwrap_angles
+from harness.core.skeleton import Skeleton, hinge_angles, hinge_rotation, unwrap_angles
 from harness.errors import BadInput
 
 LEG_BONES = ("lfemur", "ltibia", "rfemur", "rtibia")
@@ -72,11 +71,17 @@ class JointClip:
 
     def rest_m(self) -> Floats:
         """(J, 3) joint positions in the rest pose, with the first joint at the origin [m]."""
-        position_m = np.zeros((len(self.names), 3))
-        for j, parent in enumerate(self.parents):
-            if parent >= 0:
-                position_m[j] = position_m[parent] + self.offset_m[j]
-        return position_m
+        out: Floats = rest_positions(self.parents, self.offset_m) - self.offset_m[0]
+        return out
+
+
+def rest_positions(parents: Sequence[int], offsets: Floats) -> Floats:
+    """(J, 3) positions of joints from their offsets (J, 3) from the joints above; those of a first one are its own."""
+    positions = np.array(offsets)
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            positions[joint] += positions[parent]
+    return positions
 
 
 @dataclass(frozen=True)
@@ -116,30 +121,21 @@ JointMap = Mapping[str, BoneMapping]
 """The mapping of each of the 24 bones, and of "root"."""
 
 
-@dataclass(frozen=True, eq=False)
-class HingeFit:
-    """A fitted clip, and the residual of the fit."""
-
-    clip: Clip
-    residual_rad: Floats
-    """(T, 24) angle between the target and the fitted world orientation of each bone [rad]."""
-
-
 def to_clip(joint_clip: JointClip, joint_map: JointMap) -> Clip:
     """The motion on the 24 bones, with the residual of the fit in its notes; see `fit_hinges`."""
-    fit = fit_hinges(joint_clip, joint_map)
-    mean_deg = np.rad2deg(fit.residual_rad.mean(axis=0))
+    clip, residual_rad = fit_hinges(joint_clip, joint_map)
+    mean_deg = np.rad2deg(residual_rad.mean(axis=0))
     worst = int(np.argmax(mean_deg))
     note = f"hinges fitted to joint rotations: mean residual {mean_deg.mean():.2f} deg, "
     note += f"largest at {BONES[worst]} ({mean_deg[worst]:.2f} deg)"
-    return replace(fit.clip, notes=(*fit.clip.notes, note))
+    return replace(clip, notes=(*clip.notes, note))
 
 
-def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
+def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> tuple[Clip, Floats]:
     """Fit unwrapped hinge angles to the joints' rotations; BadInput if the map and the joints do not agree.
 
-    A bone whose length is missing or zero in the file gets that of the mean skeleton, scaled by the legs; the notes
-    name it.
+    Beside the clip, (T, 24) angles between the target and the fitted world orientation of each bone [rad]. A bone whose
+    length is missing or zero in the file gets that of the mean skeleton, scaled by the legs; the notes name it.
     """
     skeleton, notes = _build_skeleton(joint_clip, joint_map)
     position_m, world_from_joint = joint_clip.world()
@@ -168,7 +164,7 @@ def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
         angles_rad=unwrap_angles(skeleton, angles),
         notes=(*joint_clip.notes, *notes),
     )
-    return HingeFit(clip, residual)
+    return clip, residual
 
 
 def _target_orientation(joint_clip: JointClip, world_from_joint: Floats, mapping: BoneMapping) -> Floats:

@@ -10,7 +10,7 @@ from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic import limb_ik
 from harness.mocap.synthetic.curves import smooth_maximum, smooth_minimum
 from harness.mocap.synthetic.limb_ik import axis_rotation, horizontal_vector, normalize, rotate_vectors, stack_columns
-from harness.mocap.synthetic.posture_noise import PostureOffsets
+from harness.mocap.synthetic.performers import PostureOffsets
 
 WristAngles = tuple[Floats, Floats]
 SIDES = ("l", "r")

@@ -9,21 +9,11 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
+from harness.mocap.synthetic import footwork
 from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
-from harness.mocap.synthetic.curves import smooth_minimum, smooth_noise
-from harness.mocap.synthetic.foot_trajectory import plan_foot
-from harness.mocap.synthetic.footwork import (
-    FootPlacement,
-    StanceShift,
-    highest_root_m,
-    leg_length_m,
-    plan_body_path,
-    plan_steps,
-)
-from harness.mocap.synthetic.gestures import Gesture, Keyframes, sum_gestures
+from harness.mocap.synthetic.curves import Gesture, Keyframes, smooth_minimum, smooth_noise, sum_gestures
 from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
-from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
 
 
 def _out_and_back(value: float, wind_up: float = 0.0, hit_s: float = 0.24, back_s: float = 0.58) -> Keyframes:
@@ -128,16 +118,16 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     lead = "l" if rear == "r" else "r"
     s = SIDE_SIGN[lead]
     size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.80, 1.0)) / habits.pace
-    leg = leg_length_m(skeleton)
+    leg = footwork.leg_length_m(skeleton)
     bladed, crouch = float(rng.uniform(0.45, 0.80)), style.crouch + float(rng.uniform(0.04, 0.09))
 
     stance = {
-        lead: FootPlacement(0.27 * leg * style.width, s * 0.15 * leg * style.width, -s * 0.30),
-        rear: FootPlacement(-0.24 * leg * style.width, -s * 0.16 * leg * style.width, -s * 0.95),
+        lead: footwork.FootPlacement(0.27 * leg * style.width, s * 0.15 * leg * style.width, -s * 0.30),
+        rear: footwork.FootPlacement(-0.24 * leg * style.width, -s * 0.16 * leg * style.width, -s * 0.95),
     }
     start, shifts = _plan_footwork(rng, t, slow)
-    place, facing = plan_body_path(t, start, shifts)
-    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
+    place, facing = footwork.plan_body_path(t, start, shifts)
+    plants = footwork.plan_steps(rng, stance, start, shifts, float(t[-1]))
     act = sum_gestures(t, _plan_combinations(rng, t, size, slow, take))
 
     bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.9 + smooth_noise(rng, t, 3.0, 0.15)))
@@ -145,8 +135,10 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     place = place + horizontal_vector(facing, ahead, s * (act["side"] + smooth_noise(rng, t, 1.6, 0.015)))
     heel = 0.32 + 0.04 * np.sin(bounce) + act["heel"]
     feet = {
-        lead: plan_foot(t, skeleton, lead, plants[lead], 0.05 + style.knees_out_rad, 0.03 + 0.03 * np.sin(bounce)),
-        rear: plan_foot(t, skeleton, rear, plants[rear], 0.05 + style.knees_out_rad, heel, s * act["pivot"]),
+        lead: footwork.plan_foot(
+            t, skeleton, lead, plants[lead], 0.05 + style.knees_out_rad, 0.03 + 0.03 * np.sin(bounce)
+        ),
+        rear: footwork.plan_foot(t, skeleton, rear, plants[rear], 0.05 + style.knees_out_rad, heel, s * act["pivot"]),
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.4, 0.55) + rng.uniform(0.0, 6.0))
     pelvis = stack_columns(
@@ -164,7 +156,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
         0.18 + style.nod_rad + smooth_noise(rng, t, 2.0, 0.03),
         s * 0.4 * act["lean"] + smooth_noise(rng, t, 2.0, 0.03),
     )
-    top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
+    top = footwork.highest_root_m(skeleton, place, pelvis, feet, 0.975)
     height = np.median(top) - crouch * leg + 0.010 * np.sin(bounce) - act["dip"] + smooth_noise(rng, t, 2.0, 0.008)
     root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
     lift, reach = style.shoulder_rad
@@ -220,18 +212,22 @@ def _pose_arm(
     )
 
 
-def _plan_footwork(rng: np.random.Generator, t: Floats, slow: float) -> tuple[StanceShift, list[StanceShift]]:
+def _plan_footwork(
+    rng: np.random.Generator, t: Floats, slow: float
+) -> tuple[footwork.StanceShift, list[footwork.StanceShift]]:
     """Steps around the opponent, within about a metre of the origin."""
     yaw = float(rng.uniform(-np.pi, np.pi))
-    start = StanceShift(0.0, (float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))), yaw)
-    shifts: list[StanceShift] = []
+    start = footwork.StanceShift(0.0, (float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))), yaw)
+    shifts: list[footwork.StanceShift] = []
     now, place = float(t[0]) + rng.uniform(0.2, 0.8), np.array(start.place_m)
     while now < t[-1]:
         yaw += rng.normal(0.0, 0.16)
         home = -0.25 * place
         place = place + horizontal_vector(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.08, 0.20), 0.0) + home
         step_s = rng.uniform(0.22, 0.28) * slow
-        shifts.append(StanceShift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022))
+        shifts.append(
+            footwork.StanceShift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022)
+        )
         now += 2.0 * step_s + 0.1 + rng.uniform(0.05, 0.9)
     return start, shifts
 

@@ -12,21 +12,19 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
+from harness.mocap.synthetic import footwork
 from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
-from harness.mocap.synthetic.curves import smooth_maximum, smooth_minimum, smooth_noise
-from harness.mocap.synthetic.foot_trajectory import plan_foot
-from harness.mocap.synthetic.footwork import (
-    FootPlacement,
-    StanceShift,
-    highest_root_m,
-    leg_length_m,
-    plan_body_path,
-    plan_steps,
+from harness.mocap.synthetic.curves import (
+    Gesture,
+    Keyframes,
+    keyframes_at,
+    smooth_maximum,
+    smooth_minimum,
+    smooth_noise,
+    sum_gestures,
 )
-from harness.mocap.synthetic.gestures import Gesture, Keyframes, keyframes_at, sum_gestures
 from harness.mocap.synthetic.limb_ik import horizontal_vector, normalize, stack_columns
-from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
 
 _WRIST_SEPARATION_M = 0.075
 """Distance of the two wrists along the grip [m]."""
@@ -37,23 +35,23 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     trail, style = habits.hand, habits.style
     lead = "l" if trail == "r" else "r"
     s = SIDE_SIGN[lead]
-    leg = leg_length_m(skeleton)
+    leg = footwork.leg_length_m(skeleton)
     full = (1.0, 0.88, 0.95, 0.80)[(take - 1) % 4] * float(rng.uniform(0.97, 1.03))
     swings, begins = _plan_swings(rng, t, habits, full)
     act = sum_gestures(t, swings)
 
     half = leg * style.width * float(rng.uniform(0.22, 0.30))
     stance = {
-        lead: FootPlacement(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
-        trail: FootPlacement(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
+        lead: footwork.FootPlacement(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
+        trail: footwork.FootPlacement(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
     }
-    start = StanceShift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
+    start = footwork.StanceShift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
     shifts = _plan_footwork(rng, start, begins)
-    place, facing = plan_body_path(t, start, shifts)
-    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
+    place, facing = footwork.plan_body_path(t, start, shifts)
+    plants = footwork.plan_steps(rng, stance, start, shifts, float(t[-1]))
     feet = {
-        lead: plan_foot(t, skeleton, lead, plants[lead], 0.02 + style.knees_out_rad, act["lead heel"]),
-        trail: plan_foot(
+        lead: footwork.plan_foot(t, skeleton, lead, plants[lead], 0.02 + style.knees_out_rad, act["lead heel"]),
+        trail: footwork.plan_foot(
             t, skeleton, trail, plants[trail], 0.02 + style.knees_out_rad, act["trail heel"], s * act["pivot"]
         ),
     }
@@ -73,7 +71,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     )
     ahead = -0.13 * leg - 0.03 + act["ahead"] + smooth_noise(rng, t, 2.5, 0.006)
     place = place + horizontal_vector(facing, ahead, s * act["side"] + smooth_noise(rng, t, 2.5, 0.006))
-    top = highest_root_m(skeleton, place, pelvis, feet, 0.985)
+    top = footwork.highest_root_m(skeleton, place, pelvis, feet, 0.985)
     height = (
         np.median(top)
         - (style.crouch + float(rng.uniform(0.025, 0.05))) * leg
@@ -218,13 +216,15 @@ def _waggle_keyframes(rng: np.random.Generator, lasts_s: float, size: float = 1.
     return [(float(a), float(b)) for a, b in zip(times, swing, strict=True)]
 
 
-def _plan_footwork(rng: np.random.Generator, start: StanceShift, begins: list[float]) -> list[StanceShift]:
+def _plan_footwork(
+    rng: np.random.Generator, start: footwork.StanceShift, begins: list[float]
+) -> list[footwork.StanceShift]:
     """Small steps to the next ball, starting at the times `begins` [s]."""
-    shifts: list[StanceShift] = []
+    shifts: list[footwork.StanceShift] = []
     place, yaw = np.array(start.place_m), start.yaw_rad
     for at_s in begins:
         place = 0.5 * place + rng.normal(0.0, 0.05, 2)
         yaw += rng.normal(0.0, 0.08)
         if at_s > 0.0:
-            shifts.append(StanceShift(at_s, (float(place[0]), float(place[1])), yaw, 0.42, 0.10, 0.025))
+            shifts.append(footwork.StanceShift(at_s, (float(place[0]), float(place[1])), yaw, 0.42, 0.10, 0.025))
     return shifts

@@ -4,28 +4,114 @@ Timing follows Bobbert and van Ingen Schenau (1988): the push takes 0.25 to 0.35
 flight the root accelerates with gravity exactly; push and landing match its position, speed and acceleration.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.rotations import wrap_angle
 from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, SIDES, ArticulatedFigure, FootTarget
 from harness.mocap.synthetic.curves import (
     GRAVITY_M_S2,
+    Gesture,
     interpolate_keys,
+    keyframes_at,
     minimum_jerk,
     pulse,
     quintic_spline,
     smooth_maximum,
     smooth_minimum,
     smooth_noise,
+    sum_gestures,
 )
-from harness.mocap.synthetic.foot_trajectory import BALL_M, pose_foot
-from harness.mocap.synthetic.footwork import highest_root_m, leg_length_m
-from harness.mocap.synthetic.gestures import Gesture, keyframes_at, sum_gestures
-from harness.mocap.synthetic.jump_plan import JUMP_KINDS, Jump, plan_jumps
+from harness.mocap.synthetic.footwork import BALL_M, highest_root_m, leg_length_m, pose_foot
 from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
-from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
+
+JUMP_KINDS = ("up", "forward", "side", "turning", "series")
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One jump: its times [s], the depth of its crouches, and where it goes."""
+
+    down_s: float
+    """Start of the countermovement."""
+    bottom_s: float
+    """Lowest point of the countermovement."""
+    leave_s: float
+    land_s: float
+    landing_bottom_s: float
+    """Lowest point of the landing."""
+    up_s: float
+    """End of the landing, standing upright."""
+    dip: float
+    """Depth of the countermovement as a share of the leg."""
+    landing_depth: float
+    """Depth of the landing as a share of the leg."""
+    displacement_m: tuple[float, float]
+    """Horizontal displacement in the world [m]."""
+    turn_rad: float
+    rebound: bool
+    """Whether the next jump starts from the lowest point of this landing."""
+
+    @property
+    def flight_s(self) -> float:
+        return self.land_s - self.leave_s
+
+
+def plan_jumps(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[list[Jump], float]:
+    """The jumps of a take, most of them of one kind, and the first heading [rad].
+
+    A performer who is far from the origin turns back towards it.
+    """
+    yaw0 = yaw = float(rng.uniform(-np.pi, np.pi))
+    jumps: list[Jump] = []
+    now, rebound, left_in_series, hand = float(t[0]) + rng.uniform(0.3, 0.9), False, 0, 1.0
+    place = np.zeros(2)
+    slow = rng.uniform(0.95, 1.1) / habits.pace
+    mean_flight_s = rng.uniform(0.36, 0.50) * habits.size**0.5
+    while not jumps or now < t[-1] - 0.5:
+        jump_kind = kind if rng.random() < 0.7 or left_in_series else str(rng.choice(JUMP_KINDS))
+        if jump_kind == "series" and not left_in_series:
+            left_in_series = int(rng.integers(3, 7))
+        flight_s = float(np.clip(mean_flight_s * rng.uniform(0.9, 1.1), 0.30, 0.56))
+        along, aside, turn = 0.0, 0.0, 0.0
+        if jump_kind == "forward":
+            along = rng.uniform(0.35, 0.95) * flight_s / 0.45
+        elif jump_kind == "side":
+            aside, hand = hand * rng.uniform(0.25, 0.5), -hand
+        elif jump_kind == "turning":
+            turn = float(rng.choice([-1.0, 1.0])) * rng.uniform(0.7, 1.5)
+        elif jump_kind == "series":
+            along = rng.uniform(0.0, 0.12)
+        if np.hypot(*place) > 1.2 and along > 0.3:
+            home = np.arctan2(-place[1], -place[0])
+            turn = float(np.clip(wrap_angle(home - yaw), -1.5, 1.5))
+            along = 0.15
+        bottom_s = now if rebound else now + rng.uniform(0.45, 0.65) * slow
+        leave_s = bottom_s + rng.uniform(0.29, 0.36) * slow
+        land_s = leave_s + flight_s
+        landing_bottom_s = land_s + rng.uniform(0.25, 0.34) * slow
+        left_in_series = max(left_in_series - 1, 0)
+        again = left_in_series > 0
+        up_s = landing_bottom_s if again else landing_bottom_s + rng.uniform(0.5, 0.75) * slow
+        landing_depth = rng.uniform(0.18, 0.26) if again else rng.uniform(0.14, 0.28)
+        dip = jumps[-1].landing_depth if rebound else rng.uniform(0.26, 0.38)
+        move_m = horizontal_vector(yaw, along, aside)
+        down_s = bottom_s if rebound else now
+        displacement = (float(move_m[0]), float(move_m[1]))
+        jumps.append(
+            Jump(
+                down_s, bottom_s, leave_s, land_s, landing_bottom_s, up_s, dip, landing_depth, displacement, turn, again
+            )
+        )
+        yaw += turn
+        place += move_m
+        rebound = again
+        now = landing_bottom_s if again else up_s + rng.uniform(0.15, 0.9)
+    return jumps, yaw0
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:

@@ -10,21 +10,11 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
+from harness.mocap.synthetic import footwork
 from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
-from harness.mocap.synthetic.curves import smooth_minimum, smooth_noise
-from harness.mocap.synthetic.foot_trajectory import plan_foot
-from harness.mocap.synthetic.footwork import (
-    FootPlacement,
-    StanceShift,
-    highest_root_m,
-    leg_length_m,
-    plan_body_path,
-    plan_steps,
-)
-from harness.mocap.synthetic.gestures import Gesture, Keyframes, sum_gestures
+from harness.mocap.synthetic.curves import Gesture, Keyframes, smooth_minimum, smooth_noise, sum_gestures
 from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
-from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
 
 _FOREHAND: Mapping[str, Keyframes] = {
     "ahead": [(0.0, 0.0), (0.34, -0.30), (0.52, 0.14), (0.64, 0.16), (1.05, 0.0)],
@@ -111,22 +101,22 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     bat, style = habits.hand, habits.style
     free = "l" if bat == "r" else "r"
     s = SIDE_SIGN[free]  # the side of the bat has the sign -s
-    leg = leg_length_m(skeleton)
+    leg = footwork.leg_length_m(skeleton)
     size, slow = habits.size * float(rng.uniform(0.95, 1.15)), float(rng.uniform(0.92, 1.12)) / habits.pace
     crouch = style.crouch + float(rng.uniform(0.06, 0.13))
 
     start, shifts, strokes = _plan_rallies(rng, t, size, slow, _STROKE_FREQUENCIES[take % len(_STROKE_FREQUENCIES)], -s)
     stance = {
-        bat: FootPlacement(-0.06 * leg, -s * 0.34 * leg * style.width, -s * 0.30),
-        free: FootPlacement(0.12 * leg, s * 0.34 * leg * style.width, s * 0.18),
+        bat: footwork.FootPlacement(-0.06 * leg, -s * 0.34 * leg * style.width, -s * 0.30),
+        free: footwork.FootPlacement(0.12 * leg, s * 0.34 * leg * style.width, s * 0.18),
     }
-    place, facing = plan_body_path(t, start, shifts)
-    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
+    place, facing = footwork.plan_body_path(t, start, shifts)
+    plants = footwork.plan_steps(rng, stance, start, shifts, float(t[-1]))
     act = sum_gestures(t, strokes)
     bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.5 + smooth_noise(rng, t, 3.0, 0.12)))
     knees_out = 0.10 + style.knees_out_rad
     feet = {
-        side: plan_foot(t, skeleton, side, plants[side], knees_out, 0.10 + 0.03 * np.sin(bounce))
+        side: footwork.plan_foot(t, skeleton, side, plants[side], knees_out, 0.10 + 0.03 * np.sin(bounce))
         for side in (bat, free)
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.35, 0.5) + rng.uniform(0.0, 6.0))
@@ -147,7 +137,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     )
     ahead = -0.06 * leg - 0.05 + act["forward"] + 0.012 * np.sin(bounce) + smooth_noise(rng, t, 1.8, 0.01)
     place = place + horizontal_vector(facing, ahead, s * act["side"] + smooth_noise(rng, t, 1.8, 0.012))
-    top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
+    top = footwork.highest_root_m(skeleton, place, pelvis, feet, 0.975)
     height = np.median(top) - crouch * leg - act["dip"] + 0.010 * np.sin(bounce) + smooth_noise(rng, t, 2.0, 0.006)
     root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
     lift, reach = style.shoulder_rad
@@ -205,11 +195,11 @@ def _pose_arm(
 
 def _plan_rallies(
     rng: np.random.Generator, t: Floats, size: float, slow: float, style: tuple[float, ...], bat_side: float
-) -> tuple[StanceShift, list[StanceShift], list[Gesture]]:
+) -> tuple[footwork.StanceShift, list[footwork.StanceShift], list[Gesture]]:
     """Start, side steps and strokes of a take; balls come to the forehand or the backhand corner."""
     yaw = float(rng.uniform(-np.pi, np.pi))
-    start = StanceShift(0.0, (0.0, 0.0), yaw)
-    shifts: list[StanceShift] = []
+    start = footwork.StanceShift(0.0, (0.0, 0.0), yaw)
+    shifts: list[footwork.StanceShift] = []
     strokes: list[Gesture] = []
     left_in_rally = int(rng.integers(2, 7))
     now = float(t[0]) - rng.uniform(0.0, 0.8)
@@ -229,7 +219,7 @@ def _plan_rallies(
             aside, ahead = aside + move, float(np.clip(0.5 * ahead + deep, -0.25, 0.25))
             step_s *= 0.75 + 1.3 * abs(move)
             spot = (float(c * ahead - d * aside), float(d * ahead + c * aside))
-            shifts.append(StanceShift(now - 0.15, spot, heading, step_s, rng.uniform(0.0, 0.05), 0.025))
+            shifts.append(footwork.StanceShift(now - 0.15, spot, heading, step_s, rng.uniform(0.0, 0.05), 0.025))
             busy_s = now - 0.15 + 2.0 * step_s + 0.15
         now += rng.uniform(0.95, 1.35) * slow
         left_in_rally -= 1

@@ -10,13 +10,10 @@ from harness.core.files import move_into_place, remove_leftovers, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.body_model import BodyModel, stick_figure
 from harness.mocap.write.bvh import bvh_files
-from harness.mocap.write.csv_table import csv_files
 from harness.mocap.write.gltf import glb_files
-from harness.mocap.write.mot import mot_files
+from harness.mocap.write.opensim import mot_files, sto_files, trc_files
 from harness.mocap.write.posed_motion import ExportableCell, PosedMotion, pose_truth_and_estimate
-from harness.mocap.write.sto import sto_files
-from harness.mocap.write.trc import trc_files
-from harness.mocap.write.tum import tum_files
+from harness.mocap.write.tables import csv_files, tum_files
 
 _AnyCell = TypeVar("_AnyCell", bound=ExportableCell)
 _FORMATS_BY_MOTION: Mapping[str, Callable[[PosedMotion], Mapping[str, str]]] = {

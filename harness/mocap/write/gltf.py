@@ -12,10 +12,9 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.mocap.write.body_model import BodyModel, StationPlace
+from harness.mocap.write.body_model import BodyModel, MountedStation, merge_meshes, tessellate_box, tessellate_shape
 from harness.mocap.write.gltf_builder import GltfBuilder
 from harness.mocap.write.posed_motion import PosedMotion
-from harness.mocap.write.tessellation import merge_meshes, tessellate_box, tessellate_shape
 
 GLTF_FROM_WORLD: Floats = np.array([0.5, -0.5, -0.5, -0.5])
 """Quaternion (w, x, y, z) from world axes (x forward, y left, z up) to glTF's (x left, y up, z forward)."""
@@ -82,7 +81,7 @@ class _BodyTree:
             self.targets.append({"node": node, "path": path})
         return node
 
-    def _add_station(self, place: StationPlace) -> int:
+    def _add_station(self, place: MountedStation) -> int:
         return self._gltf.add(
             "nodes",
             name=f"{self._kind} station {place.name}",

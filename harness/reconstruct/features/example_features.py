@@ -2,7 +2,7 @@
 
 Features are those of Kim et al. 2012, eq. 2: position, velocity and orientation of each station, times the square roots
 of their weights, so that squared Euclidean distances are those of eq. 2. They are relative to an anchor frame
-(`anchor_frame`). Columns: 3 S positions, 4 S orientations, 3 S velocities.
+(`solver.ground_frame`). Columns: 3 S positions, 4 S orientations, 3 S velocities.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,9 @@ from harness.core.ranges import Range
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Lookup, make_index
-from harness.reconstruct.index.partial_search import nearest_exact, nearest_partial
+from harness.reconstruct.index.exact import nearest_exact, nearest_partial
 from harness.reconstruct.index.selection import AUTO, KD_TREE_MAX_NEIGHBOURS
-from harness.reconstruct.solver.anchor_frame import AnchorFrame, anchor_of, twist_rad
-from harness.reconstruct.solver.ground_frame import relative_ground
+from harness.reconstruct.solver.ground_frame import AnchorFrame, anchor_of, relative_ground, twist_rad
 
 Codes = NDArray[np.int16]
 _POSITION_STEP_M, _QUATERNION_STEP, _VELOCITY_STEP_M_S, _MAX_CODE = 2e-4, 1.0 / 32_000, 1e-3, 32_767

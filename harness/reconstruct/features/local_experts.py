@@ -9,7 +9,7 @@ covariance of these errors enters the regression of the first expert (`moment_ta
 a ridge instead, which was better on validation clips (docs/notes/tuning.md).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ _POSE_ERROR_RAD = float(np.deg2rad(2.0))
 """Standard deviation of the error of an estimated pose, equal for the poses of a window [rad; m for the height]."""
 
 
-@dataclass(frozen=True, eq=False)
-class FeatureMap:
+class FeatureMap(NamedTuple):
     """Map from predictors (P,), of which some are known, to features, and the covariance of the features' errors."""
 
     matrix: Floats

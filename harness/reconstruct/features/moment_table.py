@@ -17,7 +17,7 @@ import numpy as np
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.reconstruct.index.clustering import cluster_vectors
+from harness.reconstruct.index.decomposition import cluster_vectors
 
 MAX_CELLS = 448
 """Largest number of cells: with 32 features and 52 targets a table then takes 6.6 MB."""

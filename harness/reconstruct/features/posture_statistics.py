@@ -1,4 +1,4 @@
-"""Mean and spread of the hinge angles of examples, on which priors of the posture rest."""
+"""Statistics of examples on which priors rest: mean and spread of the hinge angles, height of a standing toe."""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,8 +10,13 @@ from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.solver.floor_contact import toe_tree
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.kinematic_tree import forward_kinematics_batch, new_state
+
+_SAMPLE = 4096
+"""Largest number of frames that are used, evenly spaced."""
 
 
 def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Floats:
@@ -40,6 +45,15 @@ def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, cent
     return np.sqrt(total / count)
 
 
+def scaled_spread_rad(
+    body: Body, examples: Sequence[BodyMotion] | MotionDatabase, centre: Floats, rms_rad: float, least_rad: float
+) -> Floats:
+    """(48,) standard deviations in proportion to `spread_rad`, at least `least_rad`, scaled to this RMS [rad]."""
+    spread = np.maximum(spread_rad(body, examples, centre), least_rad)
+    out: Floats = rms_rad * (spread / np.sqrt(np.mean(spread**2)))
+    return out
+
+
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
     """Principal hinge angles (T, 48) [rad], take by take, since a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):
@@ -49,3 +63,13 @@ def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | Moti
     else:
         for take in examples:
             yield limits.principal(take.qpos[:, 7:])
+
+
+def toe_height_m(body: Body, database: MotionDatabase) -> float:
+    """The median height of the lower toe [m]. It is above 0, since the toe's joint lies inside the foot."""
+    rows = np.linspace(0, len(database) - 1, min(len(database), _SAMPLE)).astype(np.int64)
+    qpos, tree = database.qpos(rows, np.zeros(3)), toe_tree(body)
+    at_m, turned = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 4))
+    forward_kinematics_batch(tree, new_state(tree), qpos, at_m, turned)
+    database.release_memory()
+    return float(np.median(at_m[..., 2].min(axis=1)))

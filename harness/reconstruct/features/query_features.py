@@ -2,22 +2,21 @@
 
 The anchor's own orientation gives the heading. Where it was not measured, the root of the last estimate is fitted to
 the readings and the missing values are taken from it. Their confidence is 0, so they only propose candidates in the
-search (`index.partial_search`).
+search (`index.exact`).
 """
 
 import math
 
 import numpy as np
 
-from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.features.example_features import ExampleFeatures, Query
-from harness.reconstruct.solver.anchor_frame import AnchorFrame
-from harness.reconstruct.solver.device_time import DeviceTime
+from harness.reconstruct.solver.ground_frame import AnchorFrame
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
+from harness.reconstruct.solver.status_monitor import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 LONGEST_GAP_S = 0.2
@@ -26,22 +25,20 @@ LONGEST_GAP_ADVICE = f"Leave it out: velocities are computed over at most {LONGE
 """For `RENAMED_KEYS` of methods, where it was an option."""
 
 
+Reading = tuple[Floats, Floats, Bools]
+"""Positions (S, 3) [m], their times (S,) [s], and where they were measured: (S,) or more, of which S count."""
+
+
 class QueryFeatures:
     """Computes the features of each frame of a session."""
 
     def __init__(
-        self,
-        residuals: Residuals,
-        calibration: Calibration,
-        examples: ExampleFeatures,
-        clock: DeviceTime | None = None,
+        self, residuals: Residuals, calibration: Calibration, examples: ExampleFeatures, clock: DeviceTime | None = None
     ) -> None:
         """`clock` is that of the session; without one the features have their own."""
         count = len(calibration.stations)
         self._residuals, self._examples = residuals, examples
-        self._identity = np.tile(rotations.IDENTITY, (count, 1))
-        self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
-        self._before_valid: Bools = np.zeros(count, bool)
+        self._before: Reading = np.zeros((count, 3)), np.full(count, np.nan), np.zeros(count, bool)
         self._time = clock or DeviceTime()
         self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
         """(S, 3) positions of the last query, measured or filled in, and its time by the device's clock [s]."""
@@ -53,16 +50,15 @@ class QueryFeatures:
         has no velocity, and neither has any station at the start or after a gap.
         """
         residuals, examples = self._residuals, self._examples
-        velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
+        velocity_m_s, moving = np.empty_like(self._before[0]), np.empty_like(self._before[2])
         complete, all_moving = _estimate_velocities(
-            *(residuals.target_m, frame.measured_s, residuals.measured),
-            *(self._before_m, self._before_s, self._before_valid),
-            *(velocity_m_s, moving),
+            *((residuals.target_m, frame.measured_s, residuals.measured), self._before, velocity_m_s, moving)
         )
         position_m, turned = residuals.target_m, residuals.world_from_target
         facing = turned[examples.anchor]
         if not complete:
-            position_m, turned, facing = self._completed_readings(last_qpos)
+            position_m, turned = residuals.completed(place_root(residuals, last_qpos))
+            facing = turned[examples.anchor]
         now_s = self._time.frame_time_s(frame)
         gap_s = now_s - self._shown_s
         filled = 0.0 < gap_s <= LONGEST_GAP_S
@@ -76,37 +72,21 @@ class QueryFeatures:
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
         query, confidence = _compute_features(
-            *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
+            *((position_m, turned, velocity_m_s), view, examples.hemisphere, examples.scale),
             *(residuals.confidence, moving),
         )
         return Query(view, query, confidence, filled)
 
-    def _completed_readings(self, last_qpos: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions (S, 3), orientations (S, 4) and the anchor's (4,); missing ones are those of the last estimate."""
-        residuals, count = self._residuals, self._examples.count
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(place_root(residuals, last_qpos))
-        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._identity)
-        turned = np.where(facing, residuals.world_from_target, turned)
-        return np.where(here, residuals.target_m, at_m), turned, turned[self._examples.anchor]
-
 
 @compiled
-def _estimate_velocities(
-    target_m: Floats,
-    measured_s: Floats,
-    measured: Bools,
-    before_m: Floats,
-    before_s: Floats,
-    before_valid: Bools,
-    velocity_m_s: Floats,
-    has_velocity: Bools,
-) -> tuple[bool, bool]:
+def _estimate_velocities(now: Reading, before: Reading, velocity_m_s: Floats, has_velocity: Bools) -> tuple[bool, bool]:
     """Compute velocities (S, 3) since the last frame [m/s], 0 where unknown, and where they are known (S,), in place.
 
     Returns whether everything was measured, and whether all velocities are known. The frame is then stored as the last
-    one (`before_*`).
+    one (`before`).
     """
+    target_m, measured_s, measured = now
+    before_m, before_s, before_valid = before
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
         has_velocity[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= LONGEST_GAP_S
@@ -119,12 +99,8 @@ def _estimate_velocities(
 
 @compiled
 def _compute_features(
-    position_m: Floats,
-    turned: Floats,
-    velocity_m_s: Floats,
-    x_m: float,
-    y_m: float,
-    yaw_rad: float,
+    readings: tuple[Floats, Floats, Floats],
+    view: AnchorFrame,
     hemisphere: Floats,
     scale: Floats,
     reading_confidence: Floats,
@@ -134,6 +110,8 @@ def _compute_features(
 
     `reading_confidence` (2 S,) is that of positions, then orientations; velocities also need `moving` (S,).
     """
+    position_m, turned, velocity_m_s = readings
+    x_m, y_m, yaw_rad = view
     count = len(position_m)
     out, confidence = np.empty(10 * count), np.empty(10 * count)
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)

@@ -25,17 +25,17 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.ranges import Range
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.ground_step import features_from_readings
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Index, Neighbours, make_index
-from harness.reconstruct.solver.anchor_frame import (
+from harness.reconstruct.solver.ground_frame import (
     MIN_HEADING_EXPLAINED,
+    POSTURE_SIZE,
     AnchorFrame,
     HeadingEstimator,
     anchor_of,
+    features_from_readings,
     twist_rad,
 )
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 _CHUNK = 256
 """Number of windows that are processed at a time."""

@@ -1,10 +1,8 @@
 """Nearest-neighbour search among many vectors: one protocol, several implementations."""
 
-from harness.reconstruct.index.flat import FlatIndex
+from harness.reconstruct.index.exact import FlatIndex, KDTree, nearest_exact, nearest_partial
 from harness.reconstruct.index.inverted_file import InvertedFile
-from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.neighbour_graph import NeighbourGraph
-from harness.reconstruct.index.partial_search import nearest_exact, nearest_partial
 from harness.reconstruct.index.protocol import ArrayVectors, Index, Lookup, Neighbours, Vectors
 from harness.reconstruct.index.selection import INDEXES, make_index
 

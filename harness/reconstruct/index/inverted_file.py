@@ -21,8 +21,14 @@ from numpy.typing import NDArray
 from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.reconstruct.index.clustering import VECTORS_PER_CELL, draw_sample, find_centroids, nearest_centroids
-from harness.reconstruct.index.principal_axes import PrincipalAxes, chunks
+from harness.reconstruct.index.decomposition import (
+    VECTORS_PER_CELL,
+    PrincipalAxes,
+    chunks,
+    draw_sample,
+    find_centroids,
+    nearest_centroids,
+)
 from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
 Codes = NDArray[np.int16]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
-from harness.reconstruct.index.principal_axes import PrincipalAxes
+from harness.reconstruct.index.decomposition import PrincipalAxes
 from harness.reconstruct.index.protocol import CHUNK, Index, Neighbours, Vectors
 
 Links = NDArray[np.int32]

@@ -1,5 +1,6 @@
 """Protocols of nearest-neighbour search: the vectors, the lookup, and its answer."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
 
@@ -65,8 +66,17 @@ class Index(Lookup, Protocol):
         ...
 
 
-class StatelessIndex:
+class StatelessIndex(ABC):
     """Base of an `Index` whose answers do not depend on earlier queries."""
+
+    @abstractmethod
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
+        """See `Index`."""
+
+    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """See `Lookup`."""
+        rows, squared, _ = self.nearest_with_offsets(query, count)
+        return rows, squared
 
     def begin_search(self) -> Self:
         """The index itself."""

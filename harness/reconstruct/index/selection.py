@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 from harness.errors import UnknownName
-from harness.reconstruct.index.flat import FlatIndex
+from harness.reconstruct.index.exact import FlatIndex, KDTree
 from harness.reconstruct.index.inverted_file import InvertedFile
-from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.neighbour_graph import NeighbourGraph
 from harness.reconstruct.index.protocol import Index, Vectors
 

@@ -13,6 +13,7 @@ It has no options.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -25,13 +26,13 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
+from harness.reconstruct.contract import Fitted
 from harness.reconstruct.features.example_features import FeatureWeights
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 Complexes = NDArray[np.complex128]
@@ -56,36 +57,25 @@ class BestMatch:
     needs_examples: bool = True
     training_data = "examples"
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedBestMatch":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Fitted["BestMatchSession"]:
         """Keep the examples; BadInput without one of at least two frames."""
         takes = tuple(take for take in examples if len(take) > 1)
         if not takes:
             raise BadInput("The best match needs examples, and there are none.", "Name some in the scenario.")
-        return FittedBestMatch(body, takes)
-
-
-@dataclass(frozen=True, eq=False)
-class FittedBestMatch:
-    """The examples; sessions compute their readings for a calibration."""
-
-    body: Body
-    takes: tuple[BodyMotion, ...]
-
-    def begin(self, calibration: Calibration) -> "BestMatchSession":
-        return BestMatchSession(self, calibration)
+        return Fitted(partial(BestMatchSession, body, takes))
 
 
 class BestMatchSession:
     """Search among N example frames, with station poses for the mounts of a calibration."""
 
-    def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
-        self._residuals = Residuals(fitted.body, calibration, Loss())
+    def __init__(self, body: Body, takes: Sequence[BodyMotion], calibration: Calibration) -> None:
+        self._residuals = Residuals(body, calibration, Loss())
         clock = DeviceTime()
         self._monitor = StatusMonitor(clock=clock)
         self._gate = OutlierGate(len(calibration.stations), _JUMP_M, clock=clock)
-        self._qpos = np.concatenate([take.qpos for take in fitted.takes])
-        read = [station_poses(fitted.body, take, calibration) for take in fitted.takes]
-        velocity = [_backward_difference(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
+        self._qpos = np.concatenate([take.qpos for take in takes])
+        read = [station_poses(body, take, calibration) for take in takes]
+        velocity = [_backward_difference(m) * take.rate_hz for (m, _), take in zip(read, takes, strict=True)]
         self._position = _StationVectors(np.concatenate([m for m, _ in read]))
         self._velocity = _StationVectors(np.concatenate(velocity))
         self._turned = np.ascontiguousarray(np.concatenate([q for _, q in read]).transpose(1, 2, 0))

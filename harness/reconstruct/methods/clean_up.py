@@ -28,14 +28,14 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.core.training_data import declared_training_data
+from harness.core.split import declared_training_data
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
@@ -119,10 +119,7 @@ class CleanUpSession:
         frame = self._answered_frame(frame, estimate.lag)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return estimate
-        if self._alignment is None:
-            self._gate.read(frame, self._residuals)
-        else:
-            self._alignment.read(frame, self._residuals, self._gate)
+        read_frame(frame, self._residuals, self._gate, self._alignment)
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)

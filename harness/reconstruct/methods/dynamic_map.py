@@ -20,8 +20,9 @@ scenarios/tune_dynamic_map.toml and other validation clips chose them. `regressi
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -31,34 +32,26 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE, Origin
-from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.errors import BadInput
-from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
-from harness.reconstruct.features.ground_step import ground_after_step
-from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
-from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.contract import CalibrationCache
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.features.predictor_query import FeatureSearch, NeighbourSearch, PoseHistorySearch
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.index import Index, make_index
-from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
+from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
 from harness.reconstruct.solver.ground_frame import (
     HEIGHT,
     HINGES,
     POSTURE_SIZE,
     TILT,
-    ground_from_qpos,
+    ground_after_step,
     posture_from_qpos,
     qpos_from_posture,
 )
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import (
-    POSTURE_PRIOR_SIGMA_RAD,
-    PosturePrior,
-    SolverOptions,
-)
-from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
+from harness.reconstruct.solver.ik_session import SolverOptions
+from harness.reconstruct.solver.ik_solver import IKSolution, Prior, multiply_priors
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
@@ -71,7 +64,7 @@ _MIN_WEIGHT_VARIANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class DynamicMap:
+class DynamicMap(DatabaseLearner["FittedDynamicMap"], SolverOptions):
     """Options of the local dynamic model, a `Method`; scenarios/tune_dynamic_map.toml chose the defaults."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
@@ -84,8 +77,6 @@ class DynamicMap:
 
     name: str = "dynamic_map"
     summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
-    needs_examples: bool = True
-    training_data = "examples"
     search: Literal["features", "history"] = "features"
     """Search of the neighbours: by the last estimates and the readings, or by the last estimates alone (the paper)."""
     regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
@@ -128,34 +119,22 @@ class DynamicMap:
     closest example if that does not converge or leaves outliers."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
-    loss: Loss = field(default_factory=Loss)
-    """Scales and robust loss of the residuals."""
-    jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
-    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    align: bool = False
-    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    stopping: Stopping = field(default_factory=Stopping)
-    """Convergence criteria of the solver."""
+    jump_m: Annotated[float, Range(0.0, math.inf)] = field(default=0.1, kw_only=True)
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedDynamicMap":
-        """Build the database; BadInput without examples of more than `poses` frames."""
-        if not any(len(take) > self.poses for take in examples):
-            message = f"A dynamic map needs examples of more than {self.poses} frames, and there are none."
-            raise BadInput(message, "Name some in the scenario.")
-        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
+    @property
+    def fewest_frames(self) -> int:
+        return self.poses + 1
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
         """Learn from a database, which may lie on disk."""
-        windows = database.windows(self.poses, with_successor=True)
-        index = make_index(self.index, windows, self.neighbours) if self.search == "history" else None
-        return FittedDynamicMap(
-            self, body, windows, index, mean_posture(body, database), Ik().posture_prior(body, database)
-        )
+        examples = WindowExamples.learn(body, database, self.poses)
+        index = make_index(self.index, examples.windows, self.neighbours) if self.search == "history" else None
+        return FittedDynamicMap(self, examples, index)
 
 
 WINDOW = DynamicMap(
-    "dynamic_map:window",
-    "dynamic_map with examples found by history alone, as in Liu et al. 2011, and regularised",
+    name="dynamic_map:window",
+    summary="dynamic_map with examples found by history alone, as in Liu et al. 2011, and regularised",
     search="history",
     poses=2,
     neighbours=100,
@@ -172,24 +151,18 @@ WINDOW = DynamicMap(
     turn_sigma_rad=math.radians(10.0),
     jump_m=JUMP_M,
 )
-LITERAL = DynamicMap(
-    "dynamic_map:literal",
-    "Liu et al. 2011 as printed, eq. 2 to 14, with constants chosen on validation clips",
-    search="history",
-    poses=2,
+LITERAL = replace(
+    WINDOW,
+    name="dynamic_map:literal",
+    summary="Liu et al. 2011 as printed, eq. 2 to 14, with constants chosen on validation clips",
     neighbours=200,
     width=0.0,
     variance_kept=0.6,
     ridge=0.0,
-    covariance="diagonal",
     spread=1.0,
-    widening=0.0,
-    ik_prior_weight=0.0,
     least_sigma_rad=math.radians(0.01),
     tilt_sigma_rad=math.radians(0.01),
     height_sigma_m=1e-4,
-    step_sigma_m=0.3,
-    turn_sigma_rad=math.radians(10.0),
     start="closest",
     loss=Loss(
         position_sigma_m=0.0007,
@@ -212,24 +185,20 @@ class FittedDynamicMap:
     """The windows of the examples and their search index."""
 
     options: DynamicMap
-    body: Body
-    windows: Windows
+    examples: WindowExamples
     index: Index | None
     """Index of the windows; None when `search` is "features"."""
-    mean_qpos: Floats
-    """(55,) mean posture, the prior of frames without a history."""
-    ik_prior: PosturePrior
-    """Prior of `ik`."""
     _regression_cache: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
 
     def regression(self, calibration: Calibration) -> ReducedRankRegression:
         """The reduced-rank regression for the mounts of a calibration; cached."""
+        examples, options = self.examples, self.options.regression
         return self._regression_cache.get(
-            calibration, lambda: ReducedRankRegression(self.body, self.windows, calibration, self.options.regression)
+            calibration, lambda: ReducedRankRegression(examples.body, examples.windows, calibration, options)
         )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
-        self.windows.database.release_memory()  # pages that earlier sessions read
+        self.examples.windows.database.release_memory()  # pages that earlier sessions read
         return DynamicMapSession(self, calibration)
 
 
@@ -250,19 +219,12 @@ class DynamicMapSession(HistorySession):
     """Follows one performer; fits a local model to every frame."""
 
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
-        options, windows = fitted.options, fitted.windows
-        solver_options = SolverOptions(
-            options.loss,
-            True,
-            options.jump_m,
-            stopping=options.stopping,
-            align=options.align,
-        )
-        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
+        options, examples = fitted.options, fitted.examples
+        windows = examples.windows
         super().__init__(
-            fitted.body, calibration, solver_options, posture_prior, options.poses, windows.database.rate_hz
+            *(examples.body, calibration, options, examples.mean_prior), *(options.poses, windows.database.rate_hz)
         )
-        self._options, self._windows, self._ik_prior = options, windows, fitted.ik_prior
+        self._options, self._windows, self._ik_prior = options, windows, examples.ik_prior
         self._neighbours: NeighbourSearch
         if fitted.index is None:
             regression = fitted.regression(calibration)
@@ -286,13 +248,7 @@ class DynamicMapSession(HistorySession):
         prediction = self.predict()
         if self._options.start == "closest":
             return self._solve(prediction, prediction.closest)
-        solution = self._solve(prediction, prediction.mean)
-        if solution.converged and self.outlier_share() == 0.0:
-            return solution
-        second = self._solve(prediction, prediction.closest)
-        best = second if second.cost < solution.cost else solution
-        self.residuals.evaluate(best.qpos)
-        return best
+        return self.solve_from_either(partial(self._solve, prediction), prediction.mean, prediction.closest)
 
     def solve_cold(self) -> IKSolution:
         """The best pose under the prediction from the readings alone, where they suffice."""
@@ -309,12 +265,7 @@ class DynamicMapSession(HistorySession):
             *(start for posture in postures for start in candidate_placements(self.residuals, posture)),
         ]
         prior = self.joint_prior(prediction)
-        solutions = [
-            self._subspace_solver.solve(prior, ground_from_qpos(start), posture_from_qpos(start)) for start in starts
-        ]
-        best = min(solutions, key=lambda solution: solution.cost)
-        self.residuals.evaluate(best.qpos)
-        return best
+        return self.cheapest_in_subspace(self._subspace_solver, prior, starts)
 
     def solve_without_history(self, frame: TrackerFrame) -> IKSolution:
         """As `solve_cold`, but from the last estimate's place alone."""

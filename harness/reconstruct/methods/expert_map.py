@@ -13,8 +13,8 @@ Sources: Liu et al. 2011 (prediction times likelihood), Hinton 2002 (product of 
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -24,19 +24,15 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
-from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.errors import BadInput
-from harness.reconstruct.contract import Session
-from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.contract import CalibrationCache, Session
+from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad, toe_height_m
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
-from harness.reconstruct.features.toe_height import toe_height_m
-from harness.reconstruct.methods.ik import Ik
+from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
 from harness.reconstruct.solver.fixed_lag import FixedLagSession
 from harness.reconstruct.solver.floor_contact import FloorContact
 from harness.reconstruct.solver.ground_frame import (
@@ -48,12 +44,10 @@ from harness.reconstruct.solver.ground_frame import (
     qpos_from_posture,
 )
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
+from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
-from harness.reconstruct.solver.loss_scale import LossScale
-from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
-from harness.reconstruct.solver.self_calibration import SelfCalibration, posterior
+from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
@@ -76,14 +70,17 @@ _LAG_WEIGHTS = {1: (0.15, 0.7, 0.15), 2: (0.02, 0.14, 0.68, 0.14, 0.02)}
 """Weights of the poses for each fixed lag. The jitter is then about that of true motion."""
 
 
+Gaussian = tuple[Floats, Floats]
+"""Mean (P,) and covariance (P, P) of a posture."""
+
+
 @dataclass(frozen=True)
-class ExpertMap:
+class ExpertMap(DatabaseLearner["FittedExpertMap"]):
     """Options of the product of local experts, a `Method`."""
 
     name: str = "expert_map"
     summary: str = "maximum a posteriori pose under tabulated local experts, with self-calibrated noise"
-    needs_examples: bool = True
-    training_data = "examples"
+    fewest_frames = POSES + 1
     neighbours: Annotated[int, Range(2, 1_000_000)] = 1800
     """K: number of examples in the local model of readings and history."""
     history_neighbours: Annotated[int, Range(2, 1_000_000)] = 400
@@ -102,21 +99,11 @@ class ExpertMap:
     jump_m: Annotated[float, Range(0.0, math.inf)] = 0.1
     """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedExpertMap":
-        """Build the database; BadInput without examples of more than three frames."""
-        if not any(len(take) > POSES for take in examples):
-            message = f"{self.name} needs examples of more than {POSES} frames, and there are none."
-            raise BadInput(message, "Name some in the scenario.")
-        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
-
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedExpertMap":
         """Learn from a database, which may lie on disk."""
-        windows = database.windows(POSES, with_successor=True)
-        ik_prior = Ik().posture_prior(body, database)
-        floor_m = toe_height_m(body, database)
-        mean_qpos = mean_posture(body, database)
-        least_sigma_rad = _SPREAD_SHARE * spread_rad(body, database, mean_qpos)
-        return FittedExpertMap(self, body, windows, mean_qpos, ik_prior, floor_m, least_sigma_rad)
+        examples = WindowExamples.learn(body, database, POSES)
+        least_sigma_rad = _SPREAD_SHARE * spread_rad(body, database, mean_posture(body, database))
+        return FittedExpertMap(self, examples, toe_height_m(body, database), least_sigma_rad)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +111,7 @@ class FittedExpertMap:
     """The windows of the examples, and the experts for the last calibration."""
 
     options: ExpertMap
-    body: Body
-    windows: Windows
-    mean_qpos: Floats
-    """(55,) mean posture, the prior of frames without a history."""
-    ik_prior: PosturePrior
-    """Prior of `ik`."""
+    examples: WindowExamples
     floor_m: float
     """Height of a toe on the floor [m]."""
     least_sigma_rad: Floats
@@ -146,9 +128,8 @@ class FittedExpertMap:
         """The regression for the mounts of a calibration, and its experts by the identity of their regression."""
 
         def make() -> tuple[ReducedRankRegression, dict[int, LocalExperts]]:
-            regression = ReducedRankRegression(
-                self.body, self.windows, calibration, ReducedRankOptions(directions=FEATURES)
-            )
+            examples, options = self.examples, ReducedRankOptions(directions=FEATURES)
+            regression = ReducedRankRegression(examples.body, examples.windows, calibration, options)
             return regression, {id(regression): LocalExperts(regression)}
 
         return self._cache.get(calibration, make)
@@ -164,21 +145,19 @@ class ExpertMapSession(HistorySession):
         regression: ReducedRankRegression,
         experts: dict[int, LocalExperts],
     ) -> None:
-        options, loss = fitted.options, Loss()
-        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
-        solver_options = SolverOptions(loss, True, options.jump_m, align=options.align)
-        super().__init__(
-            fitted.body, calibration, solver_options, posture_prior, POSES, fitted.windows.database.rate_hz
-        )
-        self._options, self._ik_prior, self._made = options, fitted.ik_prior, experts
+        options, examples = fitted.options, fitted.examples
+        solver_options = SolverOptions(jump_m=options.jump_m, align=options.align)
+        loss, rate_hz = solver_options.loss, examples.windows.database.rate_hz
+        super().__init__(examples.body, calibration, solver_options, examples.mean_prior, POSES, rate_hz)
+        self._options, self._ik_prior, self._made = options, examples.ik_prior, experts
         self._least_sigma_rad = fitted.least_sigma_rad
         self._query = PredictorQuery(regression, self.residuals)
         self._experts = experts[id(regression)]
         self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
         self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
-        self._contact = FloorContact(fitted.body, self.residuals, fitted.floor_m, fitted.windows.database.rate_hz)
+        self._contact = FloorContact(examples.body, self.residuals, fitted.floor_m, rate_hz)
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
-        self._loss_scale = LossScale(loss.position_scale_m, fitted.windows.database.rate_hz)
+        self._loss_scale = LossScale(loss.position_scale_m, rate_hz)
         self._prior: Subspace | None = None
         """Prior of the pose that was solved last; None when inverse kinematics answered."""
         self._angle_sigma_rad: Floats = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
@@ -193,13 +172,8 @@ class ExpertMapSession(HistorySession):
     def solve_next(self) -> IKSolution:
         self._prior = prior = self._predict(history=True)
         ground = self._next_ground()
-        solution = self._solver.solve(prior, ground, prior.mean)
-        if solution.converged and self.outlier_share() == 0.0:
-            return solution
-        second = self._solver.solve(prior, ground, posture_from_qpos(self.past[0]))
-        best = second if second.cost < solution.cost else solution
-        self.residuals.evaluate(best.qpos)
-        return best
+        solve = partial(self._solver.solve, prior, ground)
+        return self.solve_from_either(solve, prior.mean, posture_from_qpos(self.past[0]))
 
     def solve_cold(self) -> IKSolution:
         """The best pose under the expert of the readings, where they suffice; else by inverse kinematics."""
@@ -211,10 +185,7 @@ class ExpertMapSession(HistorySession):
         self._prior = prior = self._predict(history=False)
         posture = qpos_from_posture(prior.mean, np.zeros(3))
         starts = [by_ik.qpos, *candidate_placements(self.residuals, posture)]
-        solutions = [self._solver.solve(prior, ground_from_qpos(start), posture_from_qpos(start)) for start in starts]
-        best = min(solutions, key=lambda solution: solution.cost)
-        self.residuals.evaluate(best.qpos)
-        return best
+        return self.cheapest_in_subspace(self._solver, prior, starts)
 
     def solve_without_history(self, frame: TrackerFrame) -> IKSolution:
         """As `solve_cold`, but from the last estimate's place alone."""
@@ -268,15 +239,15 @@ class ExpertMapSession(HistorySession):
         mean, covariance = condition(local, z, noise, _RIDGE)
         mean[HINGES] = self.limits.clip(mean[HINGES])
         widened = 1.0 + (options.widening * local.nearest / len(z)) ** 2
-        other_mean, other, weight = mean, covariance, 0.0
+        other, weight = (mean, covariance), 0.0
         if history and options.history_weight > 0.0:
             u = predictors[: len(experts.history_axes)] @ experts.history_axes - experts.history_origin
             around = local_gaussian(experts.history_table, u, options.history_neighbours, _HISTORY_WIDTH)
-            other_mean, other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
+            other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
             weight = options.history_weight / math.sqrt(widened)
         precision, linear = self._ik_terms(mean, 1.0 - 1.0 / widened)
-        factors = widened * scales.prior, weight / scales.prior
-        prior = _product(mean, covariance, factors[0], other_mean, other, factors[1], precision, linear)
+        expert, factor, power = (mean, covariance), widened * scales.prior, weight / scales.prior
+        prior = _product(expert, factor, other, power, precision, linear)
         return self._contact.constrain(prior, history)
 
     def _ik_terms(self, mean: Floats, weight: float) -> tuple[Floats, Floats]:
@@ -302,26 +273,21 @@ def _extrapolate_ground(newest: Floats, before: Floats) -> Floats:
 
 @compiled
 def _product(
-    mean: Floats,
-    covariance: Floats,
-    factor: float,
-    other_mean: Floats,
-    other: Floats,
-    weight: float,
-    precision: Floats,
-    linear: Floats,
+    expert: Gaussian, factor: float, other: Gaussian, weight: float, precision: Floats, linear: Floats
 ) -> Subspace:
     """The prior: two experts, the second with a power, and independent terms of each number, linear about `mean`.
 
-    `covariance` and `other` (P, P) are overwritten.
+    The covariances (P, P) are overwritten.
     """
+    mean, covariance = expert
+    other_mean, other_covariance = other
     size = len(mean)
     _add_floor(covariance, 0.0)
     covariance *= factor
     curvature = invert_positive_definite(covariance)
     if weight > 0.0:
-        _add_floor(other, _HISTORY_SIGMA_RAD**2)
-        inverse = invert_positive_definite(other)
+        _add_floor(other_covariance, _HISTORY_SIGMA_RAD**2)
+        inverse = invert_positive_definite(other_covariance)
         linear = linear + weight * np.dot(inverse, other_mean - mean)
         curvature += weight * inverse
     for i in range(size):

@@ -6,7 +6,7 @@ has no prior. A position that jumps is left out by the outlier gate.
 
 Source: the field's standard method; papers use it as a baseline and as the last step of other methods.
 
-Options, with units and defaults, are the fields of `Ik`. Three groups matter:
+Options, with units and defaults, are the fields of `Ik` and of `SolverOptions`. Three groups matter:
 
 - The prior: its mean lies between the last estimate (`towards_mean` 0) and the examples' mean posture (1); default 0.1.
   Its standard deviation is 30 deg (RMS over hinges), in proportion to each hinge's spread over the examples (`spread`).
@@ -19,22 +19,21 @@ Presets: `ik:previous` (prior about the last estimate, learns nothing), `ik:mean
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.calibration import Calibration
 from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.core.training_data import EXAMPLES, NONE
+from harness.core.split import EXAMPLES, NONE
+from harness.reconstruct.contract import Fitted
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
-from harness.reconstruct.solver.ik_solver import Stopping
-from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 
 _MIN_SPREAD_RAD = math.radians(2.0)
@@ -42,15 +41,13 @@ _MIN_SPREAD_RAD = math.radians(2.0)
 
 
 @dataclass(frozen=True)
-class Ik:
+class Ik(SolverOptions):
     """Options of inverse kinematics, a `Method`."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"lost_after_s": LOST_AFTER_ADVICE}
 
     name: str = "ik"
     summary: str = "robust whole-body inverse kinematics with a weak prior about the examples' mean posture"
-    loss: Loss = field(default_factory=Loss)
-    """Scales and robust loss of the residuals."""
     towards_mean: Annotated[float, Range(0.0, 1.0)] = 0.1
     """Mean of the prior: 0 is the last estimate, 1 the examples' mean posture."""
     prior_sigma_rad: Annotated[float, Range(1e-06, 100.0)] = math.radians(30.0)
@@ -59,12 +56,6 @@ class Ik:
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
     limits: bool = True
     """Keep hinges within the body's limits."""
-    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
-    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    align: bool = False
-    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    stopping: Stopping = field(default_factory=Stopping)
-    """Convergence criteria of the solver."""
 
     @property
     def needs_examples(self) -> bool:
@@ -74,61 +65,44 @@ class Ik:
     def training_data(self) -> str:
         return EXAMPLES if self.needs_examples else NONE
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedIk":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Fitted[IKSession]:
         """Learn the prior from examples; BadInput when it needs some and there are none."""
         return self._fitted(body, examples)
 
-    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedIk":
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> Fitted[IKSession]:
         """Learn the prior from a database, which may lie on disk."""
         return self._fitted(body, database)
 
-    def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> "FittedIk":
-        return FittedIk(self, body, self.posture_prior(body, examples))
+    def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Fitted[IKSession]:
+        return Fitted(partial(IKSession, body, options=self, posture_prior=self.posture_prior(body, examples)))
 
     def posture_prior(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> PosturePrior:
         """The prior of the hinges; BadInput when it needs examples and there are none."""
-        sigma_rad = np.full(48, self.prior_sigma_rad)
+        equal_rad = np.full(48, self.prior_sigma_rad)
         if not self.needs_examples:
-            return PosturePrior(None, sigma_rad, self.towards_mean)
+            return PosturePrior(None, equal_rad, self.towards_mean)
+        sigma_rad = equal_rad
         mean_qpos = mean_posture(body, examples)
         if self.spread:
-            hinge_spread_rad = np.maximum(spread_rad(body, examples, mean_qpos), _MIN_SPREAD_RAD)
-            sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
+            sigma_rad = scaled_spread_rad(body, examples, mean_qpos, self.prior_sigma_rad, _MIN_SPREAD_RAD)
         return PosturePrior(mean_qpos, sigma_rad, self.towards_mean)
 
 
 PREVIOUS = Ik(
-    "ik:previous",
-    "ik with a prior about the last estimate, equal for all hinges; learns nothing",
+    name="ik:previous",
+    summary="ik with a prior about the last estimate, equal for all hinges; learns nothing",
     towards_mean=0.0,
     spread=False,
 )
 MEAN = Ik(
-    "ik:mean", "ik with a prior about the examples' mean posture, equal for all hinges", towards_mean=1.0, spread=False
+    name="ik:mean",
+    summary="ik with a prior about the examples' mean posture, equal for all hinges",
+    towards_mean=1.0,
+    spread=False,
 )
 GAUSSIAN = Ik(
-    "ik:gaussian",
-    "ik with squared residuals and no outlier gate",
+    name="ik:gaussian",
+    summary="ik with squared residuals and no outlier gate",
     loss=Loss(robust=False),
     jump_m=math.inf,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class FittedIk:
-    """Inverse kinematics with its body and prior."""
-
-    options: Ik
-    body: Body
-    posture_prior: PosturePrior
-
-    def begin(self, calibration: Calibration) -> IKSession:
-        options = self.options
-        solver_options = SolverOptions(
-            options.loss,
-            options.limits,
-            options.jump_m,
-            stopping=options.stopping,
-            align=options.align,
-        )
-        return IKSession(self.body, calibration, solver_options, self.posture_prior)

@@ -15,7 +15,7 @@ chosen on built-in takes that no scenario evaluates.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -28,16 +28,14 @@ from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.errors import BadInput
-from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.anchor_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of
-from harness.reconstruct.solver.device_time import DeviceTime
-from harness.reconstruct.solver.ground_frame import ground_from_qpos
+from harness.reconstruct.solver.ground_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of, ground_from_qpos
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import StatusMonitor
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 _JUMP_M = 0.3
@@ -93,8 +91,7 @@ class FittedKernelRidge:
         return KernelRidgeSession(self, calibration)
 
 
-@dataclass(frozen=True, eq=False)
-class ReadingMap:
+class ReadingMap(NamedTuple):
     """Kernel ridge regression of hinges on some of the readings."""
 
     columns: Bools
@@ -187,7 +184,10 @@ class KernelRidgeSession:
             self._gate.read(frame, self._residuals)
             self._measured_before |= self._residuals.measured
             learnt = self._maps.learnt(self._measured_before)
-            inputs = self._maps.inputs(*self._completed_readings(), learnt.columns, learnt.heading)
+            position_m, turned = self._residuals.target_m, self._residuals.world_from_target
+            if not self._residuals.measured.all():
+                position_m, turned = self._residuals.completed(place_root(self._residuals, self._estimate))
+            inputs = self._maps.inputs(position_m[None], turned[None], learnt.columns, learnt.heading)
             qpos = self._maps.mean_qpos.copy()
             qpos[7:] += learnt.angles(inputs)[0]
             qpos[:7] = self._estimate[:7]
@@ -195,27 +195,9 @@ class KernelRidgeSession:
             self._gate.update(self._residuals, self._estimate)
         return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
-    def _completed_readings(self) -> tuple[Floats, Floats]:
-        """Positions (1, S, 3) and bone orientations (1, S, 4); missing ones are those of the last estimate."""
-        residuals, count = self._residuals, len(self._residuals.bones)
-        if residuals.measured.all():
-            return residuals.target_m[None], residuals.world_from_target[None]
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(place_root(residuals, self._estimate))
-        at_m, turned = residuals.kinematics.station_poses(
-            residuals.bones, residuals.mount_m, _identity_orientations(count)
-        )
-        position_m = np.where(here, residuals.target_m, at_m)
-        return position_m[None], np.where(facing, residuals.world_from_target, turned)[None]
-
 
 def gaussian_kernel(x: Floats, examples: Floats, width: float) -> Floats:
     """(M, N) kernel between inputs (M, C) and those of examples (N, C)."""
     far = np.sum(x**2, axis=1)[:, None] + np.sum(examples**2, axis=1) - 2.0 * x @ examples.T
     out: Floats = np.exp(-far / width)
     return out
-
-
-def _identity_orientations(count: int) -> Floats:
-    """(S, 4) identity quaternions."""
-    return np.tile(rotations.IDENTITY, (count, 1))

@@ -17,7 +17,7 @@ Options are the fields of `LocalPca`; scenarios/tune_local_pca.toml chose the de
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
@@ -28,25 +28,16 @@ from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE
-from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.errors import BadInput
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import CalibrationCache
-from harness.reconstruct.features.ground_step import ground_after_step
-from harness.reconstruct.features.posture_statistics import mean_posture
-from harness.reconstruct.features.station_features import StationFeatures
+from harness.reconstruct.features.virtual_trackers import StationFeatures
 from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
-from harness.reconstruct.methods.ik import Ik
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, ground_after_step
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import (
-    POSTURE_PRIOR_SIGMA_RAD,
-    PosturePrior,
-    SolverOptions,
-)
+from harness.reconstruct.solver.ik_session import SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
-from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
@@ -58,15 +49,14 @@ _HISTORY = 2
 
 
 @dataclass(frozen=True)
-class LocalPca:
+class LocalPca(DatabaseLearner["FittedLocalPca"], SolverOptions):
     """Options of local PCA, a `Method`; scenarios/tune_local_pca.toml chose the defaults on validation clips."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"lost_after_s": LOST_AFTER_ADVICE}
 
     name: str = "local_pca"
     summary: str = "best fit to the readings within the principal directions of similar examples"
-    needs_examples: bool = True
-    training_data = "examples"
+    fewest_frames = _HISTORY + 1
     neighbours: Annotated[int, Range(2, 1_000_000)] = 300
     """K, examples of the local model."""
     components: Annotated[int, Range(1, 55)] = 40
@@ -90,36 +80,19 @@ class LocalPca:
     """Weight of the prior of `ik` where the answer leaves the subspace; 0 leaves it out."""
     restart: bool = True
     """Whether a cold start follows when readings contradict the answer for long; if not, only after a loss."""
-    loss: Loss = field(default_factory=Loss)
-    """Scales and robust loss of the residuals."""
-    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
-    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
-    align: bool = False
-    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
-    stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
+    stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2), kw_only=True)
     """Convergence criteria. They are looser than those of `ik`; on validation clips errors differ by 0.001 deg."""
-
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalPca":
-        """Build the database; BadInput without examples of three frames or more."""
-        if not any(len(take) > _HISTORY for take in examples):
-            message = f"Local PCA needs examples of more than {_HISTORY} frames, and there are none."
-            raise BadInput(message, "Name some in the scenario.")
-        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
         """Learn from a database, which may lie on disk."""
-        return FittedLocalPca(
-            self,
-            body,
-            database.windows(_HISTORY, with_successor=True),
-            mean_posture(body, database),
-            Ik().posture_prior(body, database),
-        )
+        return FittedLocalPca(self, WindowExamples.learn(body, database, _HISTORY))
 
 
 CHAI2005 = LocalPca(
-    "local_pca:chai2005",
-    "Chai and Hodgins 2005: 7 principal directions, squared residuals; its other constants are recalled or chosen",
+    name="local_pca:chai2005",
+    summary=(
+        "Chai and Hodgins 2005: 7 principal directions, squared residuals; its other constants are recalled or chosen"
+    ),
     neighbours=100,
     components=7,
     prior_weight=0.8,
@@ -140,19 +113,14 @@ class FittedLocalPca:
     """The windows of the examples. Their station features depend on the mounts and are cached per calibration."""
 
     options: LocalPca
-    body: Body
-    windows: Windows
-    mean_qpos: Floats
-    """(55,) mean posture, the prior of frames without a history."""
-    ik_prior: PosturePrior
-    """Prior of `ik`."""
+    examples: WindowExamples
     cache: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
         default_factory=CalibrationCache, repr=False
     )
     """Station features and search index of the last calibration, shared by sessions of one performer."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
-        self.windows.database.release_memory()  # pages that earlier sessions read
+        self.examples.windows.database.release_memory()  # pages that earlier sessions read
         return LocalPcaSession(self, calibration)
 
     def station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
@@ -160,27 +128,21 @@ class FittedLocalPca:
         return self.cache.get(calibration, lambda: self._compute_station_features(calibration))
 
     def _compute_station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
-        features = StationFeatures(self.body, self.windows, calibration, self.options.lever_m)
-        examples = _WindowsWithFeatures(self.windows, features.values, np.sqrt(self.options.control_weight))
-        return features, examples, make_index(self.options.index, examples, self.options.neighbours)
+        options, windows = self.options, self.examples.windows
+        features = StationFeatures(self.examples.body, windows, calibration, options.lever_m)
+        vectors = _WindowsWithFeatures(windows, features.values, np.sqrt(options.control_weight))
+        return features, vectors, make_index(options.index, vectors, options.neighbours)
 
 
 class LocalPcaSession(HistorySession):
     """Follows one performer; fits a local model to every frame."""
 
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
-        options, windows = fitted.options, fitted.windows
-        solver_options = SolverOptions(
-            options.loss,
-            True,
-            options.jump_m,
-            options.restart,
-            options.stopping,
-            options.align,
+        options, examples = fitted.options, fitted.examples
+        super().__init__(
+            *(examples.body, calibration, options, examples.mean_prior), *(_HISTORY, examples.windows.database.rate_hz)
         )
-        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
-        super().__init__(fitted.body, calibration, solver_options, posture_prior, _HISTORY, windows.database.rate_hz)
-        self._options, self._windows, self._ik_prior = options, windows, fitted.ik_prior
+        self._options, self._windows, self._ik_prior = options, examples.windows, examples.ik_prior
         self._subspace_solver = SubspaceSolver(self.residuals, self.limits, options.stopping)
         self._precision = np.zeros(6 + len(self.limits.low_rad))
         self._features, self._examples, index = fitted.station_features(calibration)
@@ -223,12 +185,7 @@ class LocalPcaSession(HistorySession):
             query = _join(past, scale, features.query(position_m, turned, ground))
             rows, squared = self._index.nearest(query, options.neighbours)
             return rows, float(squared[0])
-        count = len(position_m)
-        has_position, has_orientation = residuals.measured[:count, None], residuals.measured[count:, None]
-        at_m, at_orientation = features.station_poses(residuals.kinematics, self.past[0])
-        control = features.query(
-            np.where(has_position, position_m, at_m), np.where(has_orientation, turned, at_orientation), ground
-        )
+        control = features.query(*residuals.completed(self.past[0]), ground)
         weight = np.concatenate([np.ones(len(past)), features.columns(residuals.measured)])
         query = np.concatenate([past, scale * control])
         rows, squared = nearest_partial(self._index, self._examples, query, weight, options.neighbours)

@@ -12,12 +12,16 @@ For every frame (Kim et al. 2012):
 Ours: features relative to an anchor station instead of the room, weights by the readings' confidence, the outlier gate,
 and whole-body inverse kinematics with a prior about the regressed pose (`solve` "limbs" is closed-form limb IK).
 
-The options are the fields of `LocalRegression`; each method adds its own.
+The options are the fields of `LocalRegression`, and each method adds its own.
+
+Weighted blend (`weighted_blend`, docs/papers.md C3) weighs neighbours by a power of their distance in feature space. It
+is the baseline of Kim et al. 2012, which prints no weights; the power is ours. scenarios/tune_weighted_blend.toml chose
+`neighbours` 16 and `power` 4.
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar, Literal
 
@@ -26,27 +30,25 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
-from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
-from harness.errors import BadInput
+from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S, QueryFeatures
-from harness.reconstruct.solver.device_time import DeviceTime
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
+from harness.reconstruct.methods.window_method import DatabaseLearner
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture, step_ground
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.limb_solver import LimbSolver
 from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import StatusMonitor
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream.frame import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
@@ -64,7 +66,7 @@ _NO_ROWS: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
-class LocalRegression(ABC):
+class LocalRegression(DatabaseLearner["FittedLocalRegression"]):
     """Options that both methods share. A method adds its own options and `weigh`."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
@@ -77,8 +79,6 @@ class LocalRegression(ABC):
 
     name: str
     summary: str
-    needs_examples: bool = True
-    training_data = "examples"
     neighbours: Annotated[int, Range(1, 1_000_000)] = 8
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     weights: FeatureWeights = field(default_factory=FeatureWeights)
@@ -102,18 +102,12 @@ class LocalRegression(ABC):
     spread: bool = True
     """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":
-        """Build the database; BadInput without examples."""
-        if not any(len(take) for take in examples):
-            raise BadInput("A local regression learns from examples, and there are none.", "Name some in the scenario.")
-        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
-
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalRegression":
         """Learn from a database, which may lie on disk."""
         sigma_rad = np.full(48, _HINGE_SIGMA_RAD)
         if self.spread:
-            hinge_spread_rad = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
-            sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
+            centre = mean_posture(body, database)
+            sigma_rad = scaled_spread_rad(body, database, centre, _HINGE_SIGMA_RAD, _MIN_SPREAD_RAD)
         return FittedLocalRegression(self, body, database, sigma_rad)
 
     @abstractmethod
@@ -178,10 +172,7 @@ class LocalRegressionSession:
         if not any_valid:
             self._last_rows, self._last_poses = _NO_ROWS, []
             return Estimate(self._estimate, status, Origin.BRIDGED)
-        if self._alignment is None:
-            self._gate.read(frame, self._residuals)
-        else:
-            self._alignment.read(frame, self._residuals, self._gate)
+        read_frame(frame, self._residuals, self._gate, self._alignment)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._estimate, status, Origin.BRIDGED)
         query = self._features.compute(frame, self._estimate)
@@ -222,3 +213,43 @@ class LocalRegressionSession:
         if self._options.final_ik:
             return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
         return place_root(self._residuals, qpos)
+
+
+@dataclass(frozen=True)
+class WeightedBlend(LocalRegression):
+    """Options of the weighted blend, a `Method`."""
+
+    name: str = "weighted_blend"
+    summary: str = "nearest examples weighted by inverse distance, smoothed, then fitted to the trackers"
+    neighbours: Annotated[int, Range(1, 1_000_000)] = 16
+    """k of eq. 2: neighbours of a frame; those of the frame before are added."""
+    power: Annotated[float, Range(0.0, 100.0)] = 4.0
+    """Exponent of the weights, distance^-power."""
+
+    def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
+        return _inverse_distance_weights(inputs, query, self.power)
+
+
+LITERAL = WeightedBlend(
+    "weighted_blend:literal",
+    "the baseline of Kim et al. 2012: 8 neighbours by inverse distance, with the steps of kernel_cca:literal",
+    neighbours=8,
+    index="kd_tree",
+    jump_m=math.inf,
+    outputs="quaternions",
+    power=1.0,
+)
+"""The paper names the baseline and prints no weights; inverse distance is the plainest choice: docs/methods.md."""
+
+
+@compiled
+def _inverse_distance_weights(inputs: Floats, query: Floats, power: float) -> Floats:
+    """(m,) weights distance^-power of inputs (m, n) for a query (n,), of sum 1."""
+    out: Floats = np.empty(len(inputs))
+    for i in range(len(inputs)):
+        squared = 0.0
+        for k in range(len(query)):
+            squared += (inputs[i, k] - query[k]) ** 2
+        out[i] = max(squared, 1e-12) ** (-0.5 * power)
+    out /= out.sum()
+    return out

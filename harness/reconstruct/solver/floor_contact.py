@@ -9,6 +9,8 @@ A station on the shin shows where the ankle is, but not how the foot turns. Two 
 Both terms are linearised in the foot's angles at the prior's mean. The measured pose of the shin is taken as exact.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from harness.body.humanoid import Body
@@ -39,6 +41,18 @@ def toe_tree(body: Body) -> KinematicTree:
     return build_tree(body, bones, body.skeleton.bone_m[bones])
 
 
+class Feet(NamedTuple):
+    """The feet, and the stations that show the shins above them."""
+
+    tree: KinematicTree
+    """The body with a station on each toe."""
+    targets: StationTargets
+    mount_m: Floats
+    """(S, 3) positions of the stations in their bones' frames [m]."""
+    station: Ints
+    """(F,) station on the shin of each foot; -1 for none."""
+
+
 class FloorContact:
     """Contact of the feet whose shins carry stations, for one session."""
 
@@ -47,56 +61,46 @@ class FloorContact:
         tree, carriers = toe_tree(body), residuals.tree.station_body.tolist()
         shins = tree.parent[tree.station_body].tolist()
         station: Ints = np.array([carriers.index(shin) if shin in carriers else -1 for shin in shins], np.int64)
-        self._arguments = tree, residuals.targets, residuals.tree.mount_m, station
+        self._feet = Feet(tree, residuals.targets, residuals.tree.mount_m, station)
         self._scales = floor_m, _SPEED_M_S / rate_hz, _DEPTH_SIGMA_M, _DEPTH_SCALE_M
         self._last_m = np.full((len(FEET), 3), np.nan)
         posture, none = np.zeros(POSTURE_SIZE), np.zeros((0, POSTURE_SIZE))
         example = Subspace(posture, none, np.zeros((POSTURE_SIZE, POSTURE_SIZE)), posture, posture)
-        self._find = specialise(_find_toes, *self._arguments, posture[HINGES], self._last_m)
-        self._constrain = specialise(_constrain, *self._arguments, example, self._last_m, False, self._scales)
+        self._find = specialise(_find_toes, self._feet, posture[HINGES], self._last_m)
+        self._constrain = specialise(_constrain, self._feet, example, self._last_m, False, self._scales)
 
     def record(self, qpos: Floats) -> None:
         """Note where the toes of the answer (55,) to this frame are."""
-        self._find(*self._arguments, qpos[7:], self._last_m)
+        self._find(self._feet, qpos[7:], self._last_m)
 
     def constrain(self, prior: Subspace, history: bool) -> Subspace:
         """A Gaussian prior times the terms, linearised at its mean; without a `history` the floor's alone."""
-        return self._constrain(*self._arguments, prior, self._last_m, history, self._scales)
+        return self._constrain(self._feet, prior, self._last_m, history, self._scales)
 
 
 @compiled
-def _find_toes(
-    tree: KinematicTree, targets: StationTargets, mount_m: Floats, station: Ints, hinges: Floats, toe_m: Floats
-) -> None:
-    """Fill in `toe_m` (F, 3); NaN where the shin's station, `station` (F,), is -1 or not measured."""
-    slope = np.empty((3, len(tree.depth)))
-    for foot in range(len(station)):
+def _find_toes(feet: Feet, hinges: Floats, toe_m: Floats) -> None:
+    """Fill in `toe_m` (F, 3); NaN where the shin's station is missing or not measured."""
+    slope = np.empty((3, len(feet.tree.depth)))
+    for foot in range(len(feet.station)):
         toe_m[foot] = np.nan
-        if _is_measured(targets, station[foot]):
-            toe_m[foot, 0], toe_m[foot, 1], toe_m[foot, 2] = _toe_m(
-                tree, targets, mount_m, station[foot], foot, hinges, slope
-            )
+        if _is_measured(feet, foot):
+            toe_m[foot, 0], toe_m[foot, 1], toe_m[foot, 2] = _toe_m(feet, foot, hinges, slope)
 
 
 @compiled
 def _constrain(
-    tree: KinematicTree,
-    targets: StationTargets,
-    mount_m: Floats,
-    station: Ints,
-    prior: Subspace,
-    last_m: Floats,
-    history: bool,
-    scales: tuple[float, float, float, float],
+    feet: Feet, prior: Subspace, last_m: Floats, history: bool, scales: tuple[float, float, float, float]
 ) -> Subspace:
     """`FloorContact.constrain`, for the last toes (F, 3), NaN where unknown."""
+    tree = feet.tree
     floor_m, step_m, depth_sigma_m, depth_scale_m = scales
     curvature, descent = prior.curvature.copy(), np.zeros(len(prior.mean))
     slope, pull, hinges = np.empty((3, len(tree.depth))), np.empty(3), prior.mean[HINGES]
-    for foot in range(len(station)):
-        if not _is_measured(targets, station[foot]):
+    for foot in range(len(feet.station)):
+        if not _is_measured(feet, foot):
             continue
-        at = _toe_m(tree, targets, mount_m, station[foot], foot, hinges, slope)
+        at = _toe_m(feet, foot, hinges, slope)
         stays, moved = 0.0, 0.0
         for k in range(3):
             pull[k] = last_m[foot, k] - at[k]
@@ -125,27 +129,21 @@ def _constrain(
 
 
 @compiled
-def _is_measured(targets: StationTargets, station: int) -> bool:
-    """Whether a station exists and its position and orientation are measured."""
-    count = len(targets.target_m)
-    return station >= 0 and targets.precision[station] > 0.0 and targets.precision[count + station] > 0.0
+def _is_measured(feet: Feet, foot: int) -> bool:
+    """Whether the shin of a foot has a station, whose position and orientation are measured."""
+    station, precision = feet.station[foot], feet.targets.precision
+    count = len(feet.targets.target_m)
+    return bool(station >= 0 and precision[station] > 0.0 and precision[count + station] > 0.0)
 
 
 @compiled
-def _toe_m(
-    tree: KinematicTree,
-    targets: StationTargets,
-    mount_m: Floats,
-    station: int,
-    foot: int,
-    hinges: Floats,
-    slope: Floats,
-) -> Vector:
+def _toe_m(feet: Feet, foot: int, hinges: Floats, slope: Floats) -> Vector:
     """The toe of a foot [m], by the measured pose of the shin's station and the foot's angles.
 
     Its derivatives by the foot's directions are filled into the columns of `slope` (3, V) [m/rad].
     """
-    body, toe, mount = tree.station_body[foot], tree.mount_m[foot], mount_m[station]
+    tree, targets, station = feet.tree, feet.targets, feet.station[foot]
+    body, toe, mount = tree.station_body[foot], tree.mount_m[foot], feet.mount_m[station]
     first, end, ankle = tree.first_dof[body], tree.first_dof[body + 1], tree.joint_m[body]
     q = as_tuple(targets.world_from_target[station])
     to_ankle = rotate(q, ankle[0] - mount[0], ankle[1] - mount[1], ankle[2] - mount[2])

@@ -10,8 +10,8 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF
+from harness.core.skeleton import are_gimbal, equivalent_euler_angles
 
 _UNLIMITED_RANGE_RAD = np.deg2rad(350.0)
 _FULL_TURN_RAD = 2.0 * np.pi
@@ -78,19 +78,9 @@ class HingeLimits:
         out += _FULL_TURN_RAD * np.round(np.median(principal - out, axis=0) / _FULL_TURN_RAD)
         return out
 
-    def unwrap_near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
-        """Angles (48,) with full turns added to hinges without limits, to be nearest to `other_rad` (48,)."""
-        return _unwrap_near(angles_rad, other_rad, self.high_rad)
-
     def between(self, qpos: Floats, other: Floats, share: float) -> Floats:
         """A configuration (55,) with hinges moved by a share of the way to another's (55,), through full turns."""
         return _between(qpos, other, share, self.high_rad)
-
-    def mean(self, angles_rad: Floats) -> Floats:
-        """(48,) circular mean of angles (T, 48), in principal representation and within the limits."""
-        principal = self.principal(angles_rad)
-        mean = np.arctan2(np.mean(np.sin(principal), axis=0), np.mean(np.cos(principal), axis=0))
-        return self.clip(self._wrapped(mean))
 
     def _wrapped(self, angles_rad: Floats) -> Floats:
         """Angles with full turns added, so that each is within pi of the middle of its limits."""
@@ -109,7 +99,7 @@ def _any_beyond(angles_rad: Floats, hinges: Ints, limit_rad: float) -> bool:
 
 @compiled
 def _unwrap_near(angles_rad: Floats, other_rad: Floats, high_rad: Floats) -> Floats:
-    """`HingeLimits.unwrap_near`, with the upper limits (48,)."""
+    """Angles (48,) with full turns added to hinges without limits, to be nearest to others; `high_rad` (48,)."""
     out = angles_rad.copy()
     for i in range(len(out)):
         if np.isinf(high_rad[i]):

@@ -1,6 +1,7 @@
 """Tracking with a history: the last answers, one for each period of the examples."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -10,8 +11,11 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Origin
+from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.subspace import SubspaceSolver
+from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
 
 
@@ -71,6 +75,26 @@ class HistorySession(IKSession, ABC):
     def solve_cold(self) -> IKSolution:
         self.cold_origin = Origin.FALLBACK
         return super().solve_cold()
+
+    def solve_from_either(self, solve: Callable[[Floats], IKSolution], first: Floats, second: Floats) -> IKSolution:
+        """The solution from the first start, or that from the second if it is cheaper.
+
+        The second start is tried when the first does not converge, or leaves outliers.
+        """
+        solution = solve(first)
+        if solution.converged and self.outlier_share() == 0.0:
+            return solution
+        other = solve(second)
+        best = other if other.cost < solution.cost else solution
+        self.residuals.evaluate(best.qpos)
+        return best
+
+    def cheapest_in_subspace(self, solver: SubspaceSolver, prior: Subspace, starts: Sequence[Floats]) -> IKSolution:
+        """The cheapest solution under a prior, from configurations (55,)."""
+        solutions = [solver.solve(prior, ground_from_qpos(start), posture_from_qpos(start)) for start in starts]
+        best = min(solutions, key=lambda solution: solution.cost)
+        self.residuals.evaluate(best.qpos)
+        return best
 
     def record(self, frame: TrackerFrame, cold: bool) -> None:
         if cold:

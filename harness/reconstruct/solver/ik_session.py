@@ -5,8 +5,10 @@ postures and the last pose, without trust in the past. It happens at the start, 
 once, and when readings keep contradicting the pose. The solution of lower cost is used.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
@@ -15,14 +17,14 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin, Status
-from harness.reconstruct.solver.device_time import DeviceTime
+from harness.core.ranges import Range
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
-from harness.reconstruct.solver.status_monitor import StatusMonitor
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment
+from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
+from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream.frame import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
@@ -66,20 +68,22 @@ class PosturePrior:
         return Prior(limits.between(previous, self.mean_qpos, self.towards_mean), self.precision)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SolverOptions:
-    """Options of a session that solves for poses."""
+    """Options that all methods share which solve for poses. What is no field here is an option of one of them."""
 
     loss: Loss = field(default_factory=Loss)
-    limits: bool = True
-    """Keep hinges within the body's limits."""
-    jump_m: float = JUMP_M
-    """A position that jumps farther than this from its expected place is left out for a while; inf for never [m]."""
-    restart: bool = True
-    """Whether a cold start follows when readings contradict the pose for long; if not, only after a loss."""
-    stopping: Stopping = field(default_factory=Stopping)
+    """Scales and robust loss of the residuals."""
+    jump_m: Annotated[float, Range(0.0, math.inf)] = JUMP_M
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     align: bool = False
-    """Move the readings of all stations to one instant (`temporal_alignment`)."""
+    """Move the readings of all stations to one instant before anything else uses them (`temporal_alignment`)."""
+    stopping: Stopping = field(default_factory=Stopping)
+    """Convergence criteria of the solver."""
+    limits = True
+    """Keep hinges within the body's limits."""
+    restart = True
+    """Whether a cold start follows when readings contradict the pose for long; if not, only after a loss."""
 
 
 class IKSession:
@@ -133,10 +137,7 @@ class IKSession:
         self.origin = Origin.MODEL if any_valid else Origin.BRIDGED
         self.now_s = self._time.frame_time_s(frame)
         if any_valid:
-            if self._alignment is None:
-                self._gate.read(frame, self.residuals)
-            else:
-                self._alignment.read(frame, self.residuals, self._gate)
+            read_frame(frame, self.residuals, self._gate, self._alignment)
             cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
             if cold:
                 solution = self.solve_cold()

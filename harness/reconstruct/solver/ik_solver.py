@@ -8,7 +8,7 @@ cost is undone, and the damping is raised.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from harness.reconstruct.solver.levenberg_marquardt import PriorAndLimits, minim
 from harness.reconstruct.solver.residuals import Residuals
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Prior:
+class Prior(NamedTuple):
     """A Gaussian prior about a configuration."""
 
     qpos: Floats
@@ -66,8 +65,7 @@ class Stopping:
     """Steps after which a solve ends without convergence."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class IKSolution:
+class IKSolution(NamedTuple):
     """The result of a solve."""
 
     qpos: Floats

@@ -15,6 +15,18 @@ from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicT
 from harness.reconstruct.solver.matrix_algebra import dot
 from harness.reconstruct.solver.normal_equations import StationTargets, add_curvature, evaluate, normal_rows
 
+_INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
+_MAX_CONVERGED_DAMPING = 30.0
+"""Convergence is tested below this damping only: as a prior it is 10 deg about the present pose [1/rad^2]."""
+_GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
+"""Ratios of actual to predicted decrease: above the first Gauss-Newton suffices, above the second the damping falls."""
+_MAX_STEP_RAD = 1.0
+"""Larger rotations are scaled down to this."""
+_MAX_FINAL_STEP = 1e-2
+"""A converged step is still taken when no component is larger [m, rad]."""
+_MIN_DECREASE = 1e-12
+"""A predicted decrease of the cost, a log likelihood, that is only rounding."""
+
 
 class QuadraticModel(NamedTuple):
     """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and arrays to minimise it."""
@@ -23,22 +35,14 @@ class QuadraticModel(NamedTuple):
     """(V, D) Gauss-Newton matrix with prior and damping."""
     full_hessian: Floats
     """(V, D) the same with the full curvature."""
+    factor: Floats
+    """(V, D) L^T D L of the free directions."""
     gradient: Floats
     """(V,) gradient at the step 0."""
-    low: Floats
-    """(V,) lower bounds of the step."""
-    high: Floats
-    """(V,) upper bounds of the step."""
     step: Floats
     """(V,) the minimum."""
     to_mean: Floats
     """(V,) tangent step from the configuration to the prior's mean."""
-    next_qpos: Floats
-    """(V + 1,) the configuration after the step."""
-    factor: Floats
-    """(V, D) L^T D L of the free directions."""
-    clamped: Bools
-    """(V,) whether a direction is held at a bound."""
     residual_gradient: Floats
     """(V,) gradient of the model at the present step."""
     direction: Floats
@@ -49,6 +53,14 @@ class QuadraticModel(NamedTuple):
     """(V,) the trial minus the present step."""
     hessian_change: Floats
     """(V,) H times the change."""
+    low: Floats
+    """(V,) lower bounds of the step."""
+    high: Floats
+    """(V,) upper bounds of the step."""
+    next_qpos: Floats
+    """(V + 1,) the configuration after the step."""
+    clamped: Bools
+    """(V,) whether a direction is held at a bound."""
 
 
 class PriorAndLimits(NamedTuple):
@@ -73,38 +85,9 @@ class PriorAndLimits(NamedTuple):
 def new_quadratic_model(tree: KinematicTree) -> QuadraticModel:
     """Arrays for one solver; the root is unbounded."""
     directions = len(tree.depth)
-    gradient, step, to_mean, residual_gradient, direction, trial, change, hessian_change = np.zeros((8, directions))
-    hessian, full_hessian, factor = np.zeros((3, *tree.ancestors.shape))
-    return QuadraticModel(
-        hessian=hessian,
-        full_hessian=full_hessian,
-        gradient=gradient,
-        low=np.full(directions, -np.inf),
-        high=np.full(directions, np.inf),
-        step=step,
-        to_mean=to_mean,
-        next_qpos=np.zeros(directions + 1),
-        factor=factor,
-        clamped=np.zeros(directions, bool),
-        residual_gradient=residual_gradient,
-        direction=direction,
-        trial=trial,
-        change=change,
-        hessian_change=hessian_change,
-    )
-
-
-_INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
-_MAX_CONVERGED_DAMPING = 30.0
-"""Convergence is tested below this damping only: as a prior it is 10 deg about the present pose [1/rad^2]."""
-_GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
-"""Ratios of actual to predicted decrease: above the first Gauss-Newton suffices, above the second the damping falls."""
-_MAX_STEP_RAD = 1.0
-"""Larger rotations are scaled down to this."""
-_MAX_FINAL_STEP = 1e-2
-"""A converged step is still taken when no component is larger [m, rad]."""
-_MIN_DECREASE = 1e-12
-"""A predicted decrease of the cost, a log likelihood, that is only rounding."""
+    bounds = np.full(directions, -np.inf), np.full(directions, np.inf)
+    matrices, vectors = np.zeros((3, *tree.ancestors.shape)), np.zeros((8, directions))
+    return QuadraticModel._make([*matrices, *vectors, *bounds, np.zeros(directions + 1), np.zeros(directions, bool)])
 
 
 @compiled

@@ -54,15 +54,6 @@ class Limb(NamedTuple):
     """(7,) upper limits."""
 
 
-class LimbBase(NamedTuple):
-    """The pose of the joint that a limb starts from."""
-
-    world_from_parent: Floats
-    """(4,) orientation of the bone that carries it."""
-    joint_m: Floats
-    """(3,) position of shoulder or hip [m]."""
-
-
 class LimbTarget(NamedTuple):
     """A station on a limb, and its measured pose."""
 
@@ -79,16 +70,19 @@ class LimbTarget(NamedTuple):
 
 
 @compiled
-def solve_limb(limb: Limb, angles: Floats, base: LimbBase, target: LimbTarget) -> None:
-    """Change the angles (7,) of a limb, in place, so that its station gets the measured pose."""
-    parent = matrix_from_quaternion(base.world_from_parent)
+def solve_limb(limb: Limb, angles: Floats, world_from_parent: Floats, joint_m: Floats, target: LimbTarget) -> None:
+    """Change the angles (7,) of a limb, in place, so that its station gets the measured pose.
+
+    It starts from a joint (3,) [m] on a bone of orientation `world_from_parent` (4,): shoulder or hip.
+    """
+    parent = matrix_from_quaternion(world_from_parent)
     bone = matrix_from_quaternion(target.world_from_bone)
     if target.level == UPPER:
         if target.has_orientation:
             _set_ball(limb, angles, transposed_multiply(parent, bone))
         return
     if target.has_position:
-        _reach_point(limb, angles, parent, target.point_m - base.joint_m, target, bone)
+        _reach_point(limb, angles, parent, target.point_m - joint_m, target, bone)
     if target.has_orientation:
         lower = multiply(multiply(parent, _ball_rotation(limb, angles)), axis_rotation(limb.hinge, angles[3]))
         _turn_end(limb, angles, target.level, transposed_multiply(lower, bone))
@@ -221,7 +215,7 @@ def _ball_rotation(limb: Limb, angles: Floats) -> Floats:
 
 @compiled
 def _euler(axes: Floats, rotation: Floats) -> Floats:
-    """Angles (3,) about right-handed orthogonal axes (3, 3) that give a rotation (3, 3); see `core.hinges`."""
+    """Angles (3,) about right-handed orthogonal axes (3, 3) that give a rotation (3, 3); see `core.skeleton`."""
     m = np.empty((3, 3))
     for j in range(3):
         column = multiply_vector(rotation, axes[j])

@@ -13,9 +13,9 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
-from harness.reconstruct.solver.anchor_frame import anchor_of, on_trunk
+from harness.reconstruct.solver.ground_frame import anchor_of, on_trunk
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.limb_ik import END, LOWER, TWIST, UPPER, Limb, LimbBase, LimbTarget, solve_limb
+from harness.reconstruct.solver.limb_ik import END, LOWER, TWIST, UPPER, Limb, LimbTarget, solve_limb
 from harness.reconstruct.solver.residuals import Residuals
 
 _ARM = {"humerus": UPPER, "radius": LOWER, "wrist": TWIST, "hand": END}
@@ -116,14 +116,9 @@ class _LimbStations:
                 continue
             angles = np.where(self._exists, qpos[self._qpos], 0.0)
             target = LimbTarget(
-                level,
-                residuals.mount_m[station],
-                residuals.target_m[station],
-                residuals.world_from_target[station],
-                bool(has_position[station]),
-                bool(has_orientation[station]),
+                *(level, residuals.mount_m[station], residuals.target_m[station], residuals.world_from_target[station]),
+                *(bool(has_position[station]), bool(has_orientation[station])),
             )
-            base = LimbBase(state.world_from_body[self._parent], state.body_m[self._body])
-            solve_limb(self._limb, angles, base, target)
+            solve_limb(self._limb, angles, state.world_from_body[self._parent], state.body_m[self._body], target)
             qpos[self._qpos[self._exists]] = angles[self._exists]
             return

@@ -20,6 +20,8 @@ from harness.reconstruct.solver.kinematic_tree import (
     station_jacobian,
 )
 
+Readings = tuple[Floats, Floats, Bools, Bools, Floats, Bools]
+"""Positions, orientations, where each is valid, quality and suspicion of a frame, as `TrackerFrame` has them."""
 Wrench = tuple[float, float, float, float, float, float]
 """Force and torque: the weighted position error and orientation error of a station."""
 
@@ -58,22 +60,14 @@ class MeasurementModel(NamedTuple):
 
 @compiled
 def update_targets(
-    model: MeasurementModel,
-    targets: StationTargets,
-    position_m: Floats,
-    tracker_from_station: Floats,
-    position_valid: Bools,
-    orientation_valid: Bools,
-    quality: Floats,
-    suspect: Bools,
-    measured: Bools,
-    confidence: Floats,
+    model: MeasurementModel, targets: StationTargets, readings: Readings, measured: Bools, confidence: Floats
 ) -> None:
     """Take a frame's readings (S, 3), (S, 4) into the world and onto the bones.
 
     Fills in `targets`, `measured` (2S,), and `confidence` (2S,), which is 0 where not measured. Targets that were not
     measured are zero and identity.
     """
+    position_m, tracker_from_station, position_valid, orientation_valid, quality, suspect = readings
     count = len(position_m)
     for s in range(count):
         weight = quality[s] if model.by_quality else 1.0

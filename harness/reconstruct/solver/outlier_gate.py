@@ -17,8 +17,8 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled, specialise
-from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.residuals import Residuals
+from harness.reconstruct.solver.status_monitor import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25
@@ -29,8 +29,8 @@ _MAX_PERIOD_S = 0.1
 """After a longer gap no position is predicted."""
 
 
-class ReadingHistory(NamedTuple):
-    """The last readings of S stations."""
+class StationHistory(NamedTuple):
+    """The last readings of S stations, and where the last answer has them."""
 
     position_m: Floats
     """(S, 3) last position [m]."""
@@ -48,48 +48,33 @@ class ReadingHistory(NamedTuple):
     """(S,) time of the last position [s]."""
     accepted_at_s: Floats
     """(S,) time of the last position that was not left out [s]."""
-
-
-class ModelledStations(NamedTuple):
-    """The S stations in the last answer."""
-
-    position_m: Floats
-    """(S, 3) positions [m]."""
-    velocity_m_s: Floats
-    """(S, 3) velocities from the answer before [m/s]."""
+    body_m: Floats
+    """(S, 3) positions in the last answer [m]."""
+    body_velocity_m_s: Floats
+    """(S, 3) velocities to it from the answer before [m/s]."""
 
 
 class OutlierGate:
     """The outlier gate for the positions of S stations, for one session."""
 
     def __init__(
-        self,
-        stations: int,
-        jump_m: float = JUMP_M,
-        patience_s: float = PATIENCE_S,
-        clock: DeviceTime | None = None,
+        self, stations: int, jump_m: float = JUMP_M, patience_s: float = PATIENCE_S, clock: DeviceTime | None = None
     ) -> None:
         """`clock` is that of the session; without one the gate has its own."""
-        self._jump_m, self._patience_s = jump_m, patience_s
-        self._stations = ModelledStations(np.zeros((stations, 3)), np.zeros((stations, 3)))
-        self._history = ReadingHistory(
-            position_m=np.zeros((stations, 3)),
-            step_m=np.zeros((stations, 3)),
-            velocity_m_s=np.zeros((stations, 3)),
-            has_velocity=np.zeros(stations, bool),
-            offset_m=np.zeros((stations, 3)),
+        self._limits, self._moving, self._updated_at_s = (jump_m, patience_s), False, -np.inf
+        never, positions, self._no_offset_s = np.zeros(stations, bool), np.zeros((stations, 3)), np.zeros(stations)
+        self._history = StationHistory(
+            **{name: positions.copy() for name in ("position_m", "step_m", "velocity_m_s", "offset_m")},
+            **{name: positions.copy() for name in ("body_m", "body_velocity_m_s")},
+            has_velocity=never.copy(),
             left_out=np.zeros(stations, np.int64),
             read_at_s=np.full(stations, -np.inf),
             accepted_at_s=np.full(stations, -np.inf),
         )
-        self._updated_at_s, self._moving = -np.inf, False
         self._time, self._now_s = clock or DeviceTime(), -np.inf
-        never, positions, self._no_offset_s = np.zeros(stations, bool), np.zeros((stations, 3)), np.zeros(stations)
-        self._judge = specialise(
-            *(_judge, 0.0, 0.0, False, jump_m, patience_s, positions, never, self._no_offset_s),
-            *(self._stations, self._history, never),
-        )
-        self._follow = specialise(_follow, 0.0, positions, self._stations)
+        arguments = self._limits, positions, never, self._no_offset_s, self._history, never
+        self._judge = specialise(_judge, 0.0, 0.0, False, *arguments)
+        self._follow = specialise(_follow, 0.0, positions, self._history)
         self.left_out = False
         """Whether anything was left out of the last frame."""
         self.all_moved = False
@@ -124,13 +109,10 @@ class OutlierGate:
         """
         out: Bools = np.empty(len(measured), bool)
         self.all_moved = self._judge(
-            *(now_s, now_s - self._updated_at_s, self._moving, self._jump_m, self._patience_s),
-            np.ascontiguousarray(target_m),
-            np.ascontiguousarray(measured),
+            *(now_s, now_s - self._updated_at_s, self._moving, self._limits),
+            *(np.ascontiguousarray(target_m), np.ascontiguousarray(measured)),
             self._no_offset_s if offset_s is None else np.ascontiguousarray(offset_s),
-            self._stations,
-            self._history,
-            out,
+            *(self._history, out),
         )
         return out
 
@@ -138,7 +120,7 @@ class OutlierGate:
         """Take the stations' positions (S, 3) in the answer to this frame [m]."""
         period_s = now_s - self._updated_at_s
         self._moving = 0.0 < period_s <= _MAX_PERIOD_S
-        self._follow(period_s if self._moving else np.inf, np.ascontiguousarray(station_m), self._stations)
+        self._follow(period_s if self._moving else np.inf, np.ascontiguousarray(station_m), self._history)
         self._updated_at_s = now_s
 
 
@@ -147,82 +129,59 @@ def _judge(
     now_s: float,
     period_s: float,
     moving: bool,
-    jump_m: float,
-    patience_s: float,
+    limits: tuple[float, float],
     target_m: Floats,
     measured: Bools,
     offset_s: Floats,
-    stations: ModelledStations,
-    history: ReadingHistory,
+    history: StationHistory,
     out: Bools,
 ) -> bool:
-    """Fill in which measured positions (S,) to leave out, and take the frame into the history.
+    """Fill in which measured positions (S,) jumped, and not for too long, and take the frame into the history.
 
-    Returns whether at least half of the positions jumped. Nothing jumps unless the body's velocity is known (`moving`).
+    `limits` are the distance of a jump [m], and the patience [s]. Returns whether at least half of the measured
+    positions are far from the body's; then none is left out. Nothing jumps unless the body's velocity is known
+    (`moving`).
     """
     out[:] = False
     all_moved = False
     if moving and 0.0 < period_s <= _MAX_PERIOD_S:
-        all_moved = _find_jumps(
-            now_s, period_s, jump_m, patience_s, target_m, measured, offset_s, stations, history, out
-        )
+        far = 0
+        for s in range(len(out)):
+            if not measured[s]:
+                continue
+            if not history.has_velocity[s] and history.left_out[s] == 0:
+                history.velocity_m_s[s] = history.body_velocity_m_s[s]
+            expected_m = history.body_m[s] + (period_s + offset_s[s]) * history.body_velocity_m_s[s]
+            from_body_m = target_m[s] - expected_m
+            from_readings_m = target_m[s] - history.position_m[s] - period_s * history.velocity_m_s[s]
+            is_far = _squared(from_body_m) > limits[0] ** 2
+            far += is_far
+            if history.left_out[s] == 0:
+                follows = _follows(history.read_at_s[s], now_s, period_s)
+                out[s] = is_far and not (follows and _squared(from_readings_m) <= READING_JUMP_M**2)
+                history.offset_m[s] = from_readings_m if follows else from_body_m
+            else:
+                in_burst = _squared(from_body_m) > _squared(from_body_m - history.offset_m[s])
+                out[s] = in_burst and not _goes_on(target_m[s], s, now_s, period_s, history)
+        all_moved = bool(far > 0 and 2 * far >= measured.sum())
+        for s in range(len(out)):
+            out[s] = out[s] and not all_moved and now_s - history.accepted_at_s[s] <= limits[1]
     _record(now_s, period_s, target_m, measured, out, history)
     return all_moved
 
 
 @compiled
-def _follow(period_s: float, station_m: Floats, stations: ModelledStations) -> None:
+def _follow(period_s: float, station_m: Floats, history: StationHistory) -> None:
     """Take the stations' positions (S, 3) in an answer, `period_s` after the one before; inf for no velocity."""
     for s in range(len(station_m)):
         for i in range(3):
-            stations.velocity_m_s[s, i] = (station_m[s, i] - stations.position_m[s, i]) / period_s
-            stations.position_m[s, i] = station_m[s, i]
-
-
-@compiled
-def _find_jumps(
-    now_s: float,
-    period_s: float,
-    jump_m: float,
-    patience_s: float,
-    target_m: Floats,
-    measured: Bools,
-    offset_s: Floats,
-    stations: ModelledStations,
-    history: ReadingHistory,
-    out: Bools,
-) -> bool:
-    """Fill in which measured positions (S,) jumped, and not for too long.
-
-    Returns whether at least half of the measured ones are far from the body's; then none is left out.
-    """
-    far = 0
-    for s in range(len(out)):
-        if not measured[s]:
-            continue
-        if not history.has_velocity[s] and history.left_out[s] == 0:
-            history.velocity_m_s[s] = stations.velocity_m_s[s]
-        expected_m = stations.position_m[s] + (period_s + offset_s[s]) * stations.velocity_m_s[s]
-        from_body_m = target_m[s] - expected_m
-        from_readings_m = target_m[s] - history.position_m[s] - period_s * history.velocity_m_s[s]
-        is_far = _squared(from_body_m) > jump_m**2
-        far += is_far
-        if history.left_out[s] == 0:
-            follows = _follows(history.read_at_s[s], now_s, period_s)
-            out[s] = is_far and not (follows and _squared(from_readings_m) <= READING_JUMP_M**2)
-            history.offset_m[s] = from_readings_m if follows else from_body_m
-        else:
-            in_burst = _squared(from_body_m) > _squared(from_body_m - history.offset_m[s])
-            out[s] = in_burst and not _goes_on(target_m[s], s, now_s, period_s, history)
-    all_moved = bool(far > 0 and 2 * far >= measured.sum())
-    for s in range(len(out)):
-        out[s] = out[s] and not all_moved and now_s - history.accepted_at_s[s] <= patience_s
-    return all_moved
+            history.body_velocity_m_s[s, i] = (station_m[s, i] - history.body_m[s, i]) / period_s
+            history.body_m[s, i] = station_m[s, i]
 
 
 @compiled
 def _record(
-    now_s: float, period_s: float, target_m: Floats, measured: Bools, out: Bools, history: ReadingHistory
+    now_s: float, period_s: float, target_m: Floats, measured: Bools, out: Bools, history: StationHistory
 ) -> None:
     """Take the measured positions (S, 3) of a frame, of which those `out` (S,) are left out, into the history."""
     for s in range(len(out)):
@@ -244,7 +203,7 @@ def _record(
 
 
 @compiled
-def _goes_on(target_m: Floats, s: int, now_s: float, period_s: float, history: ReadingHistory) -> bool:
+def _goes_on(target_m: Floats, s: int, now_s: float, period_s: float, history: StationHistory) -> bool:
     """Whether a reading (3,) goes on with the step of the one that was left out first, rather than as before it."""
     step_m = target_m - history.position_m[s]
     as_jumped, as_before = step_m - history.step_m[s], step_m - period_s * history.velocity_m_s[s]

@@ -23,6 +23,7 @@ from harness.errors import ShapeError
 from harness.reconstruct.solver.kinematic_tree import build_tree, new_state
 from harness.reconstruct.solver.normal_equations import (
     MeasurementModel,
+    Readings,
     StationTargets,
     evaluate,
     update_targets,
@@ -80,7 +81,7 @@ class Residuals:
         self.station_m: Floats = self.state.station_m
         """(S, 3) modelled station positions in the world [m]."""
 
-        self._qpos = np.zeros(body.model.nq)
+        self._qpos, self._identity = np.zeros(body.model.nq), np.tile(rotations.IDENTITY, (count, 1))
         self._twice_scale_squared = 2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf)
         self._measurement = MeasurementModel(
             world_from_tracker=rotations.to_matrix(calibration.world_from_tracker),
@@ -95,8 +96,7 @@ class Residuals:
         zeros, never = np.zeros(count), np.zeros(count, bool)
         empty = TrackerFrame(0.0, zeros, np.zeros((count, 3)), np.zeros((count, 4)), never, never, zeros, never)
         self._update_targets = specialise(
-            *(update_targets, self._measurement, self.targets, *_frame_arguments(empty)),
-            *(self.measured, self.confidence),
+            *(update_targets, self._measurement, self.targets, _readings_of(empty)), *(self.measured, self.confidence)
         )
         self._evaluate = specialise(evaluate, self.tree, self.targets, self.state, self._qpos)
 
@@ -113,16 +113,14 @@ class Residuals:
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
-        arguments = *_frame_arguments(frame), self.measured, self.confidence
-        self._update_targets(self._measurement, self.targets, *arguments)
+        self._update_targets(self._measurement, self.targets, _readings_of(frame), self.measured, self.confidence)
 
-    def targets_of(self, frame: TrackerFrame) -> tuple[Floats, Floats, Bools]:
-        """Targets (S, 3) [m] and (S, 4), and which rows (2S,) are measured, of another frame than that read last."""
-        count = len(self.bones)
-        other = StationTargets(*(np.empty_like(array) for array in self.targets))
-        measured = np.empty(2 * count, bool)
-        self._update_targets(self._measurement, other, *_frame_arguments(frame), measured, np.empty(2 * count))
-        return other.target_m, other.world_from_target, measured
+    def completed(self, qpos: Floats) -> tuple[Floats, Floats]:
+        """Positions (S, 3) [m] and bone orientations (S, 4) of the frame; missing ones are those of a pose (55,)."""
+        self.kinematics.set(qpos)
+        at_m, turned = self.kinematics.station_poses(self.bones, self.mount_m, self._identity)
+        has_position, has_orientation = self.measured.reshape(2, -1, 1)
+        return np.where(has_position, self.target_m, at_m), np.where(has_orientation, self.world_from_target, turned)
 
     def set_sigma(self, position_m: float, orientation_rad: float) -> None:
         """Set the standard deviations of readings [m], [rad], from the next frame on."""
@@ -154,7 +152,7 @@ class Residuals:
         return self._evaluate(self.tree, self.targets, self.state, self._qpos)
 
 
-def _frame_arguments(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
+def _readings_of(frame: TrackerFrame) -> Readings:
     """The fields of a frame that `update_targets` takes, in its order."""
     valid = frame.position_valid, frame.orientation_valid
     return frame.position_m, frame.tracker_from_station, *valid, frame.quality, frame.suspect

@@ -9,16 +9,13 @@ from harness.body.humanoid import Body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.core.compiled_rotations import (
-    as_tuple,
-    matrix_from_quaternion,
-    quaternion_from_matrix,
-    quaternion_product,
-)
+from harness.core.compiled_rotations import as_tuple, matrix_from_quaternion, quaternion_from_matrix, quaternion_product
 from harness.core.humanoid24 import pack, unpack
 from harness.core.skeleton import Skeleton
 from harness.reconstruct.solver.residuals import Residuals
 
+Poses = tuple[Floats, Floats]
+"""Positions (S, 3) and orientations (S, 4) of stations."""
 _LEVER_M = 0.3
 """An orientation error of an angle counts like a position error of the angle times this lever [m]."""
 
@@ -29,15 +26,13 @@ def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Fl
     Least squares over positions and orientations (Kabsch 1976), weighted by their confidence. Without positions the
     rotation is about the root.
     """
-    count = len(residuals.bones)
     residuals.kinematics.set(qpos)
     station_m, world_from_station = residuals.kinematics.station_poses(
         residuals.bones, residuals.mount_m, residuals.bone_from_station
     )
+    measured = residuals.target_m, residuals.world_from_target
     mean_m, target_mean_m, moment = _cross_covariance(
-        *(station_m, world_from_station),
-        *(residuals.target_m, residuals.world_from_target, residuals.bone_from_station),
-        *(residuals.confidence[:count], residuals.confidence[count:], qpos[:3]),
+        (station_m, world_from_station), measured, residuals.bone_from_station, residuals.confidence, qpos[:3]
     )
     yaw_rad = np.arctan2(moment[1, 0] - moment[0, 1], moment[0, 0] + moment[1, 1])
     upright = np.array([np.cos(0.5 * yaw_rad), 0.0, 0.0, np.sin(0.5 * yaw_rad)])
@@ -69,19 +64,16 @@ def _with_arms(skeleton: Skeleton, qpos: Floats, shoulder_deg: float, elbow_deg:
 
 @compiled
 def _cross_covariance(
-    station_m: Floats,
-    world_from_station: Floats,
-    target_m: Floats,
-    world_from_target: Floats,
-    bone_from_station: Floats,
-    positions: Floats,
-    orientations: Floats,
-    root_m: Floats,
+    modelled: Poses, measured: Poses, bone_from_station: Floats, confidence: Floats, root_m: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Weighted means (3,) of stations and of readings, and the cross-covariance (3, 3) between them.
 
-    Weights are `positions` (S,) and `orientations` (S,). An orientation adds the rotation from modelled to measured.
+    Weights are the confidence (2S,) of positions, then of orientations. An orientation adds the rotation from modelled
+    to measured.
     """
+    station_m, world_from_station = modelled
+    target_m, world_from_target = measured
+    positions, orientations = confidence[: len(station_m)], confidence[len(station_m) :]
     mean_m, target_mean_m, moment = root_m.copy(), root_m.copy(), np.zeros((3, 3))
     total = positions.sum()
     if total > 0.0:

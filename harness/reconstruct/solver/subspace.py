@@ -9,10 +9,10 @@ import numpy as np
 
 from harness.core.arrays import Floats, Singles
 from harness.core.compiled import compiled, specialise
-from harness.reconstruct.solver.dense_factor import new_rows
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
+from harness.reconstruct.solver.matrix_algebra import new_rows
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.subspace_minimiser import Subspace, minimise_in_subspace
 
@@ -110,7 +110,7 @@ def invert_positive_definite(matrix: Floats) -> Floats:
     """The inverse of a positive definite matrix (N, N), by Gauss-Jordan elimination of its lower triangle.
 
     `rows` start as the matrix and end as minus the inverse. A step exchanges the roles of unknowns and right-hand sides
-    k and k + 1; both forms are symmetric, so the lower triangle suffices. For rows in pairs see `dense_factor`.
+    k and k + 1; both forms are symmetric, so the lower triangle suffices. For rows in pairs see `matrix_algebra`.
     `np.linalg.inv` takes 3.6 times as long for 52 rows.
     """
     count = len(matrix)

@@ -9,12 +9,21 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.reconstruct.solver.dense_factor import factorise, new_rows, solve_factorised
 from harness.reconstruct.solver.ground_frame import qpos_from_posture
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
 from harness.reconstruct.solver.levenberg_marquardt import DAMPING_INCREASE
-from harness.reconstruct.solver.matrix_algebra import dot
+from harness.reconstruct.solver.matrix_algebra import dot, factorise, new_rows, solve_factorised
 from harness.reconstruct.solver.normal_equations import StationTargets, evaluate, normal_rows
+
+_INITIAL_DAMPING, _DAMPING_DECREASE = 1e-4, 10.0
+"""Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it. Readings are so much stiffer
+than the prior that more damping would hold the directions which the prior alone decides."""
+_MAX_CHORD_STEP = 5e-3
+"""After a step with no larger component [m, rad] the factorised matrix is kept for the next step."""
+_MAX_EXTRAPOLATED_STEP = 2e-3
+"""After a step with no larger component [m, rad] the next decrease is predicted: decreases shrink geometrically."""
+_MIN_DIAGONAL = 1e-6
+"""Keeps the step at 0 for a ground frame that no reading determines."""
 
 
 class Subspace(NamedTuple):
@@ -33,17 +42,6 @@ class Subspace(NamedTuple):
     """(P,) b."""
     spring: Floats
     """(P,) the spring's part of the diagonal of A."""
-
-
-_INITIAL_DAMPING, _DAMPING_DECREASE = 1e-4, 10.0
-"""Relative to the diagonal, unlike that of `levenberg_marquardt`, which is added to it. Readings are so much stiffer
-than the prior that more damping would hold the directions which the prior alone decides."""
-_MAX_CHORD_STEP = 5e-3
-"""After a step with no larger component [m, rad] the factorised matrix is kept for the next step."""
-_MAX_EXTRAPOLATED_STEP = 2e-3
-"""After a step with no larger component [m, rad] the next decrease is predicted: decreases shrink geometrically."""
-_MIN_DIAGONAL = 1e-6
-"""Keeps the step at 0 for a ground frame that no reading determines."""
 
 
 @compiled

@@ -58,17 +58,14 @@ class AlignmentHistory(NamedTuple):
     """(S,) number of orientations in a row up to the last record."""
 
 
-class FollowingReadings(NamedTuple):
-    """The readings of the frame after the one that is aligned, for a fixed lag of one frame."""
-
-    measured_s: Floats
-    """(S,) time of each record; NaN where there is none or it is suspect [s]."""
-    target_m: Floats
-    """(S, 3) positions in the world [m]."""
-    world_from_target: Floats
-    """(S, 4) orientations."""
-    measured: Bools
-    """(2S,) which rows were measured."""
+def read_frame(
+    frame: TrackerFrame, residuals: Residuals, gate: OutlierGate, alignment: "TemporalAlignment | None"
+) -> None:
+    """Let residuals read a frame without the positions that jumped, at one instant if there is an alignment."""
+    if alignment is None:
+        gate.read(frame, residuals)
+    else:
+        alignment.read(frame, residuals, gate)
 
 
 class TemporalAlignment:
@@ -85,40 +82,24 @@ class TemporalAlignment:
             last_turn=np.tile(rotations.IDENTITY, (stations, 1)),
             orientations=np.zeros(stations, np.int64),
         )
-        self._nothing = FollowingReadings(
-            np.full(stations, np.nan),
-            np.zeros((stations, 3)),
-            np.zeros((stations, 4)),
-            np.zeros(2 * stations, bool),
-        )
         self._offset_s: Floats = np.zeros(stations)
         record = immutable(np.zeros(stations)), immutable(np.zeros(stations), bool)
         readings = np.zeros(2 * stations, bool), np.zeros((stations, 3)), np.zeros((stations, 4))
         self._measure_offsets = specialise(measure_offsets, *record, self._history.slot_s, self._offset_s)
-        self._align = specialise(align_readings, *record, self._offset_s, *readings, self._nothing, self._history)
+        self._align = specialise(align_readings, *record, self._offset_s, *readings, self._history)
 
-    def read(
-        self, frame: TrackerFrame, residuals: Residuals, gate: OutlierGate, following: TrackerFrame | None = None
-    ) -> None:
+    def read(self, frame: TrackerFrame, residuals: Residuals, gate: OutlierGate) -> None:
         """Let residuals read a frame, leave out the positions that jumped, and move the others to one instant.
 
-        The gate predicts each station at its own sampling time. With the `following` frame (a fixed lag of one frame)
-        a reading is interpolated towards the next one of its station instead of extrapolated.
+        The gate predicts each station at its own sampling time.
         """
         self._measure_offsets(frame.measured_s, frame.suspect, self._history.slot_s, self._offset_s)
         gate.read(frame, residuals, self._offset_s)
-        ahead = self._nothing if following is None else _following(following, residuals)
         self._align(
             *(frame.measured_s, frame.suspect, self._offset_s),
             *(residuals.measured, residuals.target_m, residuals.world_from_target),
-            *(ahead, self._history),
+            self._history,
         )
-
-
-def _following(frame: TrackerFrame, residuals: Residuals) -> FollowingReadings:
-    target_m, world_from_target, measured = residuals.targets_of(frame)
-    measured_s = np.where(frame.suspect, np.nan, frame.measured_s)
-    return FollowingReadings(measured_s, target_m, world_from_target, measured)
 
 
 @compiled
@@ -129,7 +110,6 @@ def align_readings(
     measured: Bools,
     target_m: Floats,
     world_from_target: Floats,
-    following: FollowingReadings,
     history: AlignmentHistory,
 ) -> None:
     """Move positions (S, 3) and orientations (S, 4), of which rows (2S,) are measured, to the instant, in place.
@@ -149,7 +129,7 @@ def align_readings(
         if measured[s]:
             x, y, z = target_m[s, 0], target_m[s, 1], target_m[s, 2]
             if moves:
-                _move_position(target_m[s], s, now_s, shift_s, following, history)
+                _move_position(target_m[s], s, now_s, shift_s, history)
             history.before_m[s] = history.last_m[s]
             history.last_m[s, 0], history.last_m[s, 1], history.last_m[s, 2] = x, y, z
             history.positions[s] += 1
@@ -158,7 +138,7 @@ def align_readings(
         if measured[count + s]:
             w, x, y, z = as_tuple(world_from_target[s])
             if moves:
-                _move_orientation(world_from_target[s], s, now_s, shift_s, count, following, history)
+                _move_orientation(world_from_target[s], s, now_s, shift_s, history)
             turn = history.last_turn[s]
             turn[0], turn[1], turn[2], turn[3] = w, x, y, z
             history.orientations[s] += 1
@@ -195,58 +175,36 @@ def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Flo
 
 
 @compiled
-def _move_position(
-    reading_m: Floats, s: int, now_s: float, shift_s: float, following: FollowingReadings, history: AlignmentHistory
-) -> None:
-    """Move a position (3,) of station s by a time, where it makes one motion with two others of the station."""
-    later_s = following.measured_s[s] - now_s
-    ahead = following.measured[s] and 0.0 < later_s <= MAX_STEP_S
-    if history.positions[s] < (1 if ahead else 2):
+def _move_position(reading_m: Floats, s: int, now_s: float, shift_s: float, history: AlignmentHistory) -> None:
+    """Move a position (3,) of station s by a time, where it makes one motion with the last two of the station."""
+    if history.positions[s] < 2:
         return
-    step_s = now_s - history.last_s[s]
-    other_s = later_s if ahead else history.last_s[s] - history.before_s[s]
-    last_m, before_m, later_m = history.last_m[s], history.before_m[s], following.target_m[s]
+    step_s, other_s = now_s - history.last_s[s], history.last_s[s] - history.before_s[s]
+    last_m, before_m = history.last_m[s], history.before_m[s]
     bend_m = 0.0
     for i in range(3):
-        other = (later_m[i] - reading_m[i] if ahead else last_m[i] - before_m[i]) / other_s
-        bend_m += (other * step_s - (reading_m[i] - last_m[i])) ** 2
+        bend_m += ((last_m[i] - before_m[i]) / other_s * step_s - (reading_m[i] - last_m[i])) ** 2
     if bend_m > MAX_BEND_M**2:
         return
-    lever_s = shift_s + step_s if ahead or shift_s < 0.0 else -other_s  # a parabola, or the mean velocity of two steps
+    lever_s = shift_s + step_s if shift_s < 0.0 else -other_s  # a parabola, or the mean velocity of two steps
     for i in range(3):
         velocity = (reading_m[i] - last_m[i]) / step_s
-        other = (later_m[i] - reading_m[i] if ahead else last_m[i] - before_m[i]) / other_s
-        curvature = (other - velocity if ahead else velocity - other) / (step_s + other_s)
+        curvature = (velocity - (last_m[i] - before_m[i]) / other_s) / (step_s + other_s)
         reading_m[i] += shift_s * (velocity + lever_s * curvature)
 
 
 @compiled
-def _move_orientation(
-    reading: Floats,
-    s: int,
-    now_s: float,
-    shift_s: float,
-    count: int,
-    following: FollowingReadings,
-    history: AlignmentHistory,
-) -> None:
-    """Turn an orientation (4,) of station s by a share of its rotation since the last one, or until the next one."""
-    w, x, y, z = as_tuple(reading)
-    later_s = following.measured_s[s] - now_s
-    if shift_s > 0.0 and following.measured[count + s] and 0.0 < later_s <= MAX_STEP_S:
-        turn = quaternion_product(as_tuple(following.world_from_target[s]), (w, -x, -y, -z))
-        share = shift_s / later_s
-    elif history.orientations[s] >= 1:
-        last = history.last_turn[s]
-        turn = quaternion_product((w, x, y, z), (last[0], -last[1], -last[2], -last[3]))
-        share = shift_s / (now_s - history.last_s[s])
-    else:
+def _move_orientation(reading: Floats, s: int, now_s: float, shift_s: float, history: AlignmentHistory) -> None:
+    """Turn an orientation (4,) of station s by a share of its rotation since the last one."""
+    if history.orientations[s] < 1:
         return
-    a, b, c = rotation_vector(turn)
+    w, x, y, z = as_tuple(reading)
+    last = history.last_turn[s]
+    a, b, c = rotation_vector(quaternion_product((w, x, y, z), (last[0], -last[1], -last[2], -last[3])))
     angle_rad = np.sqrt(a * a + b * b + c * c)
     if angle_rad > MAX_TURN_RAD or angle_rad == 0.0:
         return
-    half = 0.5 * share * angle_rad
+    half = 0.5 * (shift_s / (now_s - history.last_s[s])) * angle_rad
     sine = np.sin(half) / angle_rad
     moved = quaternion_product((np.cos(half), sine * a, sine * b, sine * c), (w, x, y, z))
     reading[0], reading[1], reading[2], reading[3] = moved

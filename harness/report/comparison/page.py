@@ -9,14 +9,14 @@ from harness.compare.comparison import Comparison, Difference
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.units import count_units
 from harness.core.number_format import format_change_percent, format_p_value
-from harness.report.comparison.interval_chart import interval_charts
-from harness.report.comparison.slope_chart import slope_chart
+from harness.report.comparison.charts import interval_charts, slope_chart
 from harness.report.comparison.wording import (
     KINDS,
     MARKS,
     MEANINGS,
     OUTCOME_TITLES,
     clips_of,
+    comparison_sentence,
     count_verdicts,
     deciding_parts,
     excerpt_pair,
@@ -27,10 +27,9 @@ from harness.report.comparison.wording import (
     listed_issues,
     parts_of,
     percent_of_a,
-    sentence,
     sort_by_verdict,
 )
-from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.markup import Markup, join, tag, verdict_badge
 from harness.report.kit.page import (
     Badge,
     Block,
@@ -44,12 +43,10 @@ from harness.report.kit.page import (
     Stack,
     Tally,
     TerminalOnly,
-    Verdict,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
-from harness.report.kit.text import list_first, shorten
-from harness.report.kit.verdict_badge import verdict_badge
+from harness.report.kit.text import list_first, truncate
 
 _WIDTH = 160
 _MOST_OPEN, _MOST_NAMED, _MOST_CLIPS, _MOST_LISTED, _MOST_PRINTED, _LETTERS = 24, 4, 200, 200, 6, 60
@@ -103,8 +100,8 @@ def comparison_page(comparison: Comparison) -> Page:
     return Page(
         verb="compare",
         name=f"{comparison.b} against {comparison.a}",
-        verdict=Verdict(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
-        headline=sentence(comparison),
+        verdict=(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
+        headline=comparison_sentence(comparison),
         lead=[
             TerminalOnly([Bullets(_cut(parts, _MOST_PRINTED, "{} more lines: --html"), prefix="")]),
             *([Tally(count_verdicts(lines), MARKS, MEANINGS)] if lines else []),
@@ -118,7 +115,7 @@ def comparison_page(comparison: Comparison) -> Page:
             "Training data": list_first(comparison.training_notes, _MOST_NAMED),
             "Cells matched": f"{comparison.matched:,}",
             **{
-                title: f"{len(texts):,} ({list_first([shorten(text, _LETTERS) for text in texts])})"
+                title: f"{len(texts):,} ({list_first([truncate(text, _LETTERS) for text in texts])})"
                 for title, texts in listed_issues(comparison).items()
             },
             "Circumstances": f"differ in {list_first(names, 2 * _MOST_NAMED)}" if names else "the same",
@@ -165,11 +162,14 @@ def _tables(comparison: Comparison, lines: Sequence[Difference], rest: Sequence[
     if not (lines or rest):
         return [BrowserOnly([Prose("Nothing was compared.")])]
     parts = [part for line in lines for part in parts_of(comparison, line)]
+    by_metric: dict[str, list[Difference]] = {}
+    for line in lines or rest:
+        by_metric.setdefault(line.metric, []).append(line)
     return [
         BrowserOnly([lines_table(comparison, lines, "gated lines")]),
         BrowserOnly([lines_table(comparison, parts, "parts of gated lines")], "By behaviour and performers"),
         BrowserOnly([lines_table(comparison, rest, "lines that are not gated")], "Lines that are not gated"),
-        BrowserOnly(_clip_tables(lines or rest), "Clip by clip"),
+        BrowserOnly([_clip_table(metric, of) for metric, of in by_metric.items()], "Clip by clip"),
         TerminalOnly(
             [
                 lines_table(comparison, lines, "gated lines", with_why=False),
@@ -216,15 +216,8 @@ def _reasons(lines: Sequence[Difference]) -> list[str]:
     return [f"cannot tell, {why}: {list_first(names)}" for why, names in found.items()]
 
 
-def _clip_tables(lines: Sequence[Difference]) -> list[DataTable]:
-    """For each metric a table with a row for each clip and a column for each line: A, B and their difference."""
-    return [
-        _clip_table(metric, [line for line in lines if line.metric == metric])
-        for metric in dict.fromkeys(line.metric for line in lines)
-    ]
-
-
 def _clip_table(metric: str, lines: Sequence[Difference]) -> DataTable:
+    """A row for each clip and a column for each line: A, B and their difference."""
     clips = clips_of(lines)
     varied = len({line.group for line in lines}) > 1
     head = ["clip", *(f"{line.method}, {line.group}" if varied else line.method for line in lines)]

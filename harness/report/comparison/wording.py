@@ -8,8 +8,7 @@ from typing import get_args
 from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.compare.margins import MARGINS
 from harness.compare.units import count_units
-from harness.core.interval import Interval
-from harness.core.number_format import count_noun, decimals_for, format_change_percent, format_fixed
+from harness.core.number_format import Interval, count_noun, decimals_for, format_change_percent, format_fixed
 from harness.errors import Outcome
 from harness.report.kit.text import list_first
 
@@ -32,7 +31,7 @@ OUTCOME_TITLES: Mapping[Outcome, str] = {
 }
 
 
-def sentence(comparison: Comparison) -> str:
+def comparison_sentence(comparison: Comparison) -> str:
     """The outcome in one sentence."""
     gated = [line for line in comparison.differences if line.gated]
     counts = count_verdicts(gated)

@@ -1,6 +1,6 @@
-"""The conditions of a run, each with the methods that may be ranked together, as figures and tables select them."""
+"""The conditions of a run with the methods that may be ranked together, and their errors over time, for figures."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,15 @@ from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
 from harness.compare.units import Sampling
 from harness.errors import BadInput, NothingMeasured, UnknownName
+from harness.report.figures.print_figure import FigureSelection
+from harness.report.kit.error_lines import CONTROL, Highlights, choose_highlights, find_series
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
-from harness.report.run.data import Row, lag_of, series_name
+from harness.report.run.data import Row, RunData, Trace, lag_of, last_varied, read_traces, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
 from harness.results.cell import varied_text
 from harness.results.integrity import check_cells, check_folder
+from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary
 from harness.score.metrics import DEFINITIONS
@@ -178,3 +181,48 @@ def check_metric(metric: str, known: Iterable[str], kind: str) -> None:
         raise UnknownName("metric", metric, known)
     if metric not in known:
         raise BadInput(f"{metric} is no {kind}.", f"Choose one of {', '.join(known)}.")
+
+
+def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondition:
+    """The condition of a figure that shows one: the last varied values, causal methods, known performers.
+
+    It has the chosen clip, if any. UnknownName for a clip that no condition has.
+    """
+    chosen = run.conditions
+    if selection.clip:
+        chosen = tuple(each for each in chosen if selection.clip in each.clips)
+        if not chosen:
+            clips = dict.fromkeys(clip for each in run.conditions for clip in each.clips)
+            raise UnknownName("clip of the run", selection.clip, clips)
+    last = chosen[-1].varied
+    return next(each for each in chosen if each.varied == last and each.group.lag == chosen[0].group.lag)
+
+
+def rank_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:
+    """The series with the lowest mean joint angle error, and the control.
+
+    UnknownName for a control that the condition lacks, BadInput when the methods share no clip.
+    """
+    ranking: MethodRanking | None = condition.rank()
+    if ranking is None:
+        raise BadInput("The methods share no measured clip.", "Choose methods with --methods.")
+    leader, *others = ranking.values
+    if selection.control and not find_series(others, selection.control):
+        raise UnknownName("control among the methods shown", selection.control, others)
+    return choose_highlights([leader, *others], selection.control or CONTROL)
+
+
+def read_series(
+    folder: Path, condition: RunCondition, keep: Callable[[str, Row], bool]
+) -> Mapping[str, Sequence[Trace]]:
+    """Series -> traces of the cells of a condition that `keep` accepts by series and row; in the condition's order.
+
+    BadFile for a damaged cell.
+    """
+    summary = read_summary(folder)
+    run = RunData(folder, Manifest.read(folder / "manifest.json"), last_varied(summary), (), summary)
+    rows = [row for row in condition.cells if keep(condition.series_of(row), row)]
+    found: dict[str, list[Trace]] = {}
+    for row, trace in zip(rows, read_traces(run, rows), strict=True):
+        found.setdefault(condition.series_of(row), []).append(trace)
+    return found

@@ -19,7 +19,7 @@ from harness.core.number_format import format_number
 from harness.report.figures.conditions import RunCondition, read_conditions
 from harness.report.figures.table_formats import markdown_code
 from harness.report.kit.marked_block import describe_code, replace_block
-from harness.report.kit.metric_labels import metric_label
+from harness.report.kit.text import metric_label
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS

@@ -128,15 +128,12 @@ def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
 
 
 def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -> str:
-    match name:
-        case "performers":
-            return condition.group.performer
-        case "lag":
-            return str(condition.group.lag)
-        case "behaviour":
-            return (behaviour or "").replace("_", " ")
-        case _:
-            return varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
+    texts = {
+        "performers": condition.group.performer,
+        "lag": str(condition.group.lag),
+        "behaviour": (behaviour or "").replace("_", " "),
+    }
+    return texts[name] if name in texts else varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
 
 
 def _value(

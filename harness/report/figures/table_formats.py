@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from harness.core.csv_text import csv_line
 from harness.errors import UnknownName
 from harness.report.figures.table import MetricValue, ResultsTable
-from harness.report.kit.metric_labels import metric_label
+from harness.report.kit.text import metric_label
 
 _LATEX = {
     **{sign: f"\\{sign}" for sign in "&%$#_{}"},

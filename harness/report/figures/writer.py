@@ -1,17 +1,74 @@
-"""Writes a figure or a table for a paper from the folder of a run or a placement study."""
+"""The kinds of figures that `harness plot` draws, and the files of figures and tables for papers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from harness.core.fault_report import is_system_fault
 from harness.core.files import write_bytes
-from harness.errors import BadInput
-from harness.report.figures.kinds import KINDS, plan_figure
-from harness.report.figures.selection import FigureSelection
+from harness.errors import BadInput, UnknownName
+from harness.report.figures.conditions import ConditionSet, read_conditions
+from harness.report.figures.frame_figures import distribution_figure, over_time_figure
+from harness.report.figures.mean_figures import joints_figure, ranking_figure
+from harness.report.figures.print_figure import FigureSelection, PrintFigure, draw_figure
 from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_table
 from harness.report.figures.table_formats import format_table
-from harness.report.kit.print_figure import draw_figure
+from harness.report.placement.pareto import placement_figure
+from harness.results.folder_kind import require_kind
+
+
+@dataclass(frozen=True)
+class FigureKind:
+    """One kind of figure."""
+
+    text: str
+    width_mm: int
+    """Default width."""
+    choices: tuple[str, ...] = ()
+    """Fields of `FigureSelection` that it uses."""
+    of_run: Callable[[ConditionSet, FigureSelection], PrintFigure] | None = None
+    """Plans the figure of a run; None for that of a placement study."""
+
+
+_RANKING = "mean error of each method with its interval, and the difference to the lowest"
+_TIME = "error over time on one clip: the leader and a control in colour, the others grey"
+_CHOICES = ("methods", "condition")
+KINDS = {
+    "ranking": FigureKind(_RANKING, 85, (*_CHOICES, "metric"), ranking_figure),
+    "time": FigureKind(_TIME, 170, (*_CHOICES, "metric", "clip", "control"), over_time_figure),
+    "joints": FigureKind(
+        "error at each bone of the leader and of a control", 85, (*_CHOICES, "clip", "control"), joints_figure
+    ),
+    "cdf": FigureKind(
+        "distribution of the errors of single frames", 85, (*_CHOICES, "metric", "clip"), distribution_figure
+    ),
+    "placement": FigureKind("error against the number of stations, of a placement study", 170),
+}
+"""Kind -> what it shows."""
+
+
+def plan_figure(folder: Path, kind: str, selection: FigureSelection) -> tuple[str, PrintFigure]:
+    """The kind and the figure of the results in a folder; without a kind `ranking`, or `placement` for a study.
+
+    UnknownName for a kind, metric, method, condition or clip that does not exist. BadInput for a kind that does not fit
+    the folder, and for choices that the kind does not use. NothingMeasured when no cell has an error.
+    """
+    if kind and kind not in KINDS:
+        raise UnknownName("kind of figure", kind, KINDS)
+    source = require_kind(folder, "run", "placement")
+    fitting = [name for name, each in KINDS.items() if (each.of_run is not None) == (source == "run")]
+    kind = kind or fitting[0]
+    if kind not in fitting:
+        this, other = ("a run", "a placement study") if source == "run" else ("a placement study", "a run")
+        raise BadInput(f"--kind {kind} with {folder}, {this}.", f"It is for {other}. Choose {', '.join(fitting)}.")
+    unused = [name for name, value in vars(selection).items() if value != getattr(FigureSelection(), name)]
+    if unused := [name for name in unused if name not in KINDS[kind].choices]:
+        raise BadInput(f"--{unused[0]} with --kind {kind}.", "It does not use that: leave it out.")
+    plan = KINDS[kind].of_run
+    if plan is None:
+        return kind, placement_figure(folder)
+    return kind, plan(read_conditions(folder).select(selection.condition, selection.methods), selection)
+
 
 FOLDER = "figures"
 """Folder of figures inside that of the results."""
@@ -51,9 +108,10 @@ def write_figure(
     kind, figure = plan_figure(folder, kind, selection or FigureSelection())
     path = out or folder / FOLDER / f"{figure.name}.{fmt}"
     _check_output(path, force)
-    drawn = draw_figure(figure, fmt, width_mm or KINDS[kind].width_mm)
-    _write_output(path, drawn.data)
-    return WrittenFigure(path, kind, drawn.width_mm, drawn.height_mm, figure.caption)
+    width_mm = width_mm or KINDS[kind].width_mm
+    data, height_mm = draw_figure(figure, fmt, width_mm)
+    _write_output(path, data)
+    return WrittenFigure(path, kind, float(width_mm), height_mm, figure.caption)
 
 
 @dataclass(frozen=True)

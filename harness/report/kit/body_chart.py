@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.body.anatomy import BodyGeom, body_geoms
+from harness.body.anatomy import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
-from harness.core.skeleton import Pose, pose_from_rotations
-from harness.report.kit.style import FAINT, GRID, PAPER
+from harness.core.skeleton import BodyGeom, Pose, pose_from_rotations
+from harness.report.kit.style import FAINT, GRID, PAPER, Axes, Figure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
 
 _COLOURS = "viridis"
 _ARM_ANGLE_RAD = np.deg2rad(62.0)
@@ -43,7 +41,7 @@ class BodyGroup:
     """Title -> bone -> value."""
 
 
-def draw_bodies(figure: "Figure", groups: Sequence[BodyGroup]) -> None:
+def draw_bodies(figure: Figure, groups: Sequence[BodyGroup]) -> None:
     """Draw the bodies of all groups in one row, and a colour bar from 0 to the largest value below each group.
 
     The figure needs no layout. The disc of the n-th bone of the m-th body has the gid "joint-m-n"; `joint_titles`
@@ -78,9 +76,7 @@ def joint_titles(groups: Sequence[BodyGroup], names: Mapping[str, str]) -> dict[
     }
 
 
-def _draw_body(
-    axes: "Axes", values: Mapping[str, float], group: BodyGroup, colours: "ScalarMappable", body: int
-) -> None:
+def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colours: "ScalarMappable", body: int) -> None:
     from matplotlib.patches import Circle, Polygon
 
     for outline in _outlines():

@@ -4,19 +4,15 @@ import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
-from harness.report.kit.hover_chart import describe_plots, mark_series
-from harness.report.kit.style import INK, SETTINGS, Chart, legend_scale, to_png, to_svg
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.core.working_folder import plain_import
+from harness.report.kit.inline_svg import describe_plots, mark_series
+from harness.report.kit.style import INK, SETTINGS, Axes, Chart, Figure, legend_scale, to_png, to_svg
 
 _WIDTH_IN = 8.6
 """Width of a chart as wide as the page [in]."""
@@ -35,7 +31,7 @@ def draw_chart(
     title: str,
     caption: str,
     alt: str,
-    draw: Callable[["Figure"], None],
+    draw: Callable[[Figure], None],
     height_in: float,
     *,
     width_in: float = _WIDTH_IN,
@@ -76,7 +72,7 @@ def clear_plots(folder: Path) -> Path:
     return plots
 
 
-def add_legend(figure: "Figure", axes: "Axes") -> None:
+def add_legend(figure: Figure, axes: Axes) -> None:
     """Name the lines of `axes` above the chart; the figure grows by the rows beyond the first."""
     handles, names = axes.get_legend_handles_labels()
     scale = legend_scale()
@@ -122,7 +118,7 @@ def spread_positions(wanted: Sequence[float], gap: float) -> list[float]:
     return [position - too_high for position in positions]
 
 
-def label_line_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
+def label_line_ends(axes: Axes, ends: Sequence[tuple[float, str, str]]) -> None:
     """Write each line's name to the right of its end, with a leader in its colour; names are moved apart.
 
     `ends` are the last value, name and colour of each line.

@@ -5,6 +5,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from harness.report.kit.text import to_file_name
+
 
 class Markup(str):
     """Text that is HTML already and is not escaped again."""
@@ -56,6 +58,12 @@ def bullet_list(items: Sequence[Any], class_: str | None = "notes") -> Markup:
 def inline_code(text: str) -> Markup:
     """The text with everything between backticks set as code."""
     return join(*(tag("code", part) if n % 2 else part for n, part in enumerate(_CODE.split(text))))
+
+
+def verdict_badge(verdict: str, mark: str) -> Markup:
+    """A verdict as a mark and a word, so that it does not depend on colour alone."""
+    sign = tag("span", mark, aria_hidden="true", class_="mark")
+    return tag("span", sign, verdict, class_=f"verdict {to_file_name(verdict)}")
 
 
 def _attribute(key: str) -> str:

@@ -1,20 +1,14 @@
 """A page as data: what it says is written once, `page_html` and `page_text` render it for a browser and a terminal."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.core.files import to_json_types
 from harness.errors import Outcome
 from harness.report.kit.markup import Markup
 from harness.report.kit.style import Chart
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The outcome of a page in a word of its own."""
-
-    word: str
-    outcome: Outcome
 
 
 @dataclass(frozen=True)
@@ -76,6 +70,11 @@ class Code:
     title: str = ""
 
 
+def json_listing(content: Any, title: str) -> Code:
+    """A folded listing of a record as JSON."""
+    return Code(json.dumps(to_json_types(content), indent=2, ensure_ascii=False), title)
+
+
 @dataclass(frozen=True)
 class Tally:
     """Number of cases of each verdict."""
@@ -94,7 +93,7 @@ class DataTable:
     """Cells are text, whole numbers, `Interval`, `Badge`, `Stack` or `Strong`; code stands between backticks."""
     title: str = ""
     caption: str = ""
-    """What the numbers are; only a browser shows it."""
+    """What the numbers are; a browser shows it."""
     label: str = ""
     """Name for readers who hear the page; by default the title."""
     fold: str = ""
@@ -107,16 +106,20 @@ class DataTable:
     """Whether a phone shows each row as a card, for rows of many words."""
     intervals_printed: bool = True
     """Whether a terminal shows intervals; not so in tables that are too wide for them."""
+    caption_printed: bool = False
+    """Whether a terminal prints the caption too, behind the title."""
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A chart, and its numbers, which a browser folds below it and a terminal prints."""
 
-    draw: Callable[[], Chart | None]
-    """Draws the chart; None without anything to show: the numbers are open then."""
+    chart: Chart | Callable[[], Chart | None]
+    """The chart, or what draws it; None without anything to show: the numbers are open then."""
     numbers: "DataTable | tuple[DataTable, ...]" = ()
     fold: str = "Numbers of this chart"
+    level: int | None = None
+    """Level of the chart's heading, 0 for a title in the caption; by default 3 where a section has several charts."""
 
     @property
     def tables(self) -> tuple[DataTable, ...]:
@@ -178,7 +181,8 @@ class Page:
     facts: Mapping[str, str]
     """Title -> text; a fact without text is left out."""
     sections: Sequence[Section]
-    verdict: Verdict | None = None
+    verdict: tuple[str, Outcome] | None = None
+    """The outcome, after the page's own word for it."""
     lead: Sequence[Block] = ()
     """What follows the headline at once."""
     missing: Sequence[str] = ()

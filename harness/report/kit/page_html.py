@@ -1,16 +1,15 @@
 """The browser's rendering of a page, and its file."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from harness.core.files import write_text
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED
-from harness.core.text_table import Table
+from harness.core.number_format import NOT_MEASURED, Interval
 from harness.report.kit.document import chart_figure, chart_panel, document
-from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, tag
+from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, scroll_box, tag, verdict_badge
 from harness.report.kit.page import (
     Badge,
     Block,
@@ -29,13 +28,15 @@ from harness.report.kit.page import (
     TerminalOnly,
 )
 from harness.report.kit.page_text import NUMBER
-from harness.report.kit.table import NOT_MEASURED_CELL, html_table, stacked_cell
+from harness.report.kit.style import Chart
 from harness.report.kit.text import to_file_name
-from harness.report.kit.verdict_badge import tally_list, verdict_badge
 
 _LETTER_EM, _WIDE_EM, _WIDEST_EM, _LONG_CELL_LETTERS = 0.55, 22.0, 44.0, 300
 """Width of an average letter; greatest widths of columns of words, and of those with a cell of more letters than the
 last number."""
+_SPREAD = re.compile(r"((?<=\S) ± [\d.,]+)?( n\u00a0[\d, of]+)?$")
+"""End of a text that is set in small type: a standard deviation, and the number of clips behind a mean."""
+_NOT_MEASURED = tag("span", NOT_MEASURED, class_="none")
 
 
 def write_page(page: Page, path: Path, plots: Path | None = None) -> Path:
@@ -61,8 +62,8 @@ class _Renderer:
         made_by = Section("Made by", "command", [Code(page.command)] if page.command else [])
         heading: Any = page.headline
         if page.verdict:
-            word = to_file_name(page.verdict.outcome.word)
-            heading = join(tag("span", page.verdict.word, class_=f"big {word}"), page.headline)
+            word, outcome = page.verdict
+            heading = join(tag("span", word, class_=f"big {to_file_name(outcome.word)}"), page.headline)
         return document(
             title=f"{page.name}: harness {page.verb}" if page.name else f"harness {page.verb}",
             kicker=f"harness {page.verb}" + (f" · {page.name}" if page.name else ""),
@@ -90,7 +91,7 @@ class _Renderer:
                 listing = tag("pre", block.text if block.title else tag("code", block.text))
                 return details(block.title, listing) if block.title else listing
             case Tally():
-                return tally_list(block.counts, block.marks, block.meanings)
+                return _tally(block)
             case DataTable():
                 table = page_table(block, label)
                 return details(block.fold, table) if block.fold and table else table
@@ -108,12 +109,14 @@ class _Renderer:
 
     def _drawing(self, block: Drawing, label: str, level: int) -> Markup:
         numbers = join(*(page_table(table, label) for table in block.tables))
-        chart = block.draw() if self._with_charts else None
+        draw = block.chart
+        chart = (draw if isinstance(draw, Chart) else draw()) if self._with_charts else None
         if chart is None:
             return numbers
         if self._plots is not None:
             chart.write(self._plots)
-        return join(chart_figure(chart, level), details(block.fold, numbers) if numbers else None)
+        figure = chart_figure(chart, level if block.level is None else block.level)
+        return join(figure, details(block.fold, numbers) if numbers else None)
 
 
 def page_table(table: DataTable, label: str = "") -> Markup:
@@ -133,7 +136,20 @@ def page_table(table: DataTable, label: str = "") -> Markup:
     columns = zip(table.head, *table.rows, strict=True)
     cells = [[_cell(cell) for cell in next(columns)], *map(_column, columns)]
     head, *body = map(list, zip(*cells, strict=True))
-    return html_table(Table(head, body), caption, label=label)
+    rows_of_head = tag("tr", *(tag("th", cell, scope="col") for cell in head))
+    lines = [tag("tr", tag("th", first, scope="row"), *(tag("td", cell) for cell in rest)) for first, *rest in body]
+    content = tag("table", tag("thead", rows_of_head), tag("tbody", *lines), aria_label=label)
+    return join(tag("p", caption, class_="caption"), scroll_box(content, label))
+
+
+def _tally(tally: Tally) -> Markup:
+    """For each verdict its count, its badge and its meaning."""
+    items = [
+        tag("li", tag("b", count), badge, tag("span", tally.meanings[verdict], class_="meaning"))
+        for verdict, count in tally.counts.items()
+        for badge in [verdict_badge(verdict, tally.marks[verdict])]
+    ]
+    return tag("ul", *items, class_="tally")
 
 
 def _cards(table: DataTable, label: str) -> Markup:
@@ -158,12 +174,16 @@ def _group(table: DataTable, title: object) -> Markup:
 
 
 def _words(text: str) -> Markup:
-    return text if isinstance(text, Markup) else inline_code(text)
+    if isinstance(text, Markup):
+        return text
+    end = _SPREAD.search(text)
+    words, spread = (text[: end.start()], end[0]) if end else (text, "")
+    return join(inline_code(words), tag("span", spread, class_="spread") if spread else None)
 
 
 def _column(cells: Sequence[Any]) -> list[Any]:
     """The cells of one column, its head first."""
-    head, *rest = cells
+    head, rest = _words(cells[0]), cells[1:]
     texts = [str(cell.upper) if isinstance(cell, Stack) else cell for cell in rest]
     if all(NUMBER.fullmatch(text) for text in texts if isinstance(text, str)):
         return [head, *map(_cell, rest)]
@@ -179,14 +199,19 @@ def _column(cells: Sequence[Any]) -> list[Any]:
 def _cell(cell: Any) -> Any:
     match cell:
         case Interval():
-            return stacked_cell(cell.number, cell.ends) if cell.is_measured else NOT_MEASURED_CELL
+            return _stacked(cell.number, cell.ends) if cell.is_measured else _NOT_MEASURED
         case Badge():
-            return stacked_cell(verdict_badge(cell.verdict, cell.mark), cell.why, "why")
+            return _stacked(verdict_badge(cell.verdict, cell.mark), cell.why, "why")
         case Strong():
             return tag("strong", _cell(cell.cell))
         case Stack():
-            return stacked_cell(_cell(cell.upper), _words(cell.lower))
+            return _stacked(_cell(cell.upper), _words(cell.lower))
         case str():
-            return NOT_MEASURED_CELL if cell == NOT_MEASURED else _words(cell)
+            return _NOT_MEASURED if cell == NOT_MEASURED else _words(cell)
         case _:
             return cell
+
+
+def _stacked(upper: Any, lower: Any, class_: str = "spread under") -> Markup:
+    """A cell of two lines, the lower one in small type; an empty lower line is left out."""
+    return join(upper, tag("span", lower, class_=class_) if lower else None)

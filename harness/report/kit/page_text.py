@@ -4,19 +4,19 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.text_table import Table
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, TerminalOnly
 
 WIDTH = 118
 """Most characters of a line, unless a word or a number is longer."""
-NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|yes|no|no fix|not measured")
+NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|known|none|yes|no|no fix|not measured")
 """Texts that are aligned right, as numbers are."""
 
 
 def page_text(page: Page, width: int = WIDTH) -> str:
     """The text of a page; what a terminal cannot show, and explanations of columns, are left out."""
-    lines = _wrapped(page.headline, width) + _joined(page.lead, width, after_text=True)
+    lines = _wrapped(page.headline, width) + join_blocks(page.lead, width, after_text=True)
     facts = [
         f"{_uncapitalised(title)}: {text}"
         for title, text in page.facts.items()
@@ -24,12 +24,12 @@ def page_text(page: Page, width: int = WIDTH) -> str:
     ]
     lines += ["", *(line for fact in facts for line in _wrapped(fact, width, "  "))] if facts else []
     for section in page.sections:
-        if section.terminal and (content := _joined(section.blocks, width)):
+        if section.terminal and (content := join_blocks(section.blocks, width)):
             lines += ["", *_wrapped(section.heading or _uncapitalised(section.title), width), *content]
     return "\n".join(lines)
 
 
-def _joined(blocks: Sequence[Block], width: int, *, after_text: bool = False) -> list[str]:
+def join_blocks(blocks: Sequence[Block], width: int, *, after_text: bool = False) -> list[str]:
     """The lines of several blocks; a table stands apart from what is above it."""
     lines: list[str] = []
     for block in blocks:
@@ -49,9 +49,9 @@ def block_lines(block: Block, width: int = WIDTH) -> list[str]:
         case DataTable() if block.rows:
             return table_lines(block, width)
         case Drawing():
-            return _joined(block.tables, width)
+            return join_blocks(block.tables, width)
         case TerminalOnly():
-            return _joined(block.blocks, width)
+            return join_blocks(block.blocks, width)
         case _:
             return []
 
@@ -64,7 +64,8 @@ def table_lines(table: DataTable, width: int = WIDTH) -> list[str]:
     words = [n for n, at in enumerate(used) if at == 0 or not all(NUMBER.fullmatch(row[at]) for row in rows)]
     content = Table([table.head[n] for n in used], [[row[n] for n in used] for row in rows], text_columns=words)
     head, *wrapped = content.wrapped_rows(width, words)
-    lines, rest = [*_wrapped(table.title, width), *head], iter(wrapped)
+    title = f"{_uncapitalised(table.title)} {table.caption}" if table.caption_printed else table.title
+    lines, rest = [*_wrapped(title, width), *head], iter(wrapped)
     for row in shown:
         lines += next(rest) if len(row) > 1 else ["", str(row[0])]
     more = len(table.rows) - len(shown) + table.omitted

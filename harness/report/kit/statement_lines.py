@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_number, format_p_value
+from harness.core.number_format import Interval, format_number, format_p_value
 from harness.report.kit.page import Badge, DataTable, Stack
 from harness.report.kit.page_text import table_lines
 from harness.results.benchmark_statement import BenchmarkStatement, Verdict

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
+else:
+    Axes = Figure = Any  # names for annotations: the import of matplotlib takes long
 
 INK, FAINT, GRID, PAPER = "#23282f", "#6b7480", "#dfe3e8", "#fefefe"
 _DARK = {INK: "#e4e7eb", FAINT: "#9aa4b0", GRID: "#343b45", PAPER: "#14171b"}
@@ -112,7 +114,7 @@ class Chart:
         return text.replace("<defs>", f"<style>{rules}</style><defs>", 1)
 
 
-def to_svg(figure: "Figure", name: str, settings: dict[Any, Any] = SETTINGS) -> str:
+def to_svg(figure: Figure, name: str, settings: dict[Any, Any] = SETTINGS) -> str:
     """The figure as SVG text; the same figure gives the same bytes."""
     import matplotlib
 
@@ -122,14 +124,14 @@ def to_svg(figure: "Figure", name: str, settings: dict[Any, Any] = SETTINGS) -> 
     return file.getvalue()
 
 
-def to_png(figure: "Figure", dpi: int = 130) -> bytes:
+def to_png(figure: Figure, dpi: int = 130) -> bytes:
     """The figure as PNG on white; the same figure gives the same bytes."""
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
     return file.getvalue()
 
 
-def to_pdf(figure: "Figure", settings: dict[Any, Any] = PRINT_SETTINGS) -> bytes:
+def to_pdf(figure: Figure, settings: dict[Any, Any] = PRINT_SETTINGS) -> bytes:
     """The figure as PDF with its fonts; the same figure gives the same bytes."""
     import matplotlib
 
@@ -187,7 +189,7 @@ def muted_line_style(n: int) -> dict[str, Any]:
     return {"color": MUTED, "linestyle": DASHES[n % len(DASHES)], "marker": marker}
 
 
-def hide_frame(axes: "Axes") -> None:
+def hide_frame(axes: Axes) -> None:
     """Hide frame, grid and ticks of axes whose rows are labelled bands."""
     axes.grid(False)
     axes.tick_params(length=0)

@@ -2,10 +2,10 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval, format_fixed
 
 
 @dataclass(frozen=True)
@@ -111,14 +111,15 @@ _SUFFIXES: tuple[tuple[str, str, float], ...] = (
 """Ends of keys that have no name here, with their unit."""
 
 
-def quantity(key: str) -> Quantity:
+def format_range(values: Iterable[float], decimals: int = 2) -> str:
+    """The smallest and the largest of several values, "2.1 to 3.0"; one number where they are written alike."""
+    found = list(values)
+    return " to ".join(dict.fromkeys(format_fixed(end, decimals) for end in (min(found), max(found))))
+
+
+def find_quantity(key: str) -> Quantity:
     """The name and unit of a key; an unknown key is its own name, with the unit that its end states."""
     if key in _NAMES:
         return _NAMES[key]
     stem = re.sub(r"\.\d+$", "", key)
     return next((Quantity(key, unit, factor) for end, unit, factor in _SUFFIXES if stem.endswith(end)), Quantity(key))
-
-
-def is_known(key: str) -> bool:
-    """Whether the key has a name of its own."""
-    return key in _NAMES

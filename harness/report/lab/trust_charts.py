@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_fixed
+from harness.core.number_format import Interval, format_fixed
+from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import add_legend, draw_chart
-from harness.report.kit.metric_labels import metric_label, quantity
-from harness.report.kit.rows import label_rows
-from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, series_colour
+from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, Figure, series_colour
+from harness.report.kit.text import metric_label, metric_name
 from harness.results.trust_findings import (
     Equivalence,
     EquivalenceVerdict,
@@ -19,10 +18,6 @@ from harness.results.trust_findings import (
     TrustFindings,
 )
 from harness.score.metrics import DEFINITIONS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _ROW_IN, _PAIR_IN, _FRAME_IN, _RANK_IN = 0.3, 0.46, 0.85, 4.2
 _DEVICE: Mapping[str, Any] = {"color": COLOURS[1], "marker": "o"}
@@ -92,14 +87,16 @@ def pairs_chart(findings: TrustFindings) -> Chart | None:
     )
 
 
-def _draw_pairs(figure: "Figure", pairs: Sequence[PairAgreement], metric: str) -> None:
+def _draw_pairs(figure: Figure, pairs: Sequence[PairAgreement], metric: str) -> None:
     axes = figure.subplots()
     for row, pair in enumerate(pairs):
         for side, style, label, shift in (
             (pair.device, _DEVICE, "device", -0.14),
             (pair.simulated, _SIMULATION, "simulation", 0.14),
         ):
-            _draw_side(axes, side, row + shift, style, label if row == 0 else None)
+            if side.mean is not None:
+                name = None if row else label
+                draw_interval(axes, row + shift, (side.low, side.high), side.mean, label=name, **style)
         axes.annotate(
             pair.verdict,
             (1.02, row),
@@ -114,26 +111,13 @@ def _draw_pairs(figure: "Figure", pairs: Sequence[PairAgreement], metric: str) -
     add_legend(figure, axes)
 
 
-def _draw_side(axes: "Axes", side: SideDifference, y: float, style: Mapping[str, Any], label: str | None) -> None:
-    if side.mean is None:
-        return
-    if side.low is not None and side.high is not None:
-        axes.plot([side.low, side.high], [y, y], color=style["color"], linewidth=2.2, solid_capstyle="butt")
-    axes.plot(side.mean, y, linestyle="none", markersize=6, label=label, **style)
-
-
-def _ranked(findings: TrustFindings) -> list[tuple[str, float, float]]:
-    """Arm, device's mean and simulation's mean of the metric that arms are ranked by."""
-    return [
+def ranks_chart(findings: TrustFindings) -> Chart | None:
+    """Mean error of each method on both sides; None with fewer than two."""
+    arms = [
         (one.arm, one.device, one.simulated)
         for one in findings.equivalences
         if one.metric == findings.ranked_metric and one.device is not None and one.simulated is not None
     ]
-
-
-def ranks_chart(findings: TrustFindings) -> Chart | None:
-    """Mean error of each method on both sides; None with fewer than two."""
-    arms = _ranked(findings)
     if len(arms) < 2:
         return None
     margin = next(one.margin for one in findings.equivalences if one.metric == findings.ranked_metric)
@@ -150,7 +134,7 @@ def ranks_chart(findings: TrustFindings) -> Chart | None:
     )
 
 
-def _draw_ranks(figure: "Figure", arms: Sequence[tuple[str, float, float]], margin: float, metric: str) -> None:
+def _draw_ranks(figure: Figure, arms: Sequence[tuple[str, float, float]], margin: float, metric: str) -> None:
     axes = figure.subplots()
     values = [value for _, x, y in arms for value in (x, y)]
     pad = max(0.08 * (max(values) - min(values)), margin)
@@ -173,7 +157,7 @@ def equivalence_chart(findings: TrustFindings) -> Chart | None:
     if not rows:
         return None
     texts = "; ".join(
-        f"{row.arm} {quantity(row.metric)} {_in_margins(row.difference, row):.2g}, {row.verdict}" for row in rows
+        f"{row.arm} {metric_name(row.metric)} {_in_margins(row.difference, row):.2g}, {row.verdict}" for row in rows
     )
     return draw_chart(
         "equivalence",
@@ -190,7 +174,7 @@ def _in_margins(value: float | None, row: Equivalence) -> float:
     return math.nan if value is None else value / row.margin
 
 
-def _draw_equivalence(figure: "Figure", rows: Sequence[Equivalence]) -> None:
+def _draw_equivalence(figure: Figure, rows: Sequence[Equivalence]) -> None:
     axes = figure.subplots()
     axes.axvspan(-1.0, 1.0, color=GRID, alpha=0.75, linewidth=0.0)
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
@@ -201,13 +185,11 @@ def _draw_equivalence(figure: "Figure", rows: Sequence[Equivalence]) -> None:
             min(max(_in_margins(value, row), -_MOST_MARGINS), _MOST_MARGINS)
             for value in (row.low, row.difference, row.high)
         )
-        axes.plot([low, high], [n, n], color=style["color"], linewidth=2.2, solid_capstyle="butt")
-        axes.plot(middle, n, linestyle="none", markersize=6, **style)
         text = f"{format_fixed(_in_margins(row.difference, row), 2, signed=True)} {row.verdict}"
-        axes.annotate(text, (1.02, n), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
+        draw_interval(axes, n, (low, high), middle, text, **style)
         reach = max(reach, 1.08 * abs(low), 1.08 * abs(high))
     axes.set_xlim(-reach, reach)
-    label_rows(axes, [f"{row.arm}, {quantity(row.metric)}" for row in rows])
+    label_rows(axes, [f"{row.arm}, {metric_name(row.metric)}" for row in rows])
     axes.set_xlabel("simulation − device [margins]")
 
 
@@ -233,7 +215,7 @@ def _ratio(row: ErrorDistance) -> float:
     return (row.distance or 0.0) / (row.split_half or math.nan)
 
 
-def _draw_distances(figure: "Figure", rows: Sequence[ErrorDistance], level: float) -> None:
+def _draw_distances(figure: Figure, rows: Sequence[ErrorDistance], level: float) -> None:
     axes = figure.subplots()
     for n, row in enumerate(rows):
         differs = row.p_holm is not None and row.p_holm <= level

@@ -5,10 +5,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_p_value, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_p_value, format_share
 from harness.errors import Outcome
-from harness.report.kit.metric_labels import quantity
 from harness.report.kit.page import (
     Badge,
     Bullets,
@@ -18,9 +16,8 @@ from harness.report.kit.page import (
     Prose,
     Section,
     Tally,
-    Verdict,
 )
-from harness.report.kit.text import last_line, list_first
+from harness.report.kit.text import last_line, list_first, metric_name
 from harness.report.lab.trust_charts import (
     distances_chart,
     equivalence_chart,
@@ -38,7 +35,6 @@ from harness.results.trust_findings import (
     ErrorDistance,
     PairAgreement,
     PairVerdict,
-    RankCorrelation,
     StreamHealth,
     TrustFindings,
 )
@@ -71,7 +67,7 @@ def trust_page(found: TrustFindings, command: str) -> Page:
     return Page(
         verb="trust",
         name=found.title,
-        verdict=Verdict(OUTCOME_TITLES[found.outcome], found.outcome),
+        verdict=(OUTCOME_TITLES[found.outcome], found.outcome),
         headline=verdict_sentence(found),
         lead=[
             *([Prose(_EXPLORATORY, is_warning=True)] if found.exploratory else []),
@@ -131,7 +127,7 @@ def _what_differs(findings: TrustFindings) -> str:
     """Pairs that contradict, and metrics beyond their margin."""
     pairs = [pair_title(pair) for pair in findings.pairs if pair.verdict == "contradict"]
     beyond = [
-        f"{one.arm} {quantity(one.metric)}" for one in findings.equivalences if one.verdict == "beyond the margin"
+        f"{one.arm} {metric_name(one.metric)}" for one in findings.equivalences if one.verdict == "beyond the margin"
     ]
     parts = []
     if pairs:
@@ -156,14 +152,12 @@ def count_pairs(pairs: Sequence[PairAgreement]) -> dict[PairVerdict, int]:
 
 def correlations(findings: TrustFindings) -> list[str]:
     """Each correlation of ranks with its interval, or why there is none."""
-    return [_correlation(one) for one in findings.rank_correlations]
-
-
-def _correlation(one: RankCorrelation) -> str:
-    name = f"{one.name[0].upper()}{one.name[1:]}"
-    if one.value is None:
-        return f"{name}: not measured ({one.reason})."
-    return f"{name} {Interval.of(one.value, one.low, one.high)}."
+    return [
+        f"{one.name[0].upper()}{one.name[1:]}: not measured ({one.reason})."
+        if one.value is None
+        else f"{one.name[0].upper()}{one.name[1:]} {Interval.of(one.value, one.low, one.high)}."
+        for one in findings.rank_correlations
+    ]
 
 
 def _pairs_table(found: TrustFindings) -> DataTable:

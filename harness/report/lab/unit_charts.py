@@ -1,29 +1,22 @@
 """The charts of a measured unit: checks, Allan deviation, spectrum, episodes, quality, and stations on a bar."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Floats
 from harness.measure.profile import QualityClass
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.unit_report import (
     EPISODE_KINDS,
     CaptureSummary,
-    DensityCurve,
     DeviationCurve,
     EpisodeMark,
     UnitReport,
 )
+from harness.report.kit.axes import label_rows, set_log_scale
 from harness.report.kit.chart import add_legend, decimate, draw_chart
-from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_log_scale
-from harness.report.kit.style import COLOURS, INK, Chart, series_style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.report.kit.style import COLOURS, INK, Axes, Chart, Figure, series_style
 
 _HEIGHT_IN, _FRAME_IN, _LANE_IN = 3.6, 0.75, 0.16
 _MODEL: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
@@ -56,7 +49,7 @@ def allan_chart(report: UnitReport) -> Chart | None:
         return None
     has_model = any(model is not None for *_, model in shown)
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         panels = figure.subplots(1, len(shown), squeeze=False)[0]
         for axes, (title, factor, curves, model) in zip(panels, shown, strict=True):
             _draw_deviations(axes, curves, model, float(factor))
@@ -76,9 +69,7 @@ def allan_chart(report: UnitReport) -> Chart | None:
     )
 
 
-def _draw_deviations(
-    axes: "Axes", curves: Sequence[DeviationCurve], model: DeviationCurve | None, factor: float
-) -> None:
+def _draw_deviations(axes: Axes, curves: Sequence[DeviationCurve], model: DeviationCurve | None, factor: float) -> None:
     for n, curve in enumerate(curves):
         colour = series_style(n)["color"]
         axes.fill_between(
@@ -108,10 +99,10 @@ def spectrum_chart(report: UnitReport) -> Chart | None:
     if not report.spectra:
         return None
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for n, curve in enumerate(report.spectra):
-            axes.plot(*_density(curve), label=curve.station, **_line(n))
+            axes.plot(*decimate(curve.frequency_hz, 1e6 * curve.density_m2_hz), label=curve.station, **_line(n))
         set_log_scale(axes, "x")
         set_log_scale(axes, "y")
         axes.set_xlabel("frequency [Hz]")
@@ -129,10 +120,6 @@ def spectrum_chart(report: UnitReport) -> Chart | None:
         _HEIGHT_IN,
         hover=True,
     )
-
-
-def _density(curve: DensityCurve) -> tuple[Floats, Floats]:
-    return decimate(curve.frequency_hz, 1e6 * curve.density_m2_hz)
 
 
 def episodes_chart(report: UnitReport) -> Chart | None:
@@ -153,7 +140,7 @@ def episodes_chart(report: UnitReport) -> Chart | None:
 
 
 def _draw_episodes(
-    figure: "Figure", episodes: Sequence[EpisodeMark], capture: CaptureSummary, kinds: Sequence[str]
+    figure: Figure, episodes: Sequence[EpisodeMark], capture: CaptureSummary, kinds: Sequence[str]
 ) -> None:
     from matplotlib.collections import LineCollection
 
@@ -186,7 +173,7 @@ def quality_chart(classes: Sequence[QualityClass]) -> Chart | None:
     if not any(one.to > 0.0 for one in classes):
         return None
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         shares, errors = figure.subplots(1, 2)
         names = ["lost" if one.to == 0.0 else f"{one.to:g}" for one in classes]
         heights = np.array([100.0 * one.share for one in classes])
@@ -226,7 +213,7 @@ def pair_chart(pair: RigidPair) -> Chart | None:
     if not pair.speeds:
         return None
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         middle = [0.5 * (one.from_m_s + one.to_m_s) for one in pair.speeds]
         values = np.array([1e3 * one.rms_m.value for one in pair.speeds])

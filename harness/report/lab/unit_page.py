@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
 from harness.measure.profile import QualityClass, StretchLength
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.unit_report import (
@@ -21,9 +20,8 @@ from harness.measure.unit_report import (
     UnitReport,
 )
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section
-from harness.report.lab.check_chart import check_chart
-from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
-from harness.report.lab.quantities import quantity
+from harness.report.lab.departures import check_chart, departure_texts, departures_sentence, departures_table
+from harness.report.lab.quantities import find_quantity, format_range
 from harness.report.lab.unit_charts import (
     allan_chart,
     episodes_chart,
@@ -131,19 +129,12 @@ def _spread_sentence(report: UnitReport) -> str:
         for name in ("spread_m", "spread_rad")
     }
     parts = [
-        f"{noun} scatters by {_range(numbers, f'station.{name}')}"
+        f"{noun} scatters by {format_range(shown.factor * one.value for one in numbers)} {shown.unit}"
         for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
+        for shown in [find_quantity(f"station.{name}")]
         if numbers
     ]
     return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
-
-
-def _range(numbers: Sequence[Interval], key: str) -> str:
-    shown = quantity(key)
-    ends = [
-        format_fixed(shown.factor * end, 2) for end in (min(n.value for n in numbers), max(n.value for n in numbers))
-    ]
-    return f"{' to '.join(dict.fromkeys(ends))} {shown.unit}"
 
 
 def _noise_sentence(values: Mapping[str, Interval]) -> str:
@@ -158,7 +149,7 @@ def _noise_sentence(values: Mapping[str, Interval]) -> str:
 
 
 def _number(values: Mapping[str, Interval], key: str) -> str:
-    return quantity(key).of(values[key]).number if key in values else ""
+    return find_quantity(key).of(values[key]).number if key in values else ""
 
 
 def _excursion_sentence(values: Mapping[str, Interval]) -> str:
@@ -172,7 +163,7 @@ def _excursion_sentence(values: Mapping[str, Interval]) -> str:
 
 def _ends_text(values: Mapping[str, Interval], key: str) -> str:
     if f"{key}.0" in values and f"{key}.1" in values:
-        return f"{quantity(f'{key}.0').bare(values[f'{key}.0']).number} to {_number(values, f'{key}.1')}"
+        return f"{find_quantity(f'{key}.0').bare(values[f'{key}.0']).number} to {_number(values, f'{key}.1')}"
     return _number(values, key)
 
 
@@ -194,14 +185,14 @@ def _timing_sentence(values: Mapping[str, Interval]) -> str:
     if clock:
         size = clock if clock.value >= 0.0 else clock.scaled(-1.0)
         word = "fast" if clock.value >= 0.0 else "slow"
-        parts.append(f"the clock runs {quantity('components.clock.drift_ppm').of(size).number} {word}")
+        parts.append(f"the clock runs {find_quantity('components.clock.drift_ppm').of(size).number} {word}")
     text = " and ".join(parts)
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def advice_text(advice: RecordingAdvice) -> str:
     """How long to record for a wanted precision."""
-    label, percent = quantity(advice.key).label, f"{100.0 * advice.precision:g} %"
+    label, percent = find_quantity(advice.key).label, f"{100.0 * advice.precision:g} %"
     had = f"This capture has {count_noun(advice.events, 'event')} in {_minutes(advice.minutes)}"
     if advice.events >= advice.needed_events:
         return (
@@ -227,10 +218,10 @@ def _parameters(parameters: Sequence[ParameterRow]) -> list[Block]:
     """Parameters with their interval, the default, and why numbers were not measured."""
     rows = [
         [
-            quantity(row.key).label,
-            quantity(row.key).of(row.measured),
+            find_quantity(row.key).label,
+            find_quantity(row.key).of(row.measured),
             f"{row.measured.count:,}" if row.measured.count else "–",
-            "–" if row.default is None else quantity(row.key).exact(row.default),
+            "–" if row.default is None else find_quantity(row.key).exact(row.default),
             row.status,
         ]
         for row in parameters
@@ -238,7 +229,7 @@ def _parameters(parameters: Sequence[ParameterRow]) -> list[Block]:
     why: dict[str, list[str]] = {}
     for row in parameters:
         if not row.measured.is_measured:
-            why.setdefault(row.measured.reason, []).append(quantity(row.key).label)
+            why.setdefault(row.measured.reason, []).append(find_quantity(row.key).label)
     reasons = [f"{', '.join(labels)}: {reason}" for reason, labels in why.items()]
     table = DataTable(["number", "measured", "from", "default", "status"], rows, caption=_INTERVALS)
     return [table, Bullets(reasons, "Not measured, and why", "not measured: ")]
@@ -247,13 +238,13 @@ def _parameters(parameters: Sequence[ParameterRow]) -> list[Block]:
 def _stations_table(rows: Sequence[StationFigures]) -> DataTable:
     """A row for each figure, a column for each station."""
     names = [name for name in STATION_FIGURES if any(name in row.figures for row in rows)]
-    cells = [[quantity(f"station.{name}").title, *(_figure(row, name) for row in rows)] for name in names]
+    cells = [[find_quantity(f"station.{name}").title, *(_figure(row, name) for row in rows)] for name in names]
     return DataTable(["", *(row.station for row in rows)], cells, caption=_STATIONS, intervals_printed=False)
 
 
 def _figure(row: StationFigures, name: str) -> Interval | str:
     number = row.figures.get(name)
-    return quantity(f"station.{name}").bare(number) if number and number.is_measured else "–"
+    return find_quantity(f"station.{name}").bare(number) if number and number.is_measured else "–"
 
 
 def stretches_table(stretches: Sequence[StretchLength]) -> DataTable:
@@ -353,12 +344,13 @@ def _millimetres(value_m: float) -> str:
 def _pair_table(pair: RigidPair) -> DataTable:
     """What two stations on one bar show."""
     numbers = {
-        "distance of the stations": quantity("length_m").of(pair.length_m),
-        "change of the angle between them (RMS)": quantity("rotation_rad").of(pair.rotation_rad),
-        "positions ahead of orientations": quantity("components.speed.ahead_s").of(pair.ahead_s),
+        "distance of the stations": find_quantity("length_m").of(pair.length_m),
+        "change of the angle between them (RMS)": find_quantity("rotation_rad").of(pair.rotation_rad),
+        "positions ahead of orientations": find_quantity("components.speed.ahead_s").of(pair.ahead_s),
     }
     numbers |= {
-        f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s (RMS)": quantity("rms_m").of(one.rms_m) for one in pair.speeds
+        f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s (RMS)": find_quantity("rms_m").of(one.rms_m)
+        for one in pair.speeds
     }
     caption = "Errors of both stations together. Below the numbers: 95 % intervals."
     names = " and ".join(pair.stations)

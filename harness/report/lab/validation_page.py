@@ -1,19 +1,102 @@
 """The page of a validated capture: how far it is from its reference, then the registration, then each station."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 
-from harness.core.interval import Interval
+import numpy as np
+
+from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed, format_number, format_share
-from harness.measure.validation_report import ValidationReport
-from harness.report.kit.metric_labels import metric_label
+from harness.measure.validation_report import ResidualSeries, ValidationReport
+from harness.report.kit.axes import draw_interval, label_rows
+from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
+from harness.report.kit.style import COLOURS, FAINT, Axes, Chart, Figure
+from harness.report.kit.text import metric_label
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity, format_range
 from harness.report.lab.unit_page import capture_text, stretches_table
-from harness.report.lab.validation_charts import offsets_chart, residuals_chart
 from harness.score.metrics import DEFINITIONS
+
+_OFFSETS = ("time_offset_orientation_s", "time_offset_position_s")
+_ROW_IN, _FRAME_IN, _SERIES_IN = 0.34, 0.75, 0.95
+_MOST_POINTS = 1200
+"""Points of one curve; more are averaged in pairs, fours and so on: the largest is drawn."""
+
+
+def offsets_chart(report: ValidationReport) -> Chart | None:
+    """The time offsets by orientation and by position; None unless both were measured."""
+    offsets = {key: report.numbers[key] for key in _OFFSETS if key in report.numbers}
+    if len(offsets) < 2 or not all(number.is_measured for number in offsets.values()):
+        return None
+    names = [find_quantity(key).label.removeprefix("time offset ") for key in offsets]
+    shown = [find_quantity(key).of(number) for key, number in offsets.items()]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for row, (number, colour) in enumerate(zip(shown, (COLOURS[1], COLOURS[0]), strict=True)):
+            draw_interval(axes, row, (number.low, number.high), number.value, color=colour, marker="o")
+        label_rows(axes, names)
+        axes.set_xlabel("time offset [ms]")
+
+    return draw_chart(
+        "offsets",
+        "Time offset by orientation and by position",
+        "How much later the stream is than its reference, with its 95 % interval. The two are estimated apart. Their "
+        "difference is an error of the position along the velocity: positions that are not of the moment of the stamp.",
+        f"Time offsets: {'; '.join(f'{name} {number}' for name, number in zip(names, shown, strict=True))}.",
+        draw,
+        _FRAME_IN + _ROW_IN * len(offsets),
+    )
+
+
+def residuals_chart(report: ValidationReport) -> Chart | None:
+    """The errors of each station over time; None without any."""
+    series = report.residuals
+    if not series:
+        return None
+    return draw_chart(
+        "residuals",
+        "Errors of each station over time",
+        "Distance of the position (left) and angle of the orientation (right) from the reference, after the "
+        "registration. A curve shows the largest error of each short stretch. A gap is a stretch without a reading.",
+        f"Errors over time of {', '.join(one.station for one in series)}; the numbers are in the table of accuracy.",
+        lambda figure: _draw_residuals(figure, series),
+        _FRAME_IN + _SERIES_IN * len(series),
+    )
+
+
+def _draw_residuals(figure: Figure, series: tuple[ResidualSeries, ...]) -> None:
+    panels = figure.subplots(len(series), 2, sharex=True, sharey="col", squeeze=False)
+    for (left, right), one in zip(panels, series, strict=True):
+        _draw_errors(left, one.time_s, 1e3 * one.position_m, COLOURS[1])
+        _draw_errors(right, one.time_s, np.degrees(one.angle_rad), COLOURS[0])
+        left.set_title(one.station)
+    panels[0, 0].set_title(f"{series[0].station}: position [mm]")
+    panels[0, 1].set_title("orientation [deg]")
+    for axes in panels[-1]:
+        axes.set_xlabel("time since the start [s]")
+
+
+def _draw_errors(axes: Axes, time_s: Floats, values: Floats, colour: str) -> None:
+    times, largest = insert_gaps(*largest_of_stretches(time_s, values))
+    axes.plot(times, largest, color=colour, linewidth=0.9)
+    finite = values[np.isfinite(values)]
+    if len(finite):
+        axes.axhline(float(np.median(finite)), color=FAINT, linewidth=0.9)
+        axes.set_ylim(bottom=0.0)
+
+
+def largest_of_stretches(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """At most `_MOST_POINTS` times, and the largest value from each to the next; NaN where there is no reading."""
+    every = -(-len(time_s) // _MOST_POINTS) if len(time_s) else 1
+    starts = np.arange(0, len(time_s), every)
+    if not len(starts):
+        return time_s, values
+    out: Floats = np.fmax.reduceat(values, starts)
+    return time_s[starts], out
+
 
 _REGISTRATION = (
     "These numbers were estimated from the capture and its reference, and taken out before errors were computed. An "
@@ -28,6 +111,7 @@ _DEGREES = math.degrees(1.0)
 
 def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, float | None]], command: str) -> Page:
     """The page of a capture that `command` validated; `scores` are errors of methods on it, by method and metric."""
+    reasons = [f"{find_quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
     return Page(
         verb="validate",
         name=report.name,
@@ -51,7 +135,7 @@ def validation_page(report: ValidationReport, scores: Mapping[str, Mapping[str, 
                     *([BrowserOnly([Prose(_REGISTRATION)])] if report.numbers else []),
                     Drawing(partial(offsets_chart, report)),
                     _numbers_table(report),
-                    Bullets(_number_reasons(report), prefix="not measured: "),
+                    Bullets(reasons, prefix="not measured: "),
                 ],
             ),
             Section("Room and mounts", "poses", [_poses_table(report)]),
@@ -88,15 +172,11 @@ def _median_text(report: ValidationReport) -> str:
     places = [row.position.median.scaled(1e3).value for row in report.accuracy.values()]
     turns = [row.orientation.median.scaled(_DEGREES).value for row in report.accuracy.values()]
     parts = [
-        f"{_range([value for value in values if math.isfinite(value)], decimals)} {unit}"
+        f"{format_range(filter(math.isfinite, values), decimals)} {unit}"
         for values, decimals, unit in ((places, 1, "mm"), (turns, 2, "deg"))
         if any(map(math.isfinite, values))
     ]
     return f"{' and '.join(parts)} (median of each station)" if parts else ""
-
-
-def _range(values: Sequence[float], decimals: int) -> str:
-    return " to ".join(dict.fromkeys(format_fixed(end, decimals) for end in (min(values), max(values))))
 
 
 def registration_sentences(report: ValidationReport) -> list[str]:
@@ -106,20 +186,18 @@ def registration_sentences(report: ValidationReport) -> list[str]:
         f"({format_share(report.matched_share, 1)})."
     )
     shown = [
-        f"{quantity(key).label}: {quantity(key).of(one)}" for key, one in report.numbers.items() if one.is_measured
+        f"{find_quantity(key).label}: {find_quantity(key).of(one)}"
+        for key, one in report.numbers.items()
+        if one.is_measured
     ]
     return [matched, *([f"Estimated from the capture: {'; '.join(shown)}."] if shown else [])]
 
 
 def _numbers_table(report: ValidationReport) -> DataTable:
     """Time offsets, clock, scale and heading errors with their intervals."""
-    rows = [[quantity(key).label, quantity(key).of(one)] for key, one in report.numbers.items()]
+    rows = [[find_quantity(key).label, find_quantity(key).of(one)] for key, one in report.numbers.items()]
     caption = "Below the estimates: 95 % intervals."
     return DataTable(["number", "estimate"], rows, caption=caption, label="registration")
-
-
-def _number_reasons(report: ValidationReport) -> list[str]:
-    return [f"{quantity(key).label}: {one.reason}" for key, one in report.numbers.items() if one.reason]
 
 
 def _poses_table(report: ValidationReport) -> DataTable:
@@ -142,8 +220,11 @@ def _accuracy_table(report: ValidationReport) -> DataTable:
     rows = [
         [
             station,
-            *_quantiles(row.position.median, row.position.rms, row.position.quantile95, factor=1e3),
-            *_quantiles(row.orientation.median, row.orientation.rms, row.orientation.quantile95, factor=_DEGREES),
+            *(
+                number.scaled(factor)
+                for of, factor in ((row.position, 1e3), (row.orientation, _DEGREES))
+                for number in (of.median, of.rms, of.quantile95)
+            ),
             f"{row.readings:,}",
             format_share(row.lost_share, 2),
         ]
@@ -152,10 +233,6 @@ def _accuracy_table(report: ValidationReport) -> DataTable:
     figures = [f"{name} [{unit}]" for unit in ("mm", "deg") for name in ("median", "RMS", "95 %")]
     caption = "Errors of each station after the registration. Below the numbers: 95 % intervals."
     return DataTable(["station", *figures, "readings", "lost"], rows, caption=caption, intervals_printed=False)
-
-
-def _quantiles(*numbers: Interval, factor: float) -> list[Interval]:
-    return [number.scaled(factor) for number in numbers]
 
 
 def _accuracy_reasons(report: ValidationReport) -> list[str]:

@@ -1,6 +1,5 @@
-"""The page of a reproduced paper: count of verdicts, every claim, then each experiment with figures and tables."""
+"""The page of a reproduced paper: count of verdicts, every claim, then each experiment; and its tables in a README."""
 
-import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,9 +7,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import quote
 
-from harness.core.files import to_json_types
 from harness.core.number_format import count_noun
 from harness.report.kit.chart import clear_plots
+from harness.report.kit.marked_block import describe_code, replace_block
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.page import (
     Badge,
@@ -26,22 +25,15 @@ from harness.report.kit.page import (
     Stack,
     Tally,
     TerminalOnly,
+    json_listing,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text, table_lines
 from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, statement_row
 from harness.report.kit.text import describe_motion_source, to_file_name
-from harness.report.paper.charts import figure_charts
-from harness.report.paper.figure_table import figure_table, is_measured
+from harness.report.paper.charts import figure_charts, figure_table, is_measured
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, Verdict
-from harness.results.findings import (
-    BarChart,
-    FindingsTable,
-    LineChart,
-    PaperExperiment,
-    PaperFindings,
-    read_findings,
-)
+from harness.results.findings import FindingsTable, PaperExperiment, PaperFindings, read_findings
 from harness.results.folder_kind import FINDINGS
 
 READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
@@ -101,7 +93,7 @@ def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
     return Page(
         verb="paper",
         name=f"{findings.paper} · {findings.motion}",
-        headline=sentence(claims),
+        headline=claims_sentence(claims),
         lead=[Tally(count_verdicts(printed), MARKS, MEANINGS)] if claims else [],
         facts={
             "Paper": findings.reference,
@@ -139,7 +131,7 @@ def printed_claims(claims: Iterable[BenchmarkStatement], reading: Reading) -> li
     return found if any(claim.reading == reading for claim in found) else []
 
 
-def sentence(claims: Sequence[BenchmarkStatement]) -> str:
+def claims_sentence(claims: Sequence[BenchmarkStatement]) -> str:
     """The number of printed statements of each verdict: with the methods as printed, and with ours."""
     readings = {reading: printed_claims(claims, reading) for reading in READINGS}
     found = {READINGS[reading]: some for reading, some in readings.items() if some}
@@ -189,7 +181,7 @@ def statements_text(findings: PaperFindings) -> str:
     """The printed statements with the results of both readings, in lines of at most `WIDTH` characters."""
     claims, table = all_claims(findings), statements_table(findings)
     head = page_text(Page("", "", findings.reference, {}, []), WIDTH).split("\n")
-    head += [f"{findings.paper} on {findings.motion}, seed {findings.seed}.", sentence(claims)]
+    head += [f"{findings.paper} on {findings.motion}, seed {findings.seed}.", claims_sentence(claims)]
     others = sum(claim.kind != "printed" for claim in claims)
     more = (
         ["", f"{count_noun(others, 'further claim')}: derived, repeated or of speed; see the page."] if others else []
@@ -209,7 +201,7 @@ def _experiment(findings: PaperFindings, experiment: PaperExperiment, folder: Pa
     figures: list[Block] = [
         Drawing(draw, figure_table(figure), "Numbers of this figure")
         if is_measured(figure)
-        else Prose(f"{_figure_title(figure)}: nothing was measured.")
+        else Prose(f"{figure_table(figure).title}: nothing was measured.")
         for draw, figure in zip(charts, experiment.figures, strict=True)
     ]
     none = Prose("no published statement to compare with")
@@ -233,10 +225,6 @@ def _experiment(findings: PaperFindings, experiment: PaperExperiment, folder: Pa
         ),
     ]
     return Section(experiment.title, anchor(experiment), blocks, f"{experiment.name}: {experiment.title}")
-
-
-def _figure_title(figure: BarChart | LineChart) -> str:
-    return f"{figure.title} [{figure.unit}]" if isinstance(figure, BarChart) else f"{figure.title}: {figure.y_label}"
 
 
 def _table(content: FindingsTable) -> Block:
@@ -286,11 +274,10 @@ def _circumstances(findings: PaperFindings) -> list[Block]:
     """The command that repeats the study, and the versions with which the page was made."""
     circumstances = findings.circumstances
     facts = {"seed": findings.seed, **{_FACTS[name]: circumstances[name] for name in _FACTS if name in circumstances}}
-    text = json.dumps(to_json_types(circumstances), indent=2, ensure_ascii=False)
     return [
         Code(findings.command),
         Bullets([f"{name}: {_format_fact(value)}" for name, value in facts.items()]),
-        *([Code(text, "All versions and circumstances")] if circumstances else []),
+        *([json_listing(circumstances, "All versions and circumstances")] if circumstances else []),
     ]
 
 
@@ -307,3 +294,11 @@ def run_link(folder: Path, name: str) -> str | None:
     if not path.parts or not run.is_dir() or not run.resolve().is_relative_to(folder.resolve()):
         return None
     return f"{path}/report.html" if (run / "report.html").is_file() else f"{path}/"
+
+
+def update_readme(readme: Path, findings: PaperFindings) -> None:
+    """Replace the tables of this paper and motion in `readme`, or append them; raises what `replace_block` raises."""
+    name = re.sub(r"[^\w.]+", "-", f"{findings.paper} {findings.motion}").strip("-")
+    title, made_by = f"### {findings.paper}, {findings.motion}", describe_code(findings.circumstances)
+    block = [f"    {line}".rstrip() for line in (findings.command, "", *statements_text(findings).split("\n"))]
+    replace_block(readme, f"paper {name}", [title, "", f"Made by {made_by}:", "", *block])

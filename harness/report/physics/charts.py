@@ -1,20 +1,16 @@
 """The charts of the page: spectrum, excursions, gaps and quality, each with a curve or bar for every error model."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_share
+from harness.report.kit.axes import set_log_scale
 from harness.report.kit.chart import add_legend, decimate, draw_chart
-from harness.report.kit.scales import set_log_scale
-from harness.report.kit.style import FAINT, GRID, PAPER, Chart, series_style
+from harness.report.kit.style import FAINT, GRID, PAPER, Axes, Chart, Figure, series_style
 from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _HEIGHT_IN = 3.4
 _MM2 = 1e6
@@ -44,7 +40,7 @@ def spectrum_chart(comparison: ErrorModelComparison) -> Chart:
     )
 
 
-def _draw_spectrum(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -> None:
+def _draw_spectrum(figure: Figure, models: Sequence[TrackerErrorStatistics]) -> None:
     axes = figure.subplots()
     for n, model in enumerate(models):
         inner = slice(0, -1)  # half the sampling rate is left out: its one-sided density has no mirror image to add
@@ -78,7 +74,7 @@ def excursions_chart(comparison: ErrorModelComparison) -> Chart:
     )
 
 
-def _draw_excursions(figure: "Figure", comparison: ErrorModelComparison) -> None:
+def _draw_excursions(figure: Figure, comparison: ErrorModelComparison) -> None:
     durations, peaks = figure.subplots(1, 2, sharey=True)
     _draw_rates(durations, comparison.models, lambda model: model.excursion_s)
     _draw_rates(peaks, comparison.models, lambda model: 1e3 * model.excursion_peak_m)
@@ -111,7 +107,7 @@ def gaps_chart(comparison: ErrorModelComparison) -> Chart:
     )
 
 
-def _draw_gaps(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -> None:
+def _draw_gaps(figure: Figure, models: Sequence[TrackerErrorStatistics]) -> None:
     axes = figure.subplots()
     _draw_rates(axes, models, lambda model: model.gap_s)
     _scale_rates(axes)
@@ -121,7 +117,7 @@ def _draw_gaps(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -> No
 
 
 def _draw_rates(
-    axes: "Axes",
+    axes: Axes,
     models: Sequence[TrackerErrorStatistics],
     values_of: Callable[[TrackerErrorStatistics], Floats],
     dashes: str = "-",
@@ -133,7 +129,7 @@ def _draw_rates(
         axes.plot(x[-1:], rates[-1:], "o", color=series_style(n)["color"], markersize=3.5)
 
 
-def _scale_rates(axes: "Axes") -> None:
+def _scale_rates(axes: Axes) -> None:
     """Make both axes logarithmic; axes without any episode say so instead."""
     if any(np.size(line.get_xdata()) for line in axes.lines):
         set_log_scale(axes, "x")
@@ -165,7 +161,7 @@ def quality_chart(comparison: ErrorModelComparison) -> Chart:
     )
 
 
-def _draw_quality(figure: "Figure", models: Sequence[TrackerErrorStatistics]) -> None:
+def _draw_quality(figure: Figure, models: Sequence[TrackerErrorStatistics]) -> None:
     shares, errors = figure.subplots(1, 2)
     _draw_shares(shares, models)
     for n, model in enumerate(models):
@@ -181,7 +177,7 @@ def _draw_quality(figure: "Figure", models: Sequence[TrackerErrorStatistics]) ->
     add_legend(figure, shares)
 
 
-def _draw_shares(axes: "Axes", models: Sequence[TrackerErrorStatistics]) -> None:
+def _draw_shares(axes: Axes, models: Sequence[TrackerErrorStatistics]) -> None:
     """Draw the shares of the classes as bars on a logarithmic axis, side by side."""
     from matplotlib.ticker import LogLocator, NullLocator
 

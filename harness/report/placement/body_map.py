@@ -5,28 +5,22 @@ rendered in a separate process. Labels, lines and colour bar are drawn around it
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
-from harness.core.plain_import import plain_import
 from harness.core.progress import report_step
+from harness.core.working_folder import plain_import
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
-from harness.report.kit.style import FAINT, INK, Chart
+from harness.report.kit.style import FAINT, INK, Axes, Chart, Figure
 from harness.report.placement.wording import plain_name
-from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.results.placement_findings import CandidatePlace, MarginalContribution, StationNames
 
 _COLOURS = "viridis"
 _SOFTENING_M = 0.02
@@ -44,40 +38,38 @@ CandidateValues = Mapping[str, float | None]
 """Candidate -> its contribution; None where it was not measured."""
 
 
-@dataclass(frozen=True)
-class BodyMapValues:
-    """Contributions of candidates, measured in one way, for one body map."""
-
-    values: CandidateValues
-    description: str
-    """How the contribution was measured, in words."""
-    base: StationNames = ()
-    """Stations that are already worn: they have no value and are drawn as dark balls."""
-
-
 def draw_body_map(
-    places: Sequence[StationPlacement], shown: BodyMapValues, *, unit: str, number: int = 1
+    places: Sequence[CandidatePlace],
+    values: CandidateValues,
+    description: str,
+    base: StationNames = (),
+    *,
+    unit: str,
+    number: int = 1,
 ) -> tuple[Chart | None, str]:
     """The chart and "", or None and the reason in one line why there is none.
 
+    `values` are contributions of candidates, measured in one way, which `description` says in words. Stations of `base`
+    are already worn: they have no value and are drawn as dark balls.
+
     Places that have no value and are not worn are left out. The chart needs pyvista and OpenGL.
     """
-    shown_places = [place for place in places if place.name in shown.base or shown.values.get(place.name) is not None]
-    measured = [value for place in shown_places if (value := shown.values.get(place.name)) is not None]
+    shown_places = [place for place in places if place.name in base or values.get(place.name) is not None]
+    measured = [value for place in shown_places if (value := values.get(place.name)) is not None]
     if not measured:
         return None, "no candidate has a value"
     if find_spec("pyvista") is None:
         return None, str(MissingExtra("A rendered picture", "pyvista", "viz"))
     low, high = min(0.0, *measured), max(0.0, *measured)
     ends = (low, high if high > low else low + 1.0)
-    views, reason = render_body(shown_places, shown.values, ends)
+    views, reason = render_body(shown_places, values, ends)
     if views is None:
         return None, reason
-    return _chart(shown_places, shown, views, ends, unit, number), ""
+    return _chart(shown_places, values, description, views, ends, unit, number), ""
 
 
 def render_body(
-    places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
+    places: Sequence[CandidatePlace], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
     report_step("rendered body")
@@ -106,19 +98,20 @@ def render_body(
 
 
 def _chart(
-    places: Sequence[StationPlacement],
-    shown: BodyMapValues,
+    places: Sequence[CandidatePlace],
+    known: CandidateValues,
+    description: str,
     views: Mapping[str, np.ndarray],
     ends: tuple[float, float],
     unit: str,
     number: int,
 ) -> Chart:
-    values = {n: value for n, place in enumerate(places) if (value := shown.values.get(place.name)) is not None}
+    values = {n: value for n, place in enumerate(places) if (value := known.get(place.name)) is not None}
     order = sorted(values, key=lambda n: -values[n])
     texts = {n: f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order[:_MOST_NAMED]}
     texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -133,7 +126,7 @@ def _chart(
             label_places(axes, at[side], {n: texts[n] for n in visible}, views["picture"].shape[1:3])
         bar = figure.add_subplot(grid[1, :])
         figure.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
-        bar.set_xlabel(f"{shown.description} [{unit}]")
+        bar.set_xlabel(f"{description} [{unit}]")
         bar.grid(False)
 
     most = (
@@ -150,18 +143,18 @@ def _chart(
     contributions = ", ".join(f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order)
     return draw_chart(
         f"body_map_{number}",
-        f"{shown.description[0].upper()}{shown.description[1:]}",
+        f"{description[0].upper()}{description[1:]}",
         f"Balls: places that were tried, with their contribution [{unit}]. Skin has the colour of the places on its "
         f"own bone, weighted by distance; no place was tried on grey bones.{worn}{pairs}{most} In the front view the "
         "body's left side is on the right.",
-        f"The body coloured by {shown.description}: {contributions} {unit}.",
+        f"The body coloured by {description}: {contributions} {unit}.",
         draw,
         _HEIGHT_IN,
         raster=True,
     )
 
 
-def label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
+def label_places(axes: Axes, at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
     """Write a name with a line to its ball for each place: above the arms, and in columns next to the rest."""
     height, width = size
     for right in (False, True):
@@ -214,10 +207,13 @@ def interpolate_colours(points_m: Floats, places_m: Floats, colours: Floats) -> 
     return out
 
 
-def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValues]:
-    """The maps to draw: one that compares candidates with each other, and one of adding a station, if there are any."""
+def select_body_maps(contributions: Sequence[MarginalContribution]) -> list[tuple[CandidateValues, str, StationNames]]:
+    """The values, the description and the worn stations of each map to draw.
+
+    One compares candidates with each other, and one is of adding a station, if there are any.
+    """
     groups: dict[tuple[str, StationNames], dict[str, float | None]] = {}
-    for contribution in worth:
+    for contribution in contributions:
         group = groups.setdefault((contribution.mode, contribution.base), {})
         group[contribution.candidate] = contribution.difference
     words = {
@@ -226,9 +222,9 @@ def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValue
         "exhaustive": "mean error of sets without it minus mean error of sets with it",
     }
     maps = [
-        BodyMapValues(values, words[mode].format(count=len(base)), base if mode == "add" else ())
+        (values, words[mode].format(count=len(base)), base if mode == "add" else ())
         for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
         if any(value is not None for value in values.values())
     ]
-    kinds = [m for m in maps if not m.base], [m for m in maps if m.base]
-    return [max(kind, key=lambda m: len(m.values)) for kind in kinds if kind]
+    kinds = [each for each in maps if not each[2]], [each for each in maps if each[2]]
+    return [max(kind, key=lambda each: len(each[0])) for kind in kinds if kind]

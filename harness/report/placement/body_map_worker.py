@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.anatomy import BodyGeom, body_geoms
+from harness.body.anatomy import body_geoms
 from harness.body.humanoid import tpose
 from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import write_npz
 from harness.core.humanoid24 import standard_skeleton, unpack
-from harness.core.plain_import import plain_import
-from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.core.skeleton import BodyGeom, Skeleton, forward_kinematics
+from harness.core.working_folder import plain_import
 from harness.report.placement.body_map import interpolate_colours
 
 with plain_import():

@@ -2,35 +2,25 @@
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
+from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.rows import label_rows
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, hide_frame
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, Figure, hide_frame
 from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
 from harness.report.placement.wording import (
     TIE_NOTE,
+    contribution_label,
     format_rank_range,
     plain_name,
     search_gain_sentence,
     set_error,
     set_name,
-    worth_label,
 )
-from harness.results.placement_findings import (
-    MarginalContribution,
-    PlacementFindings,
-    PlacementSearch,
-    RankAgreement,
-    Ranking,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from harness.results.placement_findings import MarginalContribution, PlacementFindings, PlacementSearch, Ranking
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
 _ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20
@@ -64,7 +54,7 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
     """Paired difference of each set to the first one, and the ranks that remain possible."""
     rows = ranking.rows[:_MOST_ROWS]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         axes.axvline(0.0, color=INK, linewidth=0.8)
         for y, row in enumerate(rows):
@@ -101,12 +91,12 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
     )
 
 
-def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalContribution], number: int) -> Chart:
+def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalContribution], number: int) -> Chart:
     """The contribution of each candidate in one mode, the largest first."""
-    rows = sorted((w for w in contributions if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    title = worth_label(findings, contributions[0])
+    rows = sorted((w for w in shown if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
+    title = contribution_label(findings, shown[0])
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for y, row in enumerate(rows):
             significant = row.low is not None and row.high is not None and not row.low <= 0.0 <= row.high
@@ -119,9 +109,10 @@ def worth_chart(findings: PlacementFindings, contributions: Sequence[MarginalCon
         axes.margins(x=0.06)
         axes.set_xlabel(f"error without it minus error with it [{findings.unit}]")
 
-    values = ", ".join(f"{plain_name(row.candidate)} {_signed(row.difference)}" for row in rows)
+    gains = [Interval.of(row.difference, None, None, signed=True).number for row in rows]
+    values = ", ".join(f"{plain_name(row.candidate)} {gain}" for row, gain in zip(rows, gains, strict=True))
     return draw_chart(
-        f"worth_{number}_{to_file_name(contributions[0].mode)}",
+        f"worth_{number}_{to_file_name(shown[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
         "Blue: sets with the station err less; orange: they err more; grey: neither is significant. Whiskers: 95 % "
         "interval over units.",
@@ -136,7 +127,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
     steps = [(step, findings.of(step.stations)) for step in search.steps]
     measured = [(step, tried) for step, tried in steps if tried and tried.mean is not None]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.subplots()
         means = [mean_or_nan(tried) for _, tried in measured]
         axes.plot(means, range(len(measured)), color=_BEST, linewidth=1.2, alpha=0.6)
@@ -172,9 +163,9 @@ def _step_label(changed: str, ties: Sequence[str]) -> str:
 def stability_chart(findings: PlacementFindings) -> Chart:
     """Agreement of the rankings under each pair of conditions, as a matrix."""
     names = [condition.name for condition in findings.conditions]
-    agreements = {frozenset((pair.a, pair.b)): pair for pair in findings.agreements}
+    taus = {frozenset((pair.a, pair.b)): pair.tau for pair in findings.agreements}
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         from matplotlib import colormaps
         from matplotlib.patches import Rectangle
 
@@ -182,7 +173,7 @@ def stability_chart(findings: PlacementFindings) -> Chart:
         for (row, a), (column, b) in itertools.product(enumerate(names), repeat=2):
             if column > row:
                 continue
-            tau = 1.0 if a == b else _tau(agreements.get(frozenset((a, b))))
+            tau = 1.0 if a == b else taus.get(frozenset((a, b)))
             if tau is None:
                 axes.text(column, row, "–", ha="center", va="center", color=FAINT)
                 continue
@@ -207,11 +198,3 @@ def stability_chart(findings: PlacementFindings) -> Chart:
         draw,
         1.1 + 0.36 * len(names),
     )
-
-
-def _signed(value: float | None) -> str:
-    return Interval.of(value, None, None, signed=True).number
-
-
-def _tau(pair: RankAgreement | None) -> float | None:
-    return pair.tau if pair else None

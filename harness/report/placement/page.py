@@ -1,13 +1,10 @@
 """The page of a placement study: recommended set, body map, error by number of stations, then every ranking."""
 
-import json
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.core.files import to_json_types
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_fixed
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
 from harness.report.kit.chart import clear_plots
 from harness.report.kit.page import (
     Block,
@@ -21,6 +18,7 @@ from harness.report.kit.page import (
     Section,
     Stack,
     TerminalOnly,
+    json_listing,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
@@ -29,23 +27,28 @@ from harness.report.kit.style import Chart
 from harness.report.kit.text import describe_motion_source, last_line
 from harness.report.paper.page import claims_table
 from harness.report.placement.body_map import draw_body_map, select_body_maps
-from harness.report.placement.charts import pareto_chart, ranking_chart, search_chart, stability_chart, worth_chart
+from harness.report.placement.charts import (
+    contribution_chart,
+    pareto_chart,
+    ranking_chart,
+    search_chart,
+    stability_chart,
+)
 from harness.report.placement.wording import (
     TIE_NOTE,
     changes_sentence,
+    contribution_label,
     format_rank_range,
-    format_stays,
     held_out_error,
     list_sets,
     original_candidates,
+    placement_sentence,
     plain_name,
     power_sentences,
     ranks_by_condition,
     search_gain_sentence,
-    sentence,
     set_error,
     set_name,
-    worth_label,
 )
 from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import (
@@ -70,8 +73,8 @@ def write_placement_page(folder: Path) -> Path:
     findings = read_placement(folder / FINDINGS)
     plots = clear_plots(folder)
     maps = [
-        draw_body_map(findings.candidates, shown, unit=findings.unit, number=number)
-        for number, shown in enumerate(select_body_maps(findings.worth), start=1)
+        draw_body_map(findings.candidates, *shown, unit=findings.unit, number=number)
+        for number, shown in enumerate(select_body_maps(findings.contributions), start=1)
     ]
     missing = dict.fromkeys(f"The body map: {reason}" for chart, reason in maps if chart is None)
     page = placement_page(findings, [chart for chart, _ in maps if chart], list(missing))
@@ -87,15 +90,15 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     """The page of a study, with its body maps."""
     counts = f"{len(original_candidates(findings))} candidates, {len(findings.tried):,} sets of them"
     ways: dict[tuple[str, tuple[str, ...]], list[MarginalContribution]] = {}
-    for contribution in findings.worth:
+    for contribution in findings.contributions:
         ways.setdefault((contribution.mode, contribution.base), []).append(contribution)
     measured = [rows for rows in ways.values() if any(row.difference is not None for row in rows)]
-    worth = [Drawing(partial(worth_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
+    drawings = [Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
     several = len(findings.conditions) > 1
     return Page(
         verb="placement",
         name=findings.name,
-        headline=sentence(findings),
+        headline=placement_sentence(findings),
         lead=[_best_table(findings)],
         facts={
             "Question": findings.title,
@@ -111,11 +114,11 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
         },
         missing=missing,
         sections=[
-            Section("Body map", "body", [Drawing(partial(_drawn, chart)) for chart in maps]),
+            Section("Body map", "body", [Drawing(chart) for chart in maps]),
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
             Section("Published statements", "claims", [claims_table(findings.claims)]),
             Section("Rankings", "rankings", _rankings(findings)),
-            Section("Contribution of each candidate", "worth", [*worth, _worth_table(findings)]),
+            Section("Contribution of each candidate", "worth", [*drawings, _contribution_table(findings)]),
             Section("Searches", "paths", [_search(findings, search) for search in findings.searches]),
             Section(
                 "Stability of the ranking",
@@ -130,14 +133,10 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     )
 
 
-def _drawn(chart: Chart) -> Chart:
-    return chart
-
-
 def _best_table(findings: PlacementFindings) -> DataTable:
     """The best set of each size."""
     held_out = any(best.held_out is not None for best in findings.best)
-    crossed = not held_out and any(best.crossed is not None for best in findings.best)
+    validated = not held_out and any(best.cross_validated_error is not None for best in findings.best)
     rows = []
     for best in findings.best:
         tried = findings.of(best.stations)
@@ -147,16 +146,18 @@ def _best_table(findings: PlacementFindings) -> DataTable:
                 Stack(set_name(best.stations), "" if best.on_front else "a smaller set is better"),
                 set_error(findings, tried),
                 *([held_out_error(findings, best)] if held_out else []),
-                *([Interval.of(best.crossed, None, None, findings.unit)] if crossed else []),
+                *([Interval.of(best.cross_validated_error, None, None, findings.unit)] if validated else []),
                 f"{tried.rate_hz:g} Hz" if tried else "",
-                Stack(best.of or "", f"stays best in {format_stays(best.stays)}" if best.stays else ""),
+                Stack(
+                    best.of or "", f"stays best in {format_share(share)}" if (share := best.selection_stability) else ""
+                ),
                 list_sets(best.ties) if best.ties else "none",
             ]
         )
     caption = (
         "The best set of each size and its mean error with the 95 % interval over units of statistics. "
         + ("Held out: the error on clips that did not take part in the choice. " if held_out else "")
-        + ("Cross-validated: of each unit, the error of the set that the other units choose. " if crossed else "")
+        + ("Cross-validated: of each unit, the error of the set that the other units choose. " if validated else "")
         + "Best of: the number of sets of this size, and in how many resamples of the units the set stays best. "
         "Ties: other sets of this size that are as good."
     )
@@ -165,7 +166,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
         "best set",
         "error",
         *(["held out"] if held_out else []),
-        *(["cross-validated"] if crossed else []),
+        *(["cross-validated"] if validated else []),
         "rate",
         "best of",
         "ties",
@@ -202,12 +203,12 @@ def _ranking_table(findings: PlacementFindings, ranking: Ranking) -> DataTable:
     return DataTable(head, rows, title, most_printed=_MOST_PRINTED)
 
 
-def _worth_table(findings: PlacementFindings) -> DataTable:
+def _contribution_table(findings: PlacementFindings) -> DataTable:
     """The contribution of each candidate, a column for each way in which it was measured."""
-    labels = list(dict.fromkeys(worth_label(findings, worth) for worth in findings.worth))
+    labels = list(dict.fromkeys(contribution_label(findings, contribution) for contribution in findings.contributions))
     found = {
-        (w.candidate, worth_label(findings, w)): Interval.of(w.difference, w.low, w.high, signed=True)
-        for w in findings.worth
+        (w.candidate, contribution_label(findings, w)): Interval.of(w.difference, w.low, w.high, signed=True)
+        for w in findings.contributions
     }
     rows = [
         [plain_name(place.name), *(found.get((place.name, label), "") for label in labels)]
@@ -299,9 +300,9 @@ def _ranks_table(findings: PlacementFindings) -> DataTable:
 
 
 def _stability_note(condition: PlacementCondition) -> str:
-    if condition.stays is None:
+    if condition.selection_stability is None:
         return ""
-    return f"; the best set stays best in {format_stays(condition.stays)} of resamples"
+    return f"; the best set stays best in {format_share(condition.selection_stability)} of resamples"
 
 
 def _candidates_table(findings: PlacementFindings) -> DataTable:
@@ -328,8 +329,6 @@ def _failures(findings: PlacementFindings) -> list[Block]:
 
 
 def _circumstances(findings: PlacementFindings) -> list[Block]:
-    text = json.dumps(to_json_types(findings.circumstances), indent=2, ensure_ascii=False)
-    return [
-        Code(findings.command),
-        *([Code(text, "All versions and circumstances")] if findings.circumstances else []),
-    ]
+    versions = findings.circumstances
+    more = [json_listing(versions, "All versions and circumstances")] if versions else []
+    return [Code(findings.command), *more]

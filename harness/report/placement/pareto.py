@@ -1,17 +1,20 @@
-"""Drawing of the error of a placement study against the number of stations, for its page and for papers."""
+"""Error of a placement study against the number of stations, for its page and as the figure `placement` of papers."""
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+from harness.compare.paired_statistics import MIN_UNITS
+from harness.core.number_format import count_noun
 from harness.core.seeds import generator
-from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, mark_scale, note_size
-from harness.report.placement.wording import set_name
-from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from harness.errors import NothingMeasured
+from harness.report.figures.print_figure import PrintFigure
+from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale, note_size
+from harness.report.kit.text import metric_name
+from harness.report.placement.wording import measured_errors, set_name
+from harness.results.folder_kind import FINDINGS
+from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
 
 _BEST, _TIED = COLOURS[1], COLOURS[0]
 _LETTERS_PER_IN, _FEWEST_LETTERS, _AXES_SHARE = 11.2, 8, 0.75
@@ -29,7 +32,7 @@ def mean_or_nan(tried: StationSetResult) -> float:
     return math.nan if tried.mean is None else tried.mean
 
 
-def draw_pareto(figure: "Figure", findings: PlacementFindings, label: str) -> None:
+def draw_pareto(figure: Figure, findings: PlacementFindings, label: str) -> None:
     """Draw every set as a point, the best of each size with its interval and name, and circles around tied sets."""
     axes, size_of_mark = figure.subplots(), 6.5 * mark_scale()
     means: dict[int, list[float]] = {}
@@ -73,14 +76,14 @@ def draw_pareto(figure: "Figure", findings: PlacementFindings, label: str) -> No
     axes.grid(False, axis="x")
 
 
-def _leave_space_below(figure: "Figure", axes: "Axes", lines: int) -> None:
+def _leave_space_below(figure: Figure, axes: Axes, lines: int) -> None:
     """Extend the vertical axis downwards, by the height of a name of so many lines."""
     low, high = axes.get_ylim()
     share = 0.03 + 1.15 * lines * note_size() / (_AXES_SHARE * 72.0 * figure.get_figheight())
     axes.set_ylim(low - share / (1.0 - share) * (high - low), high)
 
 
-def _wrap(figure: "Figure", name: str, sizes: int) -> str:
+def _wrap(figure: Figure, name: str, sizes: int) -> str:
     """The name in lines that fit between its neighbours."""
     letters = _LETTERS_PER_IN * figure.get_figwidth() / mark_scale() / sizes
     return textwrap.fill(name, max(int(letters), _FEWEST_LETTERS))
@@ -91,3 +94,33 @@ def _size_label(findings: PlacementFindings, size: int) -> str:
     rates = {tried.rate_hz for tried in findings.tried}
     rates_of_size = {tried.rate_hz for tried in findings.tried if len(tried.stations) == size}
     return f"{size}\n{'/'.join(f'{rate:g}' for rate in sorted(rates_of_size))} Hz" if len(rates) > 1 else str(size)
+
+
+_HEIGHT_MM = 85.0
+
+
+def placement_figure(folder: Path) -> PrintFigure:
+    """Error against the number of stations. BadFile without findings, NothingMeasured when no set has an error."""
+    findings = read_placement(folder / FINDINGS)
+    if not measured_best(findings):
+        raise NothingMeasured(folder, len(findings.failures))
+
+    def draw(figure: Figure) -> None:
+        draw_pareto(figure, findings, f"{metric_name(findings.metric)} [{findings.unit}]")
+        handles, names = figure.axes[0].get_legend_handles_labels()
+        marks = dict(zip(names, handles, strict=True))
+        figure.legend(marks.values(), marks.keys(), loc="outside upper left", ncols=len(marks))
+
+    return PrintFigure("placement", _figure_caption(findings), draw, _HEIGHT_MM)
+
+
+def _figure_caption(findings: PlacementFindings) -> str:
+    clips = max(len(measured_errors(tried)) for _, tried in measured_best(findings))
+    few = "" if clips >= MIN_UNITS else " Differences cannot be shown with so few clips, so all sets count as tied."
+    failed = len(findings.failures)
+    return (
+        f"Mean {metric_name(findings.metric)} of sets of stations on {count_noun(clips, 'clip')} of {findings.motion}. "
+        "Diamonds: the best set of each size with the 95 % interval of its mean, filled if no smaller set is better. "
+        f"Circles: sets of the same size that are not significantly worse.{few}"
+        + (f" {count_noun(failed, 'cell')} of {findings.planned:,} failed." if failed else "")
+    )

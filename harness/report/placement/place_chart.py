@@ -5,32 +5,28 @@ docs/studies.md shows it. It needs matplotlib, pyvista and OpenGL.
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from harness.body.places import NAMED_PLACES
 from harness.core.files import write_bytes
 from harness.errors import SystemFault
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.style import FAINT, Chart
+from harness.report.kit.style import FAINT, Chart, Figure
 from harness.report.placement.body_map import label_places, render_body
 from harness.report.placement.wording import plain_name
-from harness.results.placement_findings import StationPlacement
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from harness.results.placement_findings import CandidatePlace
 
 _HEIGHT_IN = 4.6
 
 
 def draw_place_chart() -> Chart:
     """The body from the front and from behind with all named places; SystemFault if it cannot be rendered."""
-    places = [StationPlacement(p.name, p.bone, p.along, p.around_deg) for p in NAMED_PLACES.values()]
+    places = [CandidatePlace(p.name, p.bone, p.along, p.around_deg) for p in NAMED_PLACES.values()]
     views, reason = render_body(places, {}, (0.0, 1.0))
     if views is None:
         raise SystemFault(f"The body cannot be drawn ({reason}).", "Install the extra viz, and OpenGL of the system.")
     at, pictures = views["at"], views["picture"]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         for side, title in enumerate(("from the front", "from behind")):
             axes = figure.add_subplot(1, 2, side + 1)
             axes.imshow(pictures[side], interpolation="none")

@@ -4,17 +4,16 @@ from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.units import count_clips, count_units
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_share
+from harness.core.number_format import NOT_MEASURED, Interval, count_noun
 from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
+    CandidatePlace,
     MarginalContribution,
     PlacementFindings,
     PlacementSearch,
     RankAgreement,
     StationNames,
-    StationPlacement,
     StationSetResult,
     StatisticalPower,
 )
@@ -45,16 +44,16 @@ def set_name(stations: StationNames) -> str:
     return " + ".join(sorted(parts, key=lambda part: not part.startswith("both "))) or "none"
 
 
-def original_candidates(findings: PlacementFindings) -> list[StationPlacement]:
+def original_candidates(findings: PlacementFindings) -> list[CandidatePlace]:
     """The candidates that the study names, without the positions that it derived by moving them."""
     return [place for place in findings.candidates if not place.moved_from]
 
 
-def worth_label(findings: PlacementFindings, worth: MarginalContribution) -> str:
+def contribution_label(findings: PlacementFindings, contribution: MarginalContribution) -> str:
     """How the contribution of a candidate was measured: "left out of all 5"."""
-    is_full = len(worth.base) == len(original_candidates(findings))
-    base = "" if not worth.base else f"all {len(worth.base)}" if is_full else set_name(worth.base)
-    return f"{_WORTH_LABELS[worth.mode]} {base}".strip()
+    is_full = len(contribution.base) == len(original_candidates(findings))
+    base = "" if not contribution.base else f"all {len(contribution.base)}" if is_full else set_name(contribution.base)
+    return f"{_WORTH_LABELS[contribution.mode]} {base}".strip()
 
 
 def plain_name(name: str) -> str:
@@ -67,7 +66,7 @@ def _plural(name: str) -> str:
     return " ".join([*before, _IRREGULAR.get(last, f"{last}s")])
 
 
-def sentence(findings: PlacementFindings) -> str:
+def placement_sentence(findings: PlacementFindings) -> str:
     """The answer: the best set of each size that was asked about.
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
@@ -98,7 +97,8 @@ def _size_sentence(findings: PlacementFindings, size: int) -> str:
     if best is None:
         return f"No set of {count_noun(size, 'station')} was measured."
     behaviours = " and ".join(map(plain_name, findings.behaviours))
-    stations = f"{_number_word(size)} stations" if size > 1 else "station"
+    number = _NUMBERS[size] if size < len(_NUMBERS) else str(size)
+    stations = f"{number} stations" if size > 1 else "station"
     return (
         f"Best {stations} for {behaviours}: {set_name(best.stations)}, {_size_error(findings, best)}; "
         f"{_size_ties(findings, best)}."
@@ -125,10 +125,6 @@ def _size_ties(findings: PlacementFindings, best: BestSet) -> str:
         return f"tied with the only other {noun} that was tried: {list_sets(best.ties)}"
     others = f"{best.of - 1:,} other {noun}s that were tried"
     return f"tied with {len(best.ties):,} of the {others}: {list_sets(best.ties)}"
-
-
-def _number_word(number: int) -> str:
-    return _NUMBERS[number] if number < len(_NUMBERS) else str(number)
 
 
 def power_sentences(power: StatisticalPower) -> list[str]:
@@ -255,11 +251,6 @@ def changes_sentence(findings: PlacementFindings, pair: RankAgreement) -> str:
     verb = "changes its" if pair.changes == 1 else "change their"
     example = f"{set_name(first.first)} against {set_name(first.second)}, {before} to {after} {findings.unit}".rstrip()
     return f"{pair.changes:,} of {pairs:,} pairs {verb} order{shown}: first {example}"
-
-
-def format_stays(share: float | None) -> str:
-    """The share of resamples in which a set stays best, in per cent; empty for None."""
-    return "" if share is None else format_share(share)
 
 
 def format_rank_range(rank_low: int, rank_high: int) -> str:

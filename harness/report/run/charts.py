@@ -1,37 +1,19 @@
-"""Charts of a run's page: error over time with station quality, errors per joint, error distribution."""
+"""Charts of a run's page: error over time with station quality, error distribution, error against a varied key."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.chart import add_legend, decimate, draw_chart, insert_gaps
-from harness.report.kit.distribution_chart import draw_distribution
-from harness.report.kit.highlights import Highlights
-from harness.report.kit.hover_chart import BAND_OF
-from harness.report.kit.metric_labels import metric_label
-from harness.report.kit.rows import label_rows
-from harness.report.kit.scales import set_root_scale
-from harness.report.kit.style import (
-    COLOURS,
-    FAINT,
-    GRID,
-    INK,
-    PAPER,
-    Chart,
-    hide_frame,
-)
-from harness.report.kit.text import to_file_name
-from harness.report.kit.time_chart import draw_over_time
+from harness.report.kit.error_lines import Highlights, draw_distribution, draw_over_time
+from harness.report.kit.inline_svg import BAND_OF
+from harness.report.kit.style import GRID, PAPER, Axes, Chart, Figure, hide_frame
+from harness.report.kit.text import metric_label, to_file_name
 from harness.report.run.data import RunData, Trace
+from harness.report.run.tables import rows_by_setting
+from harness.results.cell import varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
-from harness.score.pair import hinged_bones, joint_names
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 AXIS_LABELS = {metric: metric_label(metric) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
 """Metric -> label of its axis."""
@@ -52,7 +34,7 @@ def error_over_time(run: RunData, behaviour: str, highlights: Highlights) -> Cha
     which = clip + (f", the clip with the largest error of {len(clips)}" if len(clips) > 1 else "")
     bands = [trace for name, trace in shown.items() if len(trace.sigma_deg) and highlights.role(name)]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         rows = len(on_clip[0].stations)
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * rows + 0.25))
         names = [name for name in run.charted_series if name in shown]
@@ -80,42 +62,6 @@ def error_over_time(run: RunData, behaviour: str, highlights: Highlights) -> Cha
     )
 
 
-def error_per_joint(run: RunData, highlights: Highlights) -> Chart:
-    """Box plots of each joint's errors for the leader; medians of the control as points."""
-    skeleton = standard_skeleton()
-    bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
-    joints = list(joint_names(skeleton))
-    leader, control = highlights.leader, highlights.control
-    boxes = _pooled_errors(run, leader)
-    points = _pooled_errors(run, control) if control else None
-    has_points = points is not None and len(points[0]) > 0
-
-    def draw(figure: "Figure") -> None:
-        left, right = figure.subplots(1, 2)
-        for axes, names, part, title in (
-            (left, bones, 0, "rotation relative to the parent [deg]"),
-            (right, joints, 1, "position of the far end [mm]"),
-        ):
-            draw_boxes(axes, boxes[part], COLOURS[1])
-            if points is not None and has_points:
-                median = np.median(points[part], axis=0)
-                axes.plot(median, np.arange(len(names)), "o", markersize=3.5, color=COLOURS[0], label=control)
-            label_rows(axes, names)
-            set_root_scale(axes)
-            axes.set_title(title)
-
-    return draw_chart(
-        "per_joint",
-        f"Distribution at each joint, {leader}",
-        f"{leader}: boxes from quartile to quartile, lines at the median, whiskers at the 5th and 95th percentile of "
-        f"all scored frames.{f' Points: medians of {control}.' if has_points else ''} The axes have a square-root "
-        "scale.",
-        f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {leader}.",
-        draw,
-        6.4,
-    )
-
-
 def error_distribution(run: RunData, highlights: Highlights) -> Chart:
     """Cumulative distribution of the errors of every method."""
 
@@ -123,7 +69,7 @@ def error_distribution(run: RunData, highlights: Highlights) -> Chart:
         parts = [t.errors[metric][t.scored] for t in run.traces if t.series == name]
         return np.concatenate(parts or [np.empty(0)])
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: Figure) -> None:
         styles = highlights.styles(run.charted_series)
         for axes, (metric, label) in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS.items(), strict=True):
             named = {name: values(metric, name) for name in styles}
@@ -144,13 +90,56 @@ def error_distribution(run: RunData, highlights: Highlights) -> Chart:
     )
 
 
+def effect_charts(run: RunData, highlights: Highlights) -> list[Chart]:
+    """For each behaviour a chart of the error against the varied key; none unless one key takes several numbers."""
+    values = [row["varied"] for row in run.full_summary["cells"]]
+    keys = {key for varied in values for key in varied}
+    if len(keys) != 1 or len({varied_text(varied) for varied in values}) < 2:
+        return []
+    (key,) = keys
+    if not all(isinstance(varied[key], int | float) and not isinstance(varied[key], bool) for varied in values):
+        return []
+    return [_effect_chart(run, behaviour, key, highlights) for behaviour in run.behaviours]
+
+
+def _effect_chart(run: RunData, behaviour: str, key: str, highlights: Highlights) -> Chart:
+    by_series = rows_by_setting(run, behaviour)
+    names = [name for name in run.charted_series if name in by_series]
+
+    def draw(figure: Figure) -> None:
+        styles = highlights.styles(names)
+        for axes, (metric, label) in zip(figure.subplots(1, 2), AXIS_LABELS.items(), strict=True):
+            for name, style in styles.items():
+                points = sorted(
+                    (row["varied"][key], row["metrics"][metric]["mean"]) for row in by_series[name].values()
+                )
+                measured = [(x, y) for x, y in points if y is not None]
+                if measured:
+                    options = {**style, "marker": style.get("marker") or "o", "markersize": 3.5}
+                    axes.plot(*zip(*measured, strict=True), label=name + highlights.role(name), **options)
+            axes.set_xlabel(key)
+            axes.set_ylabel(label)
+            axes.set_ylim(bottom=0.0)
+        add_legend(figure, figure.axes[0])
+
+    return draw_chart(
+        f"varied_{to_file_name(key)}_{to_file_name(behaviour)}",
+        f"{behaviour.replace('_', ' ')}: error against {key}",
+        f"Mean over clips; the tables below have the numbers. {highlights.description}{omitted_series_note(run)}",
+        f"Joint angle and joint position error of {len(names)} methods against {key}.",
+        draw,
+        3.6,
+        hover=True,
+    )
+
+
 def omitted_series_note(run: RunData) -> str:
     """Sentence of a caption that says how many series have no line, or ""."""
     lines, series = len(run.charted_series), len(run.series)
     return f" Only the {lines} of {series} methods with the lowest errors are shown." if lines < series else ""
 
 
-def _draw_quality(axes: "Axes", trace: Trace) -> None:
+def _draw_quality(axes: Axes, trace: Trace) -> None:
     """A band for each station, coloured by its quality."""
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -168,7 +157,7 @@ def _draw_quality(axes: "Axes", trace: Trace) -> None:
     axes.set_xlabel("time [s]")
 
 
-def _draw_sigma_band(axes: "Axes", trace: Trace, highlights: Highlights) -> None:
+def _draw_sigma_band(axes: Axes, trace: Trace, highlights: Highlights) -> None:
     """Shade the area up to the mean standard deviation of a frame's hinges."""
     bottom, top = axes.get_ylim()
     mean_deg = np.where(trace.scored, trace.sigma_deg.mean(axis=1), np.nan)
@@ -178,21 +167,6 @@ def _draw_sigma_band(axes: "Axes", trace: Trace, highlights: Highlights) -> None
     label = f"{BAND_OF}{name}{highlights.role(name)}"
     axes.fill_between(time_s, bottom, np.maximum(mean_deg, bottom), label=label, **style)
     axes.set_ylim(bottom, np.nanmax(mean_deg, initial=top))
-
-
-def _pooled_errors(run: RunData, series: str) -> tuple[Floats, Floats]:
-    """Rotation (N, 22) [deg] and position (N, 25) [mm] errors of every scored frame of a series."""
-    traces = [trace for trace in run.traces if trace.series == series]
-    return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
-
-
-def draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
-    """A horizontal box for each column of (N, M) values. Axes.boxplot would import pyplot with its global state."""
-    low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
-    places = np.arange(values.shape[1])
-    axes.hlines(places, low, high, color=FAINT, linewidth=1.0)
-    axes.barh(places, q3 - q1, left=q1, height=0.62, color=colour, alpha=0.55)
-    axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
 def _mean(parts: Sequence[Floats]) -> float:

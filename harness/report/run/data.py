@@ -11,7 +11,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.training_data import training_note
+from harness.core.split import training_note
 from harness.report.kit.style import STYLES
 from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, varied_text
 from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row

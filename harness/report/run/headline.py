@@ -1,13 +1,10 @@
 """The sentences that open the page of a run, and the facts below them."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
 from harness.compare.units import Sampling, count_clips
-from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_share
+from harness.core.stream_health import describe_line_loss
 from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
 from harness.report.run.ranking import describe_rankings
@@ -21,30 +18,21 @@ _MOST_UNMEASURED = 8
 """Metrics without a value that are listed one by one."""
 
 
-@dataclass(frozen=True)
-class Headline:
-    """What a run found, as plain text; the page escapes it."""
+def run_verdict(run: RunData) -> tuple[str, str | None]:
+    """Which method is best, by how much and on what motion, in sentences, and the series with the lowest error.
 
-    sentence: str
-    lowest: str | None
-    """The series with the lowest error; None when no series leads."""
-    facts: Mapping[str, str]
-    """Title -> text: motion, coverage, what was not measured."""
-
-    @property
-    def opening(self) -> str:
-        """The first sentence."""
-        first, end, _ = self.sentence.partition(". ")
-        return first + end.rstrip()
-
-    @property
-    def rest(self) -> str:
-        """The sentences after the first; empty if there are none."""
-        return self.sentence.partition(". ")[2]
+    None when no series leads.
+    """
+    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
+    rankings = describe_rankings(run.full_summary, name_motion(source))
+    if not rankings:
+        return f"Nothing was measured: {_progress(run)}.", None
+    sentences = [text for ranking, lowest in rankings for text in (ranking, *_positions(run, lowest))]
+    return " ".join(sentences), rankings[0][1]
 
 
-def build_headline(run: RunData) -> Headline:
-    """Which method is best, by how much and on what motion, and what is missing."""
+def run_facts(run: RunData) -> dict[str, str]:
+    """Title -> text: motion, coverage, what was not measured; without what does not apply."""
     facts = {
         "Motion": _motion(run),
         "Tracker": _tracker(run),
@@ -54,13 +42,7 @@ def build_headline(run: RunData) -> Headline:
         "Link": describe_line_loss(run.cells).removeprefix("THE LINK IS "),
         "Not measured": _unmeasured(run),
     }
-    facts = {title: text for title, text in facts.items() if text}
-    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
-    rankings = describe_rankings(run.full_summary, name_motion(source))
-    if not rankings:
-        return Headline(f"Nothing was measured: {_progress(run)}.", None, facts)
-    sentences = [text for ranking, lowest in rankings for text in (ranking, *_positions(run, lowest))]
-    return Headline(" ".join(sentences), rankings[0][1], facts)
+    return {title: text for title, text in facts.items() if text}
 
 
 def _positions(run: RunData, series: str | None) -> list[str]:

@@ -81,12 +81,8 @@ def group_rows(run: RunData) -> dict[str, dict[str, Row]]:
 
 def _moment(run: RunData, series: str, windows: Sequence[WorstWindow], clip: int) -> PlayerMoment:
     worst, metrics = windows[0], ", ".join(window.metric for window in windows)
-    title = f"{series}: {metrics} on {run.trace(worst.key).clip}, {_span(worst)}"
+    title = f"{series}: {metrics} on {run.trace(worst.key).clip}, {worst.span}"
     return PlayerMoment(title, clip, series, worst.start_s, worst.end_s)
-
-
-def _span(window: WorstWindow) -> str:
-    return f"{window.start_s:.1f}–{window.end_s:.1f} s"
 
 
 def _worst_seconds(
@@ -102,7 +98,7 @@ def _worst_seconds(
             key = group[0].key
             name, rows = next((n, r) for n, r in groups.items() if any(str(row["key"]) == key for row in r.values()))
             both = {other: rows[other] for other in dict.fromkeys((series, run.ranked[0])) if other in rows}
-            clip = make_clip(run, f"{name}, {_span(group[0])}", both, reader, every, group[0])
+            clip = make_clip(run, f"{name}, {group[0].span}", both, reader, every, group[0])
             left -= len(clip.time_s) * len(both)
             if left < 0:
                 break

@@ -1,6 +1,7 @@
-"""Rankings of the series of a run, from the rows of its summary: for the headline, the terminal and bold cells."""
+"""Rankings of the series of a run, from the rows of its summary: sentences, bold cells and charts."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,10 +9,15 @@ import numpy as np
 from harness.compare.margins import MARGINS
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
 from harness.compare.units import Sampling, count_clips
-from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
-from harness.report.run.data import Row, lag_of, last_varied, series_name
+from harness.core.number_format import format_number
+from harness.report.kit.chart import draw_chart
+from harness.report.kit.ranking import LAG_NOTE, RankingPanel, describe_ranking, draw_ranking, explain_marks, name_lag
+from harness.report.kit.style import Chart
+from harness.report.kit.text import metric_name
+from harness.report.run.data import Row, RunData, lag_of, last_varied, series_name
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.score.metrics import DEFINITIONS
 
 
 class RankingGroup(NamedTuple):
@@ -26,6 +32,8 @@ GroupedValues = Mapping[RankingGroup, Mapping[str, ClipValues]]
 """Group -> series -> metric -> clip -> mean over its cells; causal methods are before those with a lag."""
 UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
 """Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
+_WIDTH_IN, _MOST_ROWS = 6.4, 14
+"""Width of a chart [in]; most methods of a chart, those with the lowest errors."""
 
 
 def group_values(
@@ -108,3 +116,34 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
     if len({group.lag for group in groups}) > 1:
         found.append((LAG_NOTE, None))
     return found
+
+
+def ranking_charts(run: RunData) -> list[Chart]:
+    """A chart for each group of methods that share a clip, in the order of the headline's sentences."""
+    rankings = [(group, ranking) for group, ranking in rank_groups(run.full_summary).items() if ranking]
+    several = len({group.performer for group, _ in rankings}) > 1
+    return [
+        _ranking_chart(n, _chart_title(group, several), ranking) for n, (group, ranking) in enumerate(rankings, start=1)
+    ]
+
+
+def _chart_title(group: RankingGroup, several: bool) -> str:
+    parts = [f"{group.performer} performers"] if several and group.performer else []
+    return ", ".join([*parts, *([name_lag(group.lag)] if group.lag else [])])
+
+
+def _ranking_chart(number: int, title: str, ranking: MethodRanking) -> Chart:
+    names, unit = list(ranking.values), DEFINITIONS[PRIMARY_METRIC].unit
+    shown = replace(ranking, values={name: ranking.values[name] for name in names[:_MOST_ROWS]})
+    panel = RankingPanel(title, shown)
+    more = f" The {len(shown.values)} of {len(names)} methods with the lowest means." if len(names) > _MOST_ROWS else ""
+    means = ", ".join(f"{name} {format_number(mean, unit)}" for name, mean in shown.means.items())
+    return draw_chart(
+        f"ranking_{number}",
+        "Ranking" + (f": {title}" if title else ""),
+        f"Mean {metric_name(PRIMARY_METRIC)}. {explain_marks([panel])}{more}",
+        f"Mean {metric_name(PRIMARY_METRIC)} [{unit}] of each method: {means}.",
+        lambda figure: draw_ranking(figure, [panel], metric_name(PRIMARY_METRIC), unit),
+        3.0,
+        width_in=_WIDTH_IN,
+    )

@@ -4,20 +4,28 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.core.estimate import name_with_lag
-from harness.core.hearing import poor_hearing
-from harness.core.line_loss import describe_line_loss
 from harness.core.number_format import count_noun, format_fixed, format_mean_sd, format_share
+from harness.core.stream_health import describe_line_loss, poor_hearing
 from harness.core.text_table import Table
+from harness.report.kit.page_text import block_lines
 from harness.report.kit.text import last_line, name_motion
-from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
+from harness.report.run.calibration import calibration_tables
 from harness.report.run.data import lag_of, note_of
+from harness.report.run.expectations import expected_orders, recovery_table
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
-from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, TABLE_COLUMNS
-from harness.results.sigma_table import sigma_lines
+from harness.results.reported_metrics import (
+    MAX_FALLBACK_SHARE,
+    PRIMARY_METRIC,
+    SECONDARY_METRIC,
+    TABLE_COLUMNS,
+    sigma_lines,
+)
 
 MOST_ROWS = 12
 """Rows of the short table of a run: about what a terminal shows without scrolling."""
+_WIDTH = 160
+"""Most characters of a line of the tables below the first one."""
 _SHORT_COLUMNS = (PRIMARY_METRIC, SECONDARY_METRIC, "jitter_m_s3", "step_p50_ms")
 """Metrics of the short table, which fits into 100 characters."""
 
@@ -34,6 +42,7 @@ def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
     failed = [f"FAILED {cell}: {last_line(text)}" for cell, text in summary["failures"].items()]
     if not cells:
         return "\n".join(["nothing was measured", finished, *failed])
+    blocks = [*calibration_tables(summary), recovery_table(summary), *expected_orders(summary)]
     pooled = short and len(summary["behaviours"]) > MOST_ROWS
     return "\n".join(
         [
@@ -44,10 +53,7 @@ def run_table(summary: Mapping[str, Any], *, short: bool = False) -> str:
             *(_pooled_rows(summary) if pooled else _behaviour_rows(summary)),
             "",
             *_fallback_lines(summary["methods"]),
-            *calibration_errors.text(summary),
-            *calibration_cost.text(summary),
-            *recovery.text(summary),
-            *expected_orders.text(summary),
+            *(line for block in blocks if (lines := block_lines(block, _WIDTH)) for line in (*lines, "")),
             *(text for text, _ in describe_rankings(summary, name_motion(str(cells[0]["motion_source"])))),
             finished,
             *failed,

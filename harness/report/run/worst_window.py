@@ -6,6 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.number_format import format_number
+from harness.report.run.data import WORST_METRICS, RunData
+from harness.score.metrics import DEFINITIONS
 
 WINDOW_S = 2.0
 
@@ -24,6 +27,34 @@ class WorstWindow:
     end_s: float
     mean: float
     """Mean of the metric over the window's scored frames, in the metric's unit."""
+
+    @property
+    def span(self) -> str:
+        """Begin and end, "1.2–3.2 s"."""
+        return f"{self.start_s:.1f}–{self.end_s:.1f} s"
+
+    @property
+    def mean_text(self) -> str:
+        """The mean with its unit."""
+        unit = DEFINITIONS[self.metric].unit
+        return f"{format_number(self.mean, unit)} {unit}"
+
+    def scored_rows(self, run: RunData) -> Ints:
+        """Rows of the scored frames of the window."""
+        out: Ints = self.first + np.flatnonzero(run.trace(self.key).scored[self.first : self.stop])
+        return out
+
+
+def worst_windows(run: RunData) -> dict[tuple[str, str], WorstWindow]:
+    """(series, metric) -> the worst two seconds over all clips."""
+    windows = {}
+    for series in run.series:
+        traces = [trace for trace in run.traces if trace.series == series]
+        for metric in WORST_METRICS:
+            by_trace = [find_worst_window(t.key, metric, t.time_s, t.errors[metric], t.scored) for t in traces]
+            if measured := [window for window in by_trace if window is not None]:
+                windows[series, metric] = max(measured, key=lambda window: window.mean)
+    return windows
 
 
 def find_worst_window(key: str, metric: str, time_s: Floats, values: Floats, scored: Bools) -> WorstWindow | None:
@@ -48,11 +79,6 @@ def find_worst_window(key: str, metric: str, time_s: Floats, values: Floats, sco
     first = int(np.argmax(mean))
     last = int(stop[first])
     return WorstWindow(key, metric, first, last, float(time_s[first]), float(time_s[last - 1]), float(mean[first]))
-
-
-def select_worst(windows: Iterable[WorstWindow]) -> WorstWindow | None:
-    """The window with the largest mean; the first of equal ones."""
-    return max(windows, key=lambda window: window.mean, default=None)
 
 
 def group_overlapping(windows: Iterable[WorstWindow]) -> list[tuple[WorstWindow, ...]]:

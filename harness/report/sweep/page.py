@@ -10,25 +10,23 @@ from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.ranking import find_best
 from harness.compare.units import count_clips
 from harness.core.arrays import Bools
-from harness.core.interval import Interval
-from harness.core.number_format import NOT_MEASURED, count_noun, format_number
+from harness.core.number_format import Interval, count_noun
 from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.kit.ranking import BOLD_NOTE
-from harness.report.kit.text import list_first
+from harness.report.kit.text import format_statistic, list_first
 from harness.report.sweep.charts import (
     MAX_INTERVALS,
     MAX_SCENARIOS,
     MAX_SERIES,
-    Curve,
+    Curves,
     curves,
     scenarios_varying,
     sweep_chart,
 )
-from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, unit_of
-from harness.report.sweep.reader import read_sweep
-from harness.report.sweep.wording import FailureGroup, describe_effect, group_failures, list_values, sentence
+from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, read_sweep, unit_of
+from harness.report.sweep.wording import describe_effect, group_failures, list_values, sweep_sentence
 from harness.results.index import INDEX_FILE
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -55,7 +53,7 @@ def sweep_page(sweep: SweepData) -> Page:
     return Page(
         verb="sweep",
         name=sweep.name,
-        headline=sentence(sweep),
+        headline=sweep_sentence(sweep),
         facts={
             "Scenarios": list_first(sweep.scenarios, 8),
             "Clips": count_clips(sweep.clips, sweep.sampling),
@@ -76,7 +74,7 @@ def sweep_page(sweep: SweepData) -> Page:
 def sweep_text(sweep: SweepData) -> str:
     """The sweep for a terminal; its length is limited however many cells there are."""
     groups = group_failures(sweep)
-    failures = [f"{len(g.cells):,}, such as {g.cells[0]}: {g.message}" for g in groups[:_MOST_PRINTED]]
+    failures = [f"{len(of):,}, such as {of[0]}: {message}" for message, of in list(groups.items())[:_MOST_PRINTED]]
     more = len(groups) - len(failures)
     rest = [Prose(f"and {more:,} more kinds of failure, in summary.json")] if more else []
     effects = [[key.name, describe_effect(sweep, key)] for key in sweep.keys]
@@ -85,7 +83,7 @@ def sweep_text(sweep: SweepData) -> str:
         Section("Varied keys", "varied", [DataTable(["varied", f"lowest and highest mean {PRIMARY_METRIC}"], effects)]),
         Section("Failures", "failures", [Bullets(failures, prefix="FAILED "), *rest]),
     ]
-    return page_text(Page("sweep", sweep.name, sentence(sweep), {}, sections))
+    return page_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections))
 
 
 def _methods_table(sweep: SweepData) -> DataTable:
@@ -97,7 +95,7 @@ def _methods_table(sweep: SweepData) -> DataTable:
             if selected.any():
                 found = {metric: sweep.statistic(metric, selected) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
                 clips = max(statistic.clips for statistic in found.values())
-                means = [_mean_text(statistic, metric) for metric, statistic in found.items()]
+                means = [_mean_text(statistic, metric, statistic.clips) for metric, statistic in found.items()]
                 rows.append([scenario, series, f"{int(selected.sum()):,}", clips, *means])
     head = ["scenario", "method", "cells", "clips", "joint angle [deg]", "position [mm]"]
     return DataTable(head, rows, most_printed=_MOST_ROWS)
@@ -123,7 +121,7 @@ def _varied(sweep: SweepData, *, with_intervals: bool) -> list[Block]:
     return [Prose(text), Panels(charts, broad=True), *tables]
 
 
-def _value_tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequence[Curve]) -> list[DataTable]:
+def _value_tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Curves) -> list[DataTable]:
     secondary = curves(sweep, key, scenario, SECONDARY_METRIC, with_intervals=False)
     return [
         _value_table(sweep, key, scenario, lines, metric)
@@ -131,16 +129,15 @@ def _value_tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequ
     ]
 
 
-def _value_table(sweep: SweepData, key: VariedKey, scenario: int, lines: Sequence[Curve], metric: str) -> DataTable:
+def _value_table(sweep: SweepData, key: VariedKey, scenario: int, lines: Curves, metric: str) -> DataTable:
     """The numbers of a chart: a row for each curve, a column for each value of the key."""
     titles = [f"{key.name}={text}" for text in key.labels]
     over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or over units with their 95 % interval"
-    series = [curve.colour_index for curve in lines]
     best = [
-        _best_rows(sweep, metric, ((s, sweep.select(scenario, s, **{key.name: value})) for s in series))
+        _best_rows(sweep, metric, ((s, sweep.select(scenario, s, **{key.name: value})) for s in lines))
         for value in range(len(titles))
     ]
-    return _grid(metric, over, titles, [c.name for c in lines], [c.points for c in lines], best)
+    return _grid(metric, over, titles, [sweep.series[s] for s in lines], list(lines.values()), best)
 
 
 def _scenarios(sweep: SweepData) -> list[Block]:
@@ -185,21 +182,15 @@ def _grid(
 
 
 def _cell(statistic: Statistic, metric: str, best: bool, column_clips: int) -> object:
-    note = f" n\u00a0{statistic.clips}" if statistic.clips not in (0, column_clips) else ""
-    has_interval = statistic.mean is not None and statistic.low is not None and not note
-    cell = (
-        Interval.of(statistic.mean, statistic.low, statistic.high)
-        if has_interval
-        else f"{_mean_text(statistic, metric)}{note}"
-    )
+    cell: object = _mean_text(statistic, metric, column_clips)
+    if statistic.low is not None and statistic.clips == column_clips:
+        cell = Interval.of(statistic.mean, statistic.low, statistic.high)
     return Strong(cell) if best else cell
 
 
-def _mean_text(statistic: Statistic, metric: str) -> str:
-    if statistic.mean is None:
-        return NOT_MEASURED
-    spread = "" if statistic.sd is None else f" ± {format_number(statistic.sd, unit_of(metric))}"
-    return f"{format_number(statistic.mean, unit_of(metric))}{spread}"
+def _mean_text(statistic: Statistic, metric: str, column_clips: int) -> str:
+    mean, sd, clips = statistic.mean, statistic.sd, statistic.clips
+    return format_statistic(mean, sd, unit_of(metric), clips=clips, of_column=column_clips)
 
 
 def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]]) -> set[int]:
@@ -229,16 +220,16 @@ def _failures(sweep: SweepData) -> list[Block]:
     rest = [Prose(f"And {more:,} more kinds; summary.json has them all.")] if more > 0 else []
     text = "Finished cells are kept. This command runs the failed ones again:"
     retry: list[Block] = [Prose(text), Code(sweep.command)] if groups and sweep.command else []
-    return [*retry, *(_failure(group, sweep.command) for group in groups[:_MOST_FAILURES]), *rest]
+    return [*retry, *(_failure(sweep, *group) for group in list(groups.items())[:_MOST_FAILURES]), *rest]
 
 
-def _failure(group: FailureGroup, command: str) -> Block:
-    more = len(group.cells) - _MOST_CELLS
-    cells = [*group.cells[:_MOST_CELLS], *([f"and {more:,} more"] if more > 0 else [])]
-    alone = [Code(f"{command} --cell {shlex.quote(group.cells[0])}")] if command else []
+def _failure(sweep: SweepData, message: str, failed: Sequence[str]) -> Block:
+    more = len(failed) - _MOST_CELLS
+    cells = [*failed[:_MOST_CELLS], *([f"and {more:,} more"] if more > 0 else [])]
+    alone = [Code(f"{sweep.command} --cell {shlex.quote(failed[0])}")] if sweep.command else []
     first = Prose("Message of the first cell, and the command that runs it alone:")
-    blocks: list[Block] = [Bullets(cells), first, Code(group.traceback), *alone]
-    return BrowserOnly(blocks, f"{count_noun(len(group.cells), 'cell')}: {group.message}")
+    blocks: list[Block] = [Bullets(cells), first, Code(sweep.failures[failed[0]]), *alone]
+    return BrowserOnly(blocks, f"{count_noun(len(failed), 'cell')}: {message}")
 
 
 def _files(sweep: SweepData) -> list[Block]:

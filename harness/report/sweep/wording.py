@@ -1,7 +1,6 @@
 """A sweep in words: its progress, the best method, the effect of each key, and groups of failures."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,18 +15,7 @@ from harness.report.sweep.data import SweepData, VariedKey, unit_of
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 
-@dataclass(frozen=True)
-class FailureGroup:
-    """Cells that failed with the same message."""
-
-    message: str
-    """Last line of the traceback."""
-    cells: tuple[str, ...]
-    traceback: str
-    """Full traceback of the first cell."""
-
-
-def sentence(sweep: SweepData) -> str:
+def sweep_sentence(sweep: SweepData) -> str:
     """Progress and best method, in a few sentences."""
     return f"{progress_sentence(sweep)} {_best(sweep)}".strip()
 
@@ -77,13 +65,12 @@ def describe_effect(sweep: SweepData, key: VariedKey) -> str:
     return f"{lowest}, {highest} ({rise})"
 
 
-def group_failures(sweep: SweepData) -> list[FailureGroup]:
-    """Failures grouped by their last line, the most frequent first."""
+def group_failures(sweep: SweepData) -> dict[str, list[str]]:
+    """Last line of the traceback -> cells that failed with it, the most frequent first."""
     cells_of: dict[str, list[str]] = {}
     for cell, text in sweep.failures.items():
         cells_of.setdefault(last_line(text), []).append(cell)
-    in_order = sorted(cells_of.items(), key=lambda item: -len(item[1]))
-    return [FailureGroup(line, tuple(cells), sweep.failures[cells[0]]) for line, cells in in_order]
+    return dict(sorted(cells_of.items(), key=lambda item: -len(item[1])))
 
 
 def list_values(key: VariedKey, most: int = 8) -> str:

@@ -1,26 +1,31 @@
 """Soft tissue artefact: a tracker sits on skin, which lags behind the bone and oscillates.
 
 It is the largest error of skin-mounted trackers, largest at the thigh, and as slow as the motion itself (Leardini et
-al. 2005). docs/is900.md 13.6 has its numbers and the limits of this model.
+al. 2005). docs/is900.md 13.6 has its numbers and the limits of this model. `Skin` is what lies below the stations.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
+from harness.body.mounts import Mount
+from harness.body.soft_tissue import tissue_thickness_m
 from harness.core import rotations
-from harness.core.arrays import Floats
-from harness.core.ranges import Range, check_fields
-from harness.simulate.readings import SimulatedReadings
+from harness.core.arrays import Floats, freeze
+from harness.core.calibration import Calibration
+from harness.core.ranges import CheckedFields, Range
+from harness.core.skeleton import Skeleton
+from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
 _FASTER_INWARD = 2.0
 """Ratio of the natural frequency normal to the skin to that along it: above 1 by Wakeling & Nigg 2001 [choice]."""
 
 
 @dataclass(frozen=True)
-class SoftTissueArtefact:
+class SoftTissueArtefact(CheckedFields):
     """A damped oscillator on each axis of a station, driven by the acceleration of its place on the bone.
 
     Soft tissue of thickness h is a layer in shear whose stiffness is proportional to 1/h. So the displacement is
@@ -35,9 +40,6 @@ class SoftTissueArtefact:
     """Damping ratio; 1 is critical damping."""
     reference_tissue_m: Annotated[float, Range(1e-3, 0.5)] = 0.04
     """Tissue thickness to which `frequency_hz` refers [m]."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         pace = natural_frequency_rad_s(self, readings.tissue_m)
@@ -99,4 +101,41 @@ def free_response(pace: Floats, damping: float, step_s: float) -> Floats:
             [one * two * (second - first) / gap, (one * first - two * second) / gap],
         ]
     ).real
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """What lies between S stations and their bones."""
+
+    radius_m: Floats
+    """(S,) distance of the station from the axis of its bone [m]; the station's z points away from it, x along it."""
+    tissue_m: Floats
+    """(S,) thickness of the soft tissue between bone and skin at the station [m]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, radius_m=("S",), tissue_m=("S",))
+
+
+def skin_below(skeleton: Skeleton, mounts: Sequence[Mount], calibration: Calibration) -> Skin:
+    """The skin below stations on these mounts, whose exact calibration is given."""
+    along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
+    return Skin(
+        radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
+        tissue_m=np.array([tissue_thickness_m(mount.bone, mount.along) for mount in mounts]),
+    )
+
+
+def tissue_force_m_s2(
+    turn: Floats, acceleration_m_s2: Floats, calibration: Calibration, frame_from_world: Floats = rotations.IDENTITY
+) -> Floats:
+    """(N, S, 3) specific force at each station minus that in the rest pose, in the station's axes [m/s^2].
+
+    Orientations (N, S, 4) and accelerations (N, S, 3) are those of the stations in a frame; the world's by default.
+    """
+    up = np.array([0.0, 0.0, GRAVITY_M_S2])
+    specific_force = rotations.rotate(
+        rotations.inverse(turn), acceleration_m_s2 + rotations.rotate(frame_from_world, up)
+    )
+    out: Floats = specific_force - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
     return out

@@ -6,16 +6,13 @@ solves for them by Gauss-Newton, from four headings and from a place below the e
 do not fit. It is refused if the residuals stay large, if too few ranges remain, or if two different places fit as well.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
+from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotate, rotation_vector
-from harness.simulate.physics.error_state import MOTION_ERRORS
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
-from harness.simulate.physics.strapdown import STATE, attitude, set_attitude
+from harness.simulate.physics.filter_state import RangingModel, Search, range_variance
+from harness.simulate.physics.strapdown import MOTION_ERRORS, STATE, attitude, set_attitude
 from harness.simulate.readings import GRAVITY_M_S2
 
 HEARD = 12
@@ -55,21 +52,6 @@ _INFLATION = 2.0
 """Factor on the covariance of a fix, for what its model leaves out [choice]."""
 FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE, _LEAST_TILT_VARIANCE = 1.0, 0.1, 1e-6
 """Variances of the tilt at switch-on and after ranges refuted it, and the least one [rad^2] [choice]."""
-
-
-class Search(NamedTuple):
-    """What S lost stations have collected."""
-
-    heard: Floats
-    """(S, N, 12) ranges in a ring, the latest of the window: three turns of emitters, within the limits above."""
-    stored: Ints
-    """(S,) ranges stored since the loss."""
-    path: Floats
-    """(S, 7) double and single integral of the specific force since the loss [m], [m/s], and its duration [s]."""
-    gravity: Floats
-    """(S, 5) running mean of the specific force [m/s^2], its variance, and the number of slots in them."""
-    tilt_variance: Floats
-    """(S,) variance of the attitude's tilt about each horizontal axis [rad^2]."""
 
 
 @compiled

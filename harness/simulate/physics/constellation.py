@@ -8,13 +8,11 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.names import Text
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import Range, Text, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.simulate.physics.emitter_checks import find_emitter_fault
-from harness.simulate.physics.mcf_file import MCF_SUFFIX, read_mcf
+from harness.simulate.physics.emitters import MCF_SUFFIX, find_emitter_fault, read_mcf
 from harness.stream.codec.replies import Emitter
 
 _UNIT_TOLERANCE = 1e-9

@@ -1,11 +1,20 @@
-"""Coverage by place: how many emitters are heard there, and how well ranges to them fix a position."""
+"""Coverage: how many emitters are heard at a place, or by the stations of a performer, and how well they fix it."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
-from harness.simulate.physics.constellation import Constellation
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.calibration import Calibration
+from harness.core.motion import BodyMotion
+from harness.simulate.physics.constellation import Constellation, middle_of_path_m
+from harness.simulate.physics.room import Room, place_room
+from harness.simulate.physics.sight import Sight
+from harness.simulate.physics.sound import Sound, level_db, threshold_db
+from harness.simulate.trajectory import Trajectory
 
 ENOUGH = 3
 """Number of ranges that a position needs."""
@@ -17,6 +26,9 @@ _MARGIN_M = 2.0
 """Width of the strip around the emitters in a plan view [m] [choice]."""
 _NO_FIX = 1e-9
 """Determinant of the normal matrix below which ranges fix no position: the emitters lie in a plane with the station."""
+MOST_SAMPLES = 600
+"""Most instants of a clip that are looked at [choice]."""
+_SAMPLES_HZ = 10.0
 
 
 def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
@@ -35,8 +47,7 @@ def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class PlaceCoverage:
+class EmitterCoverage(NamedTuple):
     """Coverage at N places without a body; a station there faces each emitter."""
 
     heard: Ints
@@ -65,14 +76,14 @@ class PlaceCoverage:
         return median_of_finite(self.dilution)
 
 
-def place_coverage(constellation: Constellation, position_m: Floats) -> PlaceCoverage:
+def emitter_coverage(constellation: Constellation, position_m: Floats) -> EmitterCoverage:
     """Coverage at places (N, 3) in the tracker's frame [m]: emitters in whose range and cone a place lies."""
     ray_m = position_m[:, None] - constellation.position_m
     distance_m = np.sqrt(np.sum(ray_m**2, axis=-1))
     in_cone = np.sum(ray_m * constellation.normal, axis=-1) >= np.cos(constellation.cone_rad) * distance_m
     heard = (distance_m <= constellation.range_m) & in_cone & (distance_m > 0.0)
     unit = ray_m / np.where(distance_m > 0.0, distance_m, 1.0)[..., None]
-    return PlaceCoverage(heard.sum(axis=-1), dilution_of_precision(unit, heard))
+    return EmitterCoverage(heard.sum(axis=-1), dilution_of_precision(unit, heard))
 
 
 def plan_axes_m(constellation: Constellation) -> tuple[Floats, Floats]:
@@ -92,3 +103,97 @@ def median_of_finite(values: Floats) -> float:
     """Median of the finite values; NaN without any."""
     finite = values[np.isfinite(values)]
     return float(np.median(finite)) if finite.size else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class StationCoverage:
+    """Coverage of S stations at N instants of a clip."""
+
+    stations: tuple[str, ...]
+    heard: Ints
+    """(N, S) number of emitters that one of the station's microphones hears."""
+    dilution: Floats
+    """(N, S) dilution of precision at the station's origin; NaN without a fix."""
+
+    def __post_init__(self) -> None:
+        freeze(self, np.int64, heard=("N", len(self.stations)))
+        freeze(self, dilution=(len(self.heard), len(self.stations)))
+
+    def shares(self, station: int) -> tuple[float, float, float, float]:
+        """Shares of the time in which a station hears no emitter, one, two, and three or more."""
+        counts = np.bincount(np.minimum(self.heard[:, station], ENOUGH), minlength=ENOUGH + 1) / len(self.heard)
+        none, one, two, enough = map(float, counts)
+        return none, one, two, enough
+
+    def fixed_share(self, station: int) -> float:
+        """Share of the time in which a station has a fix, with a dilution of at most `LARGEST_DILUTION`."""
+        return float(np.mean(self.dilution[:, station] <= LARGEST_DILUTION))
+
+    def median_dilution(self, station: int) -> float:
+        """Median dilution of precision of a station while it has a fix; NaN if it never has."""
+        return median_of_finite(self.dilution[:, station])
+
+
+def station_coverage(
+    constellation: Constellation,
+    body: Body,
+    motion: BodyMotion,
+    calibration: Calibration,
+    *,
+    room: Room | None = None,
+    sound: Sound | None = None,
+) -> StationCoverage:
+    """Coverage of the stations of a calibration on a performer who moves below a constellation.
+
+    The constellation stands above the middle of the motion's path. An emitter is heard when a microphone lies in its
+    range and cone, receives enough sound, and neither body nor furniture is between them. At most ten instants per
+    second are looked at, and at most `MOST_SAMPLES`.
+    """
+    room, sound = room or Room(), sound or Sound()
+    trajectory = Trajectory(body, motion)
+    count = min(int(trajectory.duration_s * _SAMPLES_HZ) + 1, MOST_SAMPLES)
+    time_s = np.linspace(0.0, trajectory.duration_s, count)
+    qpos = trajectory.qpos(time_s)
+    stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
+    centre_m = np.round(middle_of_path_m(motion.qpos), 2)
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    centred, placed = place_room(room, constellation, centre_m, calibration)
+    position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
+    turned = rotations.multiply(tracker_from_world, stations.world_from_station)
+    sight = Sight(body, placed) if room.shadow else None
+    heard = np.empty((count, len(calibration.stations), len(constellation)), dtype=bool)
+    for n in range(count):
+        if sight is not None:
+            sight.set(qpos[n])
+        heard[n] = heard_emitters(centred, position_m[n], turned[n], sound, sight)
+    ray_m = position_m[:, :, None] - centred.position_m
+    unit = ray_m / np.sqrt(np.sum(ray_m**2, axis=-1, keepdims=True))
+    return StationCoverage(calibration.stations, heard.sum(axis=-1), dilution_of_precision(unit, heard))
+
+
+def heard_emitters(
+    constellation: Constellation, position_m: Floats, turned: Floats, sound: Sound, sight: Sight | None
+) -> Bools:
+    """(S, J) which emitters a microphone of each station hears.
+
+    Stations have positions (S, 3) and orientations (S, 4) in the tracker's frame. `sight` tells what is in the way.
+    """
+    out = np.zeros((len(position_m), len(constellation)), dtype=bool)
+    microphones_m = position_m[:, None] + rotations.rotate(turned[:, None], np.array(sound.microphones_m))
+    outward = rotations.rotate(turned, np.array([0.0, 0.0, 1.0]))
+    least_db = threshold_db(constellation.range_m, constellation.cone_rad, sound.absorption_db_per_m)
+    cone_cos = float(np.cos(constellation.cone_rad))
+    for emitter, (at_m, normal) in enumerate(zip(constellation.position_m, constellation.normal, strict=True)):
+        ray_m = microphones_m - at_m
+        distance_m = np.sqrt(np.sum(ray_m**2, axis=-1))
+        emitter_cos = np.sum(ray_m * normal, axis=-1) / distance_m
+        station_cos = -np.sum(ray_m * outward[:, None], axis=-1) / distance_m
+        near: Bools = (distance_m <= constellation.range_m) & (emitter_cos >= cone_cos)
+        for station, microphone in np.argwhere(near):
+            each = station, microphone
+            level = level_db(distance_m[each], emitter_cos[each], station_cos[each], sound.absorption_db_per_m)
+            near[each] = level >= least_db
+        if sight is not None and near.any():
+            near[near] = ~sight.blocked(at_m, microphones_m[near])
+        out[:, emitter] = near.any(axis=1)
+    return out

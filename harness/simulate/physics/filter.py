@@ -9,33 +9,27 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
-from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotate
-from harness.simulate.physics.acquisition import (
-    Search,
-    add_force,
-    fix,
-    level_attitude,
-)
-from harness.simulate.physics.enhancement import MODES, add_to_offset
-from harness.simulate.physics.error_state import (
+from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate
+from harness.simulate.physics.acquisition import add_force, fix, level_attitude
+from harness.simulate.physics.filter_record import MODES, add_to_offset, write_record
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, Scratch, range_variance
+from harness.simulate.physics.schedule import TICKS_PER_SLOT
+from harness.simulate.physics.strapdown import (
     ERRORS,
     MOTION_ERRORS,
     add_noise,
     add_tick,
+    attitude,
     attitude_sigma_rad,
+    integrate,
     position_sigma_m,
     project,
     propagate,
     reset_attitude,
+    set_attitude,
     update,
 )
-from harness.simulate.physics.filter_record import write_record
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
-from harness.simulate.physics.ranging_model import RangingModel, range_variance
-from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CONFIRMING, LOST
-from harness.simulate.physics.strapdown import attitude, integrate, set_attitude
-from harness.simulate.physics.tracking_state import finish_slot
+from harness.simulate.physics.tracking_state import CONFIRMING, LOST, finish_slot
 from harness.simulate.readings import GRAVITY_M_S2
 
 _CLIPPED_SHARE = 0.3
@@ -51,9 +45,7 @@ _ATTEMPT_SLOTS = 8
 @compiled
 def advance(
     model: FilterModel,
-    ranging: RangingModel,
     state: FilterState,
-    search: Search,
     first_slot: int,
     angle_rad: Floats,
     velocity_m_s: Floats,
@@ -61,8 +53,13 @@ def advance(
     outputs: Outputs,
 ) -> None:
     """Advance all stations over a block of slots; see `FusionFilter.advance`."""
-    transition, scratch = np.zeros((9, 9)), np.empty((MOTION_ERRORS, ERRORS))
-    vectors, angles, force = np.empty((4, ERRORS)), np.empty((TICKS_PER_SLOT, 3)), np.empty(3)
+    scratch = Scratch(
+        np.zeros((9, 9)),
+        np.empty((MOTION_ERRORS, ERRORS)),
+        np.empty((4, ERRORS)),
+        np.empty((TICKS_PER_SLOT, 3)),
+        np.empty(3),
+    )
     for s in range(len(state.motion)):
         record = 0
         while record < len(outputs.tick) and outputs.tick[record, s] < first_slot * TICKS_PER_SLOT:
@@ -70,49 +67,44 @@ def advance(
         for f in range(len(range_m)):
             slot, t = first_slot + f, f * TICKS_PER_SLOT
             inertia = angle_rad[t : t + TICKS_PER_SLOT, s], velocity_m_s[t : t + TICKS_PER_SLOT, s]
-            transition[:] = 0.0
             state.motion[s, 0] = state.motion[s, TICKS_PER_SLOT]
-            first_turn = state.turn_rad_s[s, 0], state.turn_rad_s[s, 1], state.turn_rad_s[s, 2]
-            first_acceleration = (
-                state.acceleration_m_s2[s, 0],
-                state.acceleration_m_s2[s, 1],
-                state.acceleration_m_s2[s, 2],
-            )
-            predict_slot(model, state, search, s, inertia[0], inertia[1], transition, angles, force)
+            first_turn = as_vector(state.turn_rad_s[s])
+            first_acceleration = as_vector(state.acceleration_m_s2[s])
+            predict_slot(model, state, s, inertia, scratch)
             while record < len(outputs.tick) and outputs.tick[record, s] < (slot + 1) * TICKS_PER_SLOT:
                 k = outputs.tick[record, s] - slot * TICKS_PER_SLOT
                 turn, acceleration = first_turn, first_acceleration
                 if k > 0:
-                    by = 1.0 / model.tick_s
+                    by, angles = 1.0 / model.tick_s, scratch.angles
                     turn = by * angles[k - 1, 0], by * angles[k - 1, 1], by * angles[k - 1, 2]
                     before, after = state.motion[s, k - 1], state.motion[s, k]
                     acceleration = by * (after[3] - before[3]), by * (after[4] - before[4]), by * (after[5] - before[5])
                 write_record(model, state, s, k, turn, acceleration, outputs, record)
                 record += 1
-            propagate(state.covariance[s], transition, TICKS_PER_SLOT * model.tick_s, scratch)
-            add_slot_noise(model, state.covariance[s], angles, force, inertia)
-            emitter = slot % len(ranging.emitter_m)
+            propagate(state.covariance[s], scratch.transition, TICKS_PER_SLOT * model.tick_s, scratch.product)
+            add_slot_noise(model, state.covariance[s], inertia, scratch)
             if state.status[s, 0] == LOST:
-                search_slot(model, ranging, state, search, s, slot, emitter, range_m[f, s], angles, force)
+                search_slot(model, state, s, slot, range_m[f, s], scratch)
             else:
-                correct(model, ranging, state, search, s, slot, emitter, range_m[f, s], angles, force, vectors)
-            finish_slot(model, state, search, s, slot)
+                correct(model, state, s, slot, range_m[f, s], scratch)
+            finish_slot(model, state, s, slot)
+
+
+@compiled
+def as_vector(array: Floats) -> Vector:
+    """Three numbers of an array as a tuple, which keeps them."""
+    return array[0], array[1], array[2]
 
 
 @compiled
 def predict_slot(
-    model: FilterModel,
-    state: FilterState,
-    search: Search,
-    s: int,
-    angle_rad: Floats,
-    velocity_m_s: Floats,
-    transition: Floats,
-    angles: Floats,
-    force: Floats,
+    model: FilterModel, state: FilterState, s: int, inertia: tuple[Floats, Floats], scratch: Scratch
 ) -> None:
-    """Integrate the increments (5, 3) of a slot; sets its transition, corrected angles (5, 3) and mean force (3,)."""
+    """Integrate the increments of a slot, (5, 3) each; sets its transition, corrected angles and mean force."""
+    angle_rad, velocity_m_s = inertia
+    angles, force = scratch.angles, scratch.force
     bias, dt, lost = state.bias[s], model.tick_s, state.status[s, 0] == LOST
+    scratch.transition[:] = 0.0
     force[:] = 0.0
     for k in range(TICKS_PER_SLOT):
         before, after = state.motion[s, k], state.motion[s, k + 1]
@@ -123,12 +115,12 @@ def predict_slot(
             velocity_m_s[k, 1] - bias[4] * dt,
             velocity_m_s[k, 2] - bias[5] * dt,
         )
-        gained = integrate(before, (angles[k, 0], angles[k, 1], angles[k, 2]), velocity, dt, after)
+        gained = integrate(before, as_vector(angles[k]), velocity, dt, after)
         if state.status[s, 1] == 1:
             after[:6] = before[:6]
-        add_tick(transition, attitude(before), gained, dt)
+        add_tick(scratch.transition, attitude(before), gained, dt)
         if lost:
-            add_force(search.path[s], gained[0], gained[1], gained[2], dt)
+            add_force(state.search.path[s], gained[0], gained[1], gained[2], dt)
         for i in range(3):
             force[i] += gained[i] / (TICKS_PER_SLOT * dt)
             state.turn_rad_s[s, i] = angles[k, i] / dt
@@ -136,16 +128,14 @@ def predict_slot(
 
 
 @compiled
-def add_slot_noise(
-    model: FilterModel, covariance: Floats, angles: Floats, force: Floats, inertia: tuple[Floats, Floats]
-) -> None:
+def add_slot_noise(model: FilterModel, covariance: Floats, inertia: tuple[Floats, Floats], scratch: Scratch) -> None:
     """Add the noise of the sensors, and that of scale and misalignment, which grows with the motion of the slot.
 
     A sensor at its limit measures too little, by an unknown part of the limit.
     Such an error keeps its sign while the motion goes on, so its density is its variance times a correlation time.
     Where the station turns, gravity changes its place among the axes, and so the accelerometers' apparent bias.
     """
-    duration = TICKS_PER_SLOT * model.tick_s
+    duration, angles, force = TICKS_PER_SLOT * model.tick_s, scratch.angles, scratch.force
     turn, change = 0.0, force[0] ** 2 + force[1] ** 2 + (force[2] + GRAVITY_M_S2) ** 2
     for i in range(3):
         total = 0.0
@@ -177,21 +167,13 @@ def count_at_limit(increments: Floats, limit: float) -> int:
 
 
 @compiled
-def arrival(
-    model: FilterModel,
-    ranging: RangingModel,
-    motion: Floats,
-    angles: Floats,
-    distance_m: float,
-    arm_m: Floats,
-    at: Floats,
-) -> float:
+def arrival(model: FilterModel, motion: Floats, angles: Floats, distance_m: float, arm_m: Floats, at: Floats) -> float:
     """Set `at` (10,) to position of the inertial unit, microphone from it, and z axis, when a sound arrives.
 
     `motion` (6, 10) has the slot's ticks, `angles` (5, 3) the turns between them. Returns the time until the slot's end
     [s]. Positions between ticks are cubic.
     """
-    ticks = min(max(distance_m / ranging.speed_m_s / model.tick_s, 0.0), TICKS_PER_SLOT - 1e-9)
+    ticks = min(max(distance_m / model.ranging.speed_m_s / model.tick_s, 0.0), TICKS_PER_SLOT - 1e-9)
     k = int(ticks)
     u = ticks - k
     before, after = motion[k], motion[k + 1]
@@ -208,21 +190,10 @@ def arrival(
 
 
 @compiled
-def correct(
-    model: FilterModel,
-    ranging: RangingModel,
-    state: FilterState,
-    search: Search,
-    s: int,
-    slot: int,
-    emitter: int,
-    range_m: Floats,
-    angles: Floats,
-    force: Floats,
-    vectors: Floats,
-) -> None:
+def correct(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, scratch: Scratch) -> None:
     """Correct a station with the ranges (2,) of a slot, one after the other; NaN where nothing was heard."""
-    covariance, motion = state.covariance[s], state.motion[s]
+    ranging, covariance, motion, force = model.ranging, state.covariance[s], state.motion[s], scratch.force
+    emitter, vectors = slot % len(ranging.emitter_m), scratch.vectors
     error, slope, column, rest = vectors[0], vectors[1], vectors[2], vectors[3]
     error[:] = 0.0
     received, rejected = 0, 0
@@ -231,7 +202,7 @@ def correct(
         if np.isnan(range_m[m]):
             continue
         received += 1
-        lag = arrival(model, ranging, motion, angles, range_m[m], ranging.arm_m[m], at)
+        lag = arrival(model, motion, scratch.angles, range_m[m], model.ranging.arm_m[m], at)
         x = at[0] + at[3] - ranging.emitter_m[emitter, 0]
         y = at[1] + at[4] - ranging.emitter_m[emitter, 1]
         z = at[2] + at[5] - ranging.emitter_m[emitter, 2]
@@ -290,29 +261,19 @@ def inject(model: FilterModel, state: FilterState, s: int, error: Floats) -> Non
 
 
 @compiled
-def search_slot(
-    model: FilterModel,
-    ranging: RangingModel,
-    state: FilterState,
-    search: Search,
-    s: int,
-    slot: int,
-    emitter: int,
-    range_m: Floats,
-    angles: Floats,
-    force: Floats,
-) -> None:
+def search_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, scratch: Scratch) -> None:
     """Collect the ranges (2,) of a slot for a station that is lost, and try a fix."""
-    motion, path, slot_s = state.motion[s], search.path[s], TICKS_PER_SLOT * model.tick_s
+    search, force, slot_s = state.search, scratch.force, TICKS_PER_SLOT * model.tick_s
+    motion, path = state.motion[s], search.path[s]
     at = np.empty(9)
     received = 0
     for m in range(len(range_m)):
         if np.isnan(range_m[m]):
             continue
         received += 1
-        lag = arrival(model, ranging, motion, angles, range_m[m], ranging.arm_m[m], at)
+        lag = arrival(model, motion, scratch.angles, range_m[m], model.ranging.arm_m[m], at)
         row = search.heard[s, search.stored[s] % search.heard.shape[1]]
-        row[0], row[1], row[11] = path[6] - lag, range_m[m], emitter
+        row[0], row[1], row[11] = path[6] - lag, range_m[m], slot % len(model.ranging.emitter_m)
         for k in range(3):
             # The path at the arrival, back from the slot's end by the slot's mean force.
             row[2 + k] = path[k] - path[3 + k] * lag + 0.5 * force[k] * lag * lag
@@ -328,7 +289,7 @@ def search_slot(
     state.status[s, 5] = 0
     now = motion[TICKS_PER_SLOT].copy()
     trial = covariance.copy()
-    if not fix(ranging, search, s, model.window_s, now, trial):
+    if not fix(model.ranging, search, s, model.window_s, now, trial):
         return
     if position_sigma_m(trial) > _FIX_SIGMA_M or attitude_sigma_rad(trial) > _FIX_SIGMA_RAD:
         return

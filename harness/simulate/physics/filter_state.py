@@ -3,11 +3,34 @@
 from typing import NamedTuple
 
 from harness.core.arrays import Floats, Ints
+from harness.core.compiled import compiled
+from harness.simulate.physics.sound import level_db, noise_factor
+
+
+class RangingModel(NamedTuple):
+    """Constants of all stations, in the tracker's frame."""
+
+    emitter_m: Floats
+    """(J, 3) positions."""
+    normal: Floats
+    """(J, 3) unit vectors along which the emitters send."""
+    arm_m: Floats
+    """(M, 3) positions of the microphones from the inertial unit, in the station's axes."""
+    speed_m_s: float
+    """Assumed speed of sound."""
+    absorption_db_per_m: float
+    range_noise_m: float
+    """Standard deviation of a range at 2 m on the axes."""
+    range_scale: float
+    """Standard deviation of the scale of a range."""
+    survey_m: float
+    """Standard deviation of an emitter's position."""
 
 
 class FilterModel(NamedTuple):
     """Constants of the filter, shared by all stations."""
 
+    ranging: RangingModel
     tick_s: float
     lever_m: Floats
     """(3,) inertial unit in the station's axes [m]."""
@@ -29,6 +52,21 @@ class FilterModel(NamedTuple):
     """Time whose ranges make a fix."""
     best_sigma_m: float
     """Standard deviation of the position up to which the quality is 1."""
+
+
+class Search(NamedTuple):
+    """What S lost stations have collected."""
+
+    heard: Floats
+    """(S, N, 12) ranges in a ring, the latest of the window: three turns of emitters, within the limits above."""
+    stored: Ints
+    """(S,) ranges stored since the loss."""
+    path: Floats
+    """(S, 7) double and single integral of the specific force since the loss [m], [m/s], and its duration [s]."""
+    gravity: Floats
+    """(S, 5) running mean of the specific force [m/s^2], its variance, and the number of slots in them."""
+    tilt_variance: Floats
+    """(S,) variance of the attitude's tilt about each horizontal axis [rad^2]."""
 
 
 class FilterState(NamedTuple):
@@ -55,6 +93,22 @@ class FilterState(NamedTuple):
     """(S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
     nis: Floats
     """(S, 2) sum of normalised squared innovations of accepted ranges since the fix, and their number."""
+    search: Search
+
+
+class Scratch(NamedTuple):
+    """Memory for one slot of one station."""
+
+    transition: Floats
+    """(9, 9) of the slot, see `strapdown.add_tick`."""
+    product: Floats
+    """(9, 15) for `strapdown.propagate`."""
+    vectors: Floats
+    """(4, 15) error, slope, column and rest, see `strapdown.update`."""
+    angles: Floats
+    """(5, 3) corrected turns between the slot's ticks [rad]."""
+    force: Floats
+    """(3,) the slot's mean specific force in the tracker's axes [m/s^2]."""
 
 
 class Outputs(NamedTuple):
@@ -74,3 +128,18 @@ class Outputs(NamedTuple):
     """(E, S, 3) angular velocity in the tracker's axes."""
     report: Floats
     """(E, S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
+
+
+@compiled
+def range_variance(
+    model: RangingModel, emitter: int, distance_m: float, x: float, y: float, z: float, cos_station: float
+) -> float:
+    """Variance of a range [m^2] at a distance, in the direction (x, y, z) from the emitter to the microphone.
+
+    `cos_station` is the cosine of the angle between the station's z axis and the direction to the emitter.
+    """
+    normal = model.normal[emitter]
+    cos_emitter = normal[0] * x + normal[1] * y + normal[2] * z
+    level = level_db(distance_m, cos_emitter, cos_station, model.absorption_db_per_m)
+    noise = model.range_noise_m * noise_factor(level, model.absorption_db_per_m)
+    return noise * noise + (model.range_scale * distance_m) ** 2 + model.survey_m**2

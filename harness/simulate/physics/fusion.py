@@ -11,30 +11,21 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.names import Name
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import CheckedFields, Name, Range
 from harness.errors import ShapeError
-from harness.simulate.physics.acquisition import (
-    FIRST_TILT_VARIANCE,
-    HEARD,
-    LEAST_WINDOW_SLOTS,
-    LONGEST_WINDOW_SLOTS,
-    Search,
-)
-from harness.simulate.physics.enhancement import MODES
-from harness.simulate.physics.error_state import ERRORS
+from harness.simulate.physics.acquisition import FIRST_TILT_VARIANCE, HEARD, LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS
 from harness.simulate.physics.filter import advance
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
+from harness.simulate.physics.filter_record import MODES
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, RangingModel, Search
 from harness.simulate.physics.inertial import Inertial, InertialErrors
-from harness.simulate.physics.ranging_model import RangingModel
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
-from harness.simulate.physics.strapdown import STATE
+from harness.simulate.physics.strapdown import ERRORS, STATE
 from harness.simulate.physics.tracking_state import CONFIRMING_SLOTS, freeze, set_bias_covariance
 
 
 @dataclass(frozen=True)
-class Fusion:
+class Fusion(CheckedFields):
     """What the device's filter assumes, when it gives a station up, and the settings of each station."""
 
     gate: Annotated[float, Range(0.5, 100.0)] = 4.0
@@ -64,9 +55,6 @@ class Fusion:
     enhancement: dict[Name, Annotated[int, Range(0, 2)]] = field(default_factory=dict)
     """Station -> perceptual enhancement (`MF`); 0 for the others (docs/is900.md 4.2)."""
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 class FusionFilter:
     """The filters of S stations, which advance over blocks of slots; results do not depend on the blocks' size.
@@ -90,7 +78,7 @@ class FusionFilter:
         window = min(max(3 * emitters, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
         second = max(round(1.0 / slot_s), 1)
         self.stations = tuple(stations)
-        self.ranging = RangingModel(
+        ranging = RangingModel(
             np.array(emitter_m, dtype=float),
             np.array(normal, dtype=float),
             np.array(sound.microphones_m) - lever,
@@ -102,6 +90,7 @@ class FusionFilter:
         )
         gyroscope, accelerometer = inertial.gyroscope, inertial.accelerometer
         self.model = FilterModel(
+            ranging=ranging,
             tick_s=1.0 / schedule.tick_hz,
             lever_m=lever,
             gate=fusion.gate,
@@ -119,8 +108,7 @@ class FusionFilter:
             window_s=(window + 0.5) * slot_s,
             best_sigma_m=fusion.quality_sigma_m,
         )
-        self.state = _initial_state(len(self.stations), max(second, LEAST_WINDOW_SLOTS))
-        self.search = _initial_search(len(self.stations), MICROPHONES * (window + 1))
+        self.state = _initial_state(len(self.stations), max(second, LEAST_WINDOW_SLOTS), MICROPHONES * (window + 1))
         for s in range(len(self.stations)):
             set_bias_covariance(self.model, self.state.covariance[s])
             freeze(self.state, s)
@@ -142,7 +130,7 @@ class FusionFilter:
             if array.shape != shape:
                 raise ShapeError("FusionFilter", name, array.shape, str(shape))
         angle, velocity, ranges = (np.ascontiguousarray(a, dtype=float) for a in (angle_rad, velocity_m_s, range_m))
-        advance(self.model, self.ranging, self.state, self.search, first_slot, angle, velocity, ranges, outputs)
+        advance(self.model, self.state, first_slot, angle, velocity, ranges, outputs)
 
 
 def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
@@ -168,7 +156,7 @@ def _bias_variance(errors: InertialErrors) -> float:
     return errors.turn_on**2 + errors.bias_instability**2
 
 
-def _initial_state(stations: int, slots: int) -> FilterState:
+def _initial_state(stations: int, slots: int, ranges: int) -> FilterState:
     motion = np.zeros((stations, TICKS_PER_SLOT + 1, STATE))
     motion[:, :, 6] = 1.0
     return FilterState(
@@ -182,14 +170,11 @@ def _initial_state(stations: int, slots: int) -> FilterState:
         counts=np.zeros((2, stations, slots), dtype=np.int64),
         report=np.zeros((stations, 4)),
         nis=np.zeros((stations, 2)),
-    )
-
-
-def _initial_search(stations: int, ranges: int) -> Search:
-    return Search(
-        heard=np.zeros((stations, ranges, HEARD)),
-        stored=np.zeros(stations, dtype=np.int64),
-        path=np.zeros((stations, 7)),
-        gravity=np.zeros((stations, 5)),
-        tilt_variance=np.full(stations, FIRST_TILT_VARIANCE),
+        search=Search(
+            heard=np.zeros((stations, ranges, HEARD)),
+            stored=np.zeros(stations, dtype=np.int64),
+            path=np.zeros((stations, 7)),
+            gravity=np.zeros((stations, 5)),
+            tilt_variance=np.full(stations, FIRST_TILT_VARIANCE),
+        ),
     )

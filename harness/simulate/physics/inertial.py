@@ -10,7 +10,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import as_tuple, quaternion_product, rotate, rotation_vector
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import CheckedFields, Range
 from harness.core.seeds import generator
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.readings import GRAVITY_M_S2
@@ -21,7 +21,7 @@ Limit = Annotated[float, Range(1.0, 1e6)]
 
 
 @dataclass(frozen=True)
-class InertialErrors:
+class InertialErrors(CheckedFields):
     """Errors of three gyroscopes or three accelerometers; x stands for rad or m/s."""
 
     white: Spread
@@ -40,9 +40,6 @@ class InertialErrors:
     """Standard deviation of each axis's angles to the station's axes, for a session [rad]."""
     limit: Limit
     """Largest measured value on each axis [x/s]."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ class Accelerometer(InertialErrors):
 
 
 @dataclass(frozen=True)
-class Inertial:
+class Inertial(CheckedFields):
     """The inertial unit of a station."""
 
     rate_hz: Annotated[float, Range(100.0, 2000.0)] = 400.0
@@ -83,9 +80,6 @@ class Inertial:
     """Position of the inertial unit in the station's axes [m] [choice]."""
     gyroscope: Gyroscope = field(default_factory=Gyroscope)
     accelerometer: Accelerometer = field(default_factory=Accelerometer)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 def true_increments(motion: TrackerMotion, lever_m: Floats) -> tuple[Floats, Floats]:

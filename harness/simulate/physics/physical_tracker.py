@@ -10,10 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.hearing import ENOUGH_EMITTERS
+from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.filter_readings import FilterReadings, empty_readings
-from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import InertialUnit, true_increments
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource
@@ -22,6 +20,7 @@ from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
+from harness.simulate.readings import FilterReadings
 
 BLOCK_SLOTS = 160
 """Slots of a block: two seconds."""
@@ -72,32 +71,29 @@ class PhysicalTracker:
         self._first_slot = -lead_in_slots(physics)
         self._with_body = sight is not None
 
-    def measure(self, time_s: Floats, *, with_motion: bool = False) -> FilterReadings:
-        """Readings at the times (E, S) of a take, ascending for each station and not before 0 [s].
-
-        `with_motion` also keeps what prediction and enhancement need.
-        """
+    def measure(self, time_s: Floats) -> FilterReadings:
+        """Readings at the times (E, S) of a take, ascending for each station and not before 0 [s]."""
         tick_hz = self.schedule.tick_hz
         tick = np.floor(time_s * tick_hz).astype(np.int64)
-        last_slot = int(tick.max()) // TICKS_PER_SLOT
-        out = empty_readings(time_s.shape, with_motion)
+        outputs = empty_outputs(tick, time_s * tick_hz - tick)
         hearing = _Hearing(self.schedule.emitters, time_s.shape[1])
-        first = self._first_slot
-        while first <= last_slot:
-            slots = min(BLOCK_SLOTS, last_slot + 1 - first)
-            motion, ranges = self._advance_true(first, slots)
+        end = int(tick.max()) // TICKS_PER_SLOT + 1
+        for first in range(self._first_slot, end, BLOCK_SLOTS):
+            motion, ranges = self._advance_true(first, min(BLOCK_SLOTS, end - first))
             angle_rad, velocity_m_s = self.unit.measure(*true_increments(motion, self._lever_m))
-            begin, end = first * TICKS_PER_SLOT, (first + slots) * TICKS_PER_SLOT
-            within = (tick >= begin) & (tick < end)
-            rows = np.nonzero(within.any(axis=1))[0]
-            some = slice(int(rows[0]), int(rows[-1]) + 1) if len(rows) else slice(0, 0)
-            outputs = empty_outputs(tick[some], time_s[some] * tick_hz - tick[some])
             self.fusion.advance(first, angle_rad, velocity_m_s, ranges.range_m, outputs)
-            _store(out, outputs, some, within[some])
             hearing.add(first, ranges)
-            first += slots
-        out.hearing_share, out.echo_share = hearing.shares()
-        return out
+        quality, _, received, rejected = np.moveaxis(outputs.report, -1, 0)
+        position_m, turned = (
+            np.ascontiguousarray(np.moveaxis(modes, 2, 0))
+            for modes in (outputs.position_m, outputs.tracker_from_station)
+        )
+        return FilterReadings(
+            *(position_m[0], turned[0], np.ascontiguousarray(quality)),
+            *(received.astype(np.int64), rejected.astype(np.int64)),
+            *(outputs.velocity_m_s, outputs.turn_rad_s, position_m[1:], turned[1:]),
+            *hearing.shares(),
+        )
 
     def _advance_true(self, first: int, slots: int) -> tuple[TrackerMotion, Ranges]:
         """True motion and ranges of a block."""
@@ -139,20 +135,3 @@ class _Hearing:
 
     def shares(self) -> tuple[Floats, Floats]:
         return self._enough / max(self._slots, 1), self._echoes / np.maximum(self._ranges, 1.0)
-
-
-def _store(out: FilterReadings, outputs: Outputs, some: slice, within: Bools) -> None:
-    """Copy the outputs of the rows `some` whose ticks lie in the block."""
-    out.position_m[some][within] = outputs.position_m[:, :, 0][within]
-    out.tracker_from_station[some][within] = outputs.tracker_from_station[:, :, 0][within]
-    quality, _, received, rejected = np.moveaxis(outputs.report, -1, 0)
-    out.quality[some][within] = quality[within]
-    out.ranges_received[some][within] = received[within]
-    out.ranges_rejected[some][within] = rejected[within]
-    if out.motion is not None:
-        out.motion.velocity_m_s[some][within] = outputs.velocity_m_s[within]
-        out.motion.turn_rad_s[some][within] = outputs.turn_rad_s[within]
-        for mode in range(2):
-            out.motion.enhanced_position_m[mode, some][within] = outputs.position_m[:, :, 1 + mode][within]
-            turned = outputs.tracker_from_station[:, :, 1 + mode]
-            out.motion.enhanced_tracker_from_station[mode, some][within] = turned[within]

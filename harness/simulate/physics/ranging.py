@@ -14,16 +14,23 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.simulate.physics.bursts import Bursts
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.echoes import mirror_images, reflection_point
-from harness.simulate.physics.flight import time_of_flight_s
-from harness.simulate.physics.level import level_db, noise_factor, threshold_db
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
+from harness.simulate.physics.sound import (
+    MICROPHONES,
+    Bursts,
+    Sound,
+    level_db,
+    mirror_images,
+    noise_factor,
+    reflection_point,
+    speed_of_sound_m_s,
+    threshold_db,
+    time_of_flight_s,
+)
 
 _EARLY_SHARE = 0.5
 """Share of the microphones that a burst triggers early; the others hear nothing [choice]."""
@@ -52,6 +59,11 @@ class _Law(NamedTuple):
     threshold_db: float
     absorption_db_per_m: float
     reflection_db: float
+
+
+_Paths = tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats, _Law]
+"""For compiled loops: emitter of each slot (F,), positions and normals of the emitters (J, 3), positions and velocities
+of the microphones at the ticks (T+1, S, 2, 3), the stations' z axes (F, S, 3), speed of sound (F, S), and the law."""
 
 
 class Ranging:
@@ -123,13 +135,13 @@ class Ranging:
             air := np.empty((slots, len(self._noise))),
         )
         speed_m_s = self._speed_m_s + air
-        geometry = (emitter, self._position_m, self._normal, position_m, velocity_m_s, facing, speed_m_s, self._law)
-        time_s, level = _direct_sound(*geometry)
+        paths = (emitter, self._position_m, self._normal, position_m, velocity_m_s, facing, speed_m_s, self._law)
+        time_s, level = _direct_sound(paths)
         at_m = position_m[begins]
         self._block_direct(emitter, at_m, qpos, time_s)
         direct = ~np.isnan(time_s)
         if len(self._planes):
-            reflected_s, reflected_db, bounce_m = _reflected_sound(self._planes, self._images_m, time_s, *geometry)
+            reflected_s, reflected_db, bounce_m = _reflected_sound(self._planes, self._images_m, time_s, paths)
             self._block_reflected(emitter, at_m, qpos, reflected_s, bounce_m)
             _earliest(reflected_s, reflected_db, time_s, level)
         echo = ~np.isnan(time_s) & ~direct
@@ -204,17 +216,9 @@ def _path_level(source_m: Floats, leaves: Floats, normal: Floats, at_m: Floats, 
 
 
 @compiled
-def _direct_sound(
-    emitter: Ints,
-    emitter_m: Floats,
-    normal: Floats,
-    position_m: Floats,
-    velocity_m_s: Floats,
-    facing: Floats,
-    speed_m_s: Floats,
-    law: _Law,
-) -> tuple[Floats, Floats]:
+def _direct_sound(paths: _Paths) -> tuple[Floats, Floats]:
     """Time of flight (F, S, 2) and level of the direct sound; NaN where it is not heard, were nothing in its way."""
+    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, law = paths
     slots, stations, microphones = len(emitter), position_m.shape[1], position_m.shape[2]
     time_s = np.full((slots, stations, microphones), np.nan)
     level = np.full((slots, stations, microphones), np.nan)
@@ -236,19 +240,10 @@ def _direct_sound(
 
 @compiled
 def _reflected_sound(
-    planes: Floats,
-    images_m: Floats,
-    direct_s: Floats,
-    emitter: Ints,
-    emitter_m: Floats,
-    normal: Floats,
-    position_m: Floats,
-    velocity_m_s: Floats,
-    facing: Floats,
-    speed_m_s: Floats,
-    law: _Law,
+    planes: Floats, images_m: Floats, direct_s: Floats, paths: _Paths
 ) -> tuple[Floats, Floats, Floats]:
     """Time (F, S, 2, P), level and point of reflection (F, S, 2, P, 3) of each echo where no direct sound is heard."""
+    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, law = paths
     shape = (*direct_s.shape, len(planes))
     time_s, level, bounce_m = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros((*shape, 3))
     for slot in range(shape[0]):

@@ -7,21 +7,20 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.ranges import Range, check_fields
+from harness.core.calibration import Calibration
+from harness.core.ranges import CheckedFields, Range, check_fields
 from harness.errors import BadInput
+from harness.simulate.physics.constellation import Constellation
 
 
 @dataclass(frozen=True)
-class Box:
+class Box(CheckedFields):
     """A piece of furniture: a box whose sides are parallel to the walls."""
 
     centre_m: Annotated[tuple[float, float, float], Range(-100.0, 100.0)]
     """Centre: x and y from the middle of the room, z from the floor [m]."""
     size_m: Annotated[tuple[float, float, float], Range(0.01, 100.0)]
     """Length along x, y and z [m]."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -77,6 +76,15 @@ class PlacedRoom:
         distance_m = np.array([0.0, self.room.height_m, length / 2 - x, length / 2 + x, width / 2 - y, width / 2 + y])
         own = rotations.rotate(rotations.inverse(self.world_from_tracker), normal)
         return np.concatenate([own, (distance_m - np.sum(normal * self.origin_m, axis=1))[:, None]], axis=1)
+
+
+def place_room(
+    room: Room, constellation: Constellation, centre_m: Floats, calibration: Calibration
+) -> tuple[Constellation, PlacedRoom]:
+    """A constellation in the tracker's frame above a point (2,) of the world's floor [m], and the room around it."""
+    placed = PlacedRoom(room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
+    offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
+    return constellation.shifted(rotations.rotate(rotations.inverse(calibration.world_from_tracker), offset_m)), placed
 
 
 def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> None:

@@ -5,7 +5,7 @@ number of ticks. One emitter fires at the beginning of each slot, in a fixed tur
 arrives until the slot's end belongs to it. So no part of the timing depends on which stations are worn.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ TICKS_PER_SLOT = 5
 """At 400 ticks per second a slot takes 12.5 ms, in which sound travels 4.3 m [choice]."""
 
 
-@dataclass(frozen=True)
-class Schedule:
+class Schedule(NamedTuple):
     """The turn of J emitters at a rate of the inertial sensors."""
 
     tick_hz: float
@@ -39,7 +38,3 @@ class Schedule:
         """(slots,) index of the emitter that fires at the beginning of each slot."""
         out: Ints = np.arange(first_slot, first_slot + slots) % self.emitters
         return out
-
-    def slot_of(self, time_s: float) -> int:
-        """Number of the slot that contains a time."""
-        return int(np.floor(time_s * self.tick_hz / TICKS_PER_SLOT))

@@ -6,7 +6,7 @@ from harness.body.humanoid import Body, body_spec
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
-from harness.core.plain_import import plain_import
+from harness.core.working_folder import plain_import
 from harness.simulate.physics.room import PlacedRoom
 
 with plain_import():

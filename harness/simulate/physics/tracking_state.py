@@ -2,22 +2,13 @@
 
 import numpy as np
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.simulate.physics.acquisition import (
-    LOST_TILT_VARIANCE,
-    Search,
-    begin_search,
-)
-from harness.simulate.physics.enhancement import decay
-from harness.simulate.physics.error_state import (
-    MOTION_ERRORS,
-    attitude_sigma_rad,
-    position_sigma_m,
-)
+from harness.simulate.physics.acquisition import LOST_TILT_VARIANCE, begin_search
+from harness.simulate.physics.filter_record import decay
 from harness.simulate.physics.filter_state import FilterModel, FilterState
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
-from harness.simulate.physics.status import CYCLE_SLOTS, DOUBTED, LOST, TRACKING, quality, sum_last
+from harness.simulate.physics.strapdown import MOTION_ERRORS, attitude_sigma_rad, position_sigma_m
 
 CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
 """Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
@@ -33,10 +24,17 @@ _DOUBTED_SIGMA_M = 0.15
 """Standard deviation of the position at which a doubted station needs a new fix [choice]."""
 _COAST_SIGMA_M = 0.5
 """Standard deviation of the position at which a lost station stops coasting [choice]."""
+LOST, CONFIRMING, TRACKING, DOUBTED = 0, 1, 2, 3
+"""Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one; with one whose position
+has become too uncertain. Records show quality 0 for all but the third."""
+CYCLE_SLOTS = 6
+"""Slots whose ranges `MP` counts: at most twelve ranges of two microphones (docs/is900.md 7)."""
+LEAST_QUALITY = 1.0 / 255.0
+"""Quality of a station that tracks: the least that a record tells from lost (docs/is900.md 7)."""
 
 
 @compiled
-def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, slot: int) -> None:
+def finish_slot(model: FilterModel, state: FilterState, s: int, slot: int) -> None:
     """Decide whether a station is lost or confirmed, and what its records report from now on."""
     status, counts, covariance = state.status[s], state.counts, state.covariance[s]
     sigma = position_sigma_m(covariance)
@@ -45,19 +43,19 @@ def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, 
         received = sum_last(counts[0, s], slot, model.judged_slots)
         rejected = sum_last(counts[1, s], slot, model.judged_slots)
         if received >= _FEWEST_JUDGED and rejected > model.reject_share * received:
-            distrust(model, state, search, s)
+            distrust(model, state, s)
         elif status[2] > model.coast_slots:
-            lose(state, search, s, kept_tilt_variance(covariance))
+            lose(state, s, kept_tilt_variance(covariance))
         elif sigma > model.sigma_limit_m:
             doubt(state, s)
     elif status[0] != LOST:
         judged, doubted = status[3] + status[4], status[0] == DOUBTED
         if judged >= CONFIRMING_RANGES and status[4] > _CONFIRMING_REJECTS * judged:
-            distrust(model, state, search, s)
+            distrust(model, state, s)
         elif doubted and (status[2] > model.coast_slots or not sigma < _DOUBTED_SIGMA_M):
-            lose(state, search, s, kept_tilt_variance(covariance))
+            lose(state, s, kept_tilt_variance(covariance))
         elif not doubted and (status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M):
-            lose(state, search, s, LOST_TILT_VARIANCE)
+            lose(state, s, LOST_TILT_VARIANCE)
         elif (
             status[3] >= CONFIRMING_RANGES
             and status[5] >= (CONFIRMING_SLOTS if doubted else model.confirm_slots)
@@ -67,7 +65,7 @@ def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, 
             if state.nis[s, 0] < _CONFIRMED_NIS * state.nis[s, 1]:
                 status[0] = TRACKING
             else:
-                distrust(model, state, search, s)
+                distrust(model, state, s)
     if status[0] == LOST and not sigma < _COAST_SIGMA_M:
         freeze(state, s)
     motion = state.motion[s, TICKS_PER_SLOT]
@@ -82,10 +80,10 @@ def finish_slot(model: FilterModel, state: FilterState, search: Search, s: int, 
 
 
 @compiled
-def lose(state: FilterState, search: Search, s: int, tilt_variance: float) -> None:
+def lose(state: FilterState, s: int, tilt_variance: float) -> None:
     """Declare a station lost."""
     state.status[s, 0] = LOST
-    begin_search(search, s, tilt_variance)
+    begin_search(state.search, s, tilt_variance)
 
 
 @compiled
@@ -105,9 +103,9 @@ def kept_tilt_variance(covariance: Floats) -> float:
 
 
 @compiled
-def distrust(model: FilterModel, state: FilterState, search: Search, s: int) -> None:
+def distrust(model: FilterModel, state: FilterState, s: int) -> None:
     """Declare a station lost whose ranges contradict it: velocity, tilt and biases are then worth nothing either."""
-    lose(state, search, s, LOST_TILT_VARIANCE)
+    lose(state, s, LOST_TILT_VARIANCE)
     freeze(state, s)
     state.bias[s] = 0.0
     set_bias_covariance(model, state.covariance[s])
@@ -133,3 +131,25 @@ def freeze(state: FilterState, s: int) -> None:
     for i in range(3):
         covariance[i, i] = _COAST_SIGMA_M**2
         covariance[6 + i, 6 + i] = LOST_TILT_VARIANCE
+
+
+@compiled
+def sum_last(counts: Ints, slot: int, slots: int) -> int:
+    """Sum of the counts of the last slots, up to `slot`, in a ring (N,) with one entry per slot."""
+    total = 0
+    for k in range(slots):
+        total += counts[(slot - k) % len(counts)]
+    return total
+
+
+@compiled
+def quality(state: int, sigma_m: float, received: int, rejected: int, best_sigma_m: float) -> float:
+    """Quality in 0..1 [choice]: `best_sigma_m` over the position's standard deviation [m], at most 1.
+
+    The share of accepted ranges scales it by 0.5 to 1. A station without a confirmed fix has 0.
+    """
+    if state != TRACKING:
+        return 0.0
+    share = (received - rejected) / received if received > 0 else 0.0
+    precision = min(1.0, best_sigma_m / sigma_m) if sigma_m > 0.0 else 1.0
+    return max(LEAST_QUALITY, precision * (0.5 + 0.5 * share))

@@ -1,4 +1,4 @@
-"""What is worn moves the tracker itself: soft tissue, mount errors and slips, with consistent velocities.
+"""True motion of the stations that a performer wears, and what is worn: soft tissue, mount errors and slips.
 
 The components are those of the statistical noise, with the same draws. Here they act at every tick of the inertial
 sensors, and velocity and turn rate are the derivatives of position and orientation. So a slip needs a duration.
@@ -11,21 +11,28 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.errors import BadInput, UnknownName
+from harness.errors import UnknownName
 from harness.simulate.components.mount import MountSlip
-from harness.simulate.components.soft_tissue import SoftTissueArtefact, free_response, natural_frequency_rad_s
+from harness.simulate.components.soft_tissue import (
+    Skin,
+    SoftTissueArtefact,
+    free_response,
+    natural_frequency_rad_s,
+    tissue_force_m_s2,
+)
 from harness.simulate.noise import Noise
-from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.skin import Skin
+from harness.simulate.physics.motion import TrackerMotion, station_chain, station_states
+from harness.simulate.trajectory import Trajectory
 
 
 class Worn:
     """The worn components of a noise on S stations. It carries state: `apply` takes block after block.
 
     `ends_s` is the last sampling time of the take, by which random slips are timed [s]. UnknownName for a slip of a
-    station that is not worn, BadInput for a slip in no time.
+    station that is not worn. `Noise` refuses slips in no time, whose acceleration is infinite.
     """
 
     def __init__(
@@ -40,7 +47,6 @@ class Worn:
         take: str,
         session: str = "",
     ) -> None:
-        check_slips(noise)
         self._radius_m = skin.radius_m
         self._tissue = None if noise.soft_tissue is None else _Tissue(noise.soft_tissue, skin, tick_hz)
         self._mount: tuple[Floats, Floats] | None = None
@@ -90,13 +96,6 @@ class Worn:
             speed_m_s = np.stack([slip.along_m * pace, swing_m_s * np.cos(angle), swing_m_s * np.sin(angle)], 1)
             _shift(motion, row, offset_m, speed_m_s)
             _roll(motion, row, angle, rate)
-
-
-def check_slips(noise: Noise) -> None:
-    """Raise BadInput for a slip in no time: inertial sensors would measure an infinite acceleration."""
-    slips = (*noise.mount_slip, *(() if noise.strap_slip is None else (noise.strap_slip,)))
-    if any(slip.over_s == 0.0 for slip in slips):
-        raise BadInput("A slip in no time: infinite acceleration.", "Set over_s above 0, such as 0.5.")
 
 
 def minimum_jerk_share(since_s: Floats, over_s: float) -> tuple[Floats, Floats]:
@@ -186,3 +185,30 @@ def _roll(motion: TrackerMotion, row: int | slice, angle_rad: Floats, rate_rad_s
     axis, turn = np.array([1.0, 0.0, 0.0]), motion.tracker_from_station[:, row]
     motion.turn_rad_s[:, row] += rotations.rotate(turn, rate_rad_s[..., None] * axis)
     motion.tracker_from_station[:, row] = rotations.multiply(turn, rotations.exp(angle_rad[..., None] * axis))
+
+
+class BodyMotionSource:
+    """A `TrackerMotionSource`: the stations of a calibration on a trajectory, with what `worn` does to them."""
+
+    def __init__(self, trajectory: Trajectory, calibration: Calibration, worn: Worn) -> None:
+        self.stations = calibration.stations
+        self._trajectory, self._calibration, self._worn = trajectory, calibration, worn
+        self._chain = station_chain(trajectory.body.skeleton, calibration)
+        self._pieces: Floats = np.ascontiguousarray(trajectory.spline.c)
+        self._knots_s: Floats = np.ascontiguousarray(trajectory.spline.x)
+
+    def advance(self, time_s: Floats) -> TrackerMotion:
+        """Motion at the ticks (T+1,) of the next block [s]; BadInput outside the trajectory."""
+        self._trajectory.require_inside(time_s)
+        motion, acceleration_m_s2 = station_states(self._chain, self._pieces, self._knots_s, time_s)
+        force_m_s2 = None
+        if self._worn.on_tissue:
+            force_m_s2 = tissue_force_m_s2(
+                motion.tracker_from_station, acceleration_m_s2, self._calibration, self._chain.tracker_from_world
+            )
+        self._worn.apply(motion, force_m_s2)
+        return motion
+
+    def qpos(self, time_s: Floats) -> Floats:
+        """(F, 55) configurations at F times [s]."""
+        return self._trajectory.qpos(time_s)

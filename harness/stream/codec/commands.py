@@ -5,8 +5,11 @@ functions here end lines with CR LF, as the manuals do. Stations are named by th
 "C".
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+from harness.errors import BadInput
 
 POLL, STREAM, STOP = b"P", b"C", b"c"
 ASCII, BINARY = b"F", b"f"
@@ -26,90 +29,13 @@ LONGEST_LINE = 256
 """Longest command line; the rest is discarded. No command in the sources is half as long [bytes]."""
 
 
-def _line(text: str) -> bytes:
-    return text.encode("ascii") + b"\r\n"
+def station_command(name: str, station: str, values: Iterable[float] = (), decimals: int = 0) -> bytes:
+    """Command that queries something of a station, such as `O`, or sets it to values (docs/is900.md 4).
 
-
-def set_output_list(station: str, items: Sequence[int]) -> bytes:
-    """Command that sets the output list of a station; it has no reply."""
-    return _line(f"O{station}," + ",".join(map(str, items)))
-
-
-def query_output_list(station: str) -> bytes:
-    """Command that queries the output list of a station."""
-    return _line(f"O{station}")
-
-
-def switch_station(station: str, active: bool) -> bytes:
-    """Command that switches a station on or off; it has no reply."""
-    return _line(f"l{station},{int(active)}")
-
-
-def boresight(station: str) -> bytes:
-    """Command that makes the present direction of the station heading 0."""
-    return _line(f"B{station}")
-
-
-def undo_boresight(station: str) -> bytes:
-    """Command that undoes the boresight of a station."""
-    return _line(f"b{station}")
-
-
-def alignment(station: str, origin_cm: Sequence[float], on_x_cm: Sequence[float], on_y_cm: Sequence[float]) -> bytes:
-    """Command that sets a new frame: its origin, a point on its X axis and one on its Y axis, in the present frame
-    [cm].
+    No setter has a reply. Lengths are in cm or inches, as the device is set.
     """
-    return _line(f"A{station}," + ",".join(f"{value:.2f}" for value in (*origin_cm, *on_x_cm, *on_y_cm)))
-
-
-def undo_alignment(station: str) -> bytes:
-    """Command that resets the frame of a station."""
-    return _line(f"R{station}")
-
-
-def query_geometry(station: str, letter: str) -> bytes:
-    """Command that queries alignment (`A`), boresight reference angles (`G`) or tip offset (`N`)."""
-    return _line(f"{letter}{station}")
-
-
-def set_geometry(station: str, letter: str, values: Sequence[float]) -> bytes:
-    """Command that sets the boresight reference angles (`G`) [deg] or the tip offset (`N`) [cm]."""
-    return _line(f"{letter}{station}," + ",".join(f"{value:.3f}" for value in values))
-
-
-def query_prediction(station: str) -> bytes:
-    """Command that queries the prediction interval."""
-    return _line(f"Mp{station}")
-
-
-def query_sensitivity(station: str) -> bytes:
-    """Command that queries the sensitivity to rotation."""
-    return _line(f"MQ{station}")
-
-
-def query_station(station: str) -> bytes:
-    """Command that queries the station record: filter and compass."""
-    return _line(f"Ms{station}")
-
-
-def prediction(station: str, ahead_ms: int) -> bytes:
-    """Command that sets the prediction interval, 0 to 50 ms."""
-    return _line(f"Mp{station},{ahead_ms}")
-
-
-def enhancement(station: str, mode: int) -> bytes:
-    """Command that sets the filter: 0 most exact, 1 less jitter, 2 for head displays."""
-    return _line(f"MF{station},{mode}")
-
-
-def sensitivity(station: str, level: int) -> bytes:
-    """Command that sets the sensitivity to rotation, 1 to 5."""
-    return _line(f"MQ{station},{level}")
-
-
-def serial_line(baud: int) -> bytes:
-    """Command that sets the device's baud rate [bit/s], with 8N1 and no handshake."""
-    return _line(f"o{baud // 100},N,8,0")
+    texts = [f"{name}{station}", *(f"{value:.{decimals}f}" for value in values)]
+    return ",".join(texts).encode("ascii") + b"\r\n"
 
 
 @dataclass(frozen=True)
@@ -164,3 +90,80 @@ class CommandReader:
     def _clear(self) -> None:
         self._line.clear()
         self._cut = False
+
+
+@dataclass(frozen=True)
+class DeviceCommand:
+    """One command of the protocol. Control characters are written `^K`."""
+
+    name: str
+    danger: str = ""
+    """Why a person must allow it; "" where it only reads, or sets what ends when the device is switched off."""
+    set_danger: str = ""
+    """Why a person must allow it where values follow; "" as above, or for the same reason as without values."""
+
+
+_HARMLESS = (
+    "P C c F f U u S ^Q ^S O l A R G B b H N V x v MS Ms Mp MF MQ MH Mh MT Mt MZ MBI MBF MB MG MGP MGS MP MU Mg "
+    "ML0 ML1 MLB ME ME0 ME1 MLogState MLogSend MSchAlg MInfoSystem"
+)
+_OTHER_PRODUCT = "belongs to another product; no source says what an IS-900 does with it"
+_EMITTERS = "changes the emitter constellation, on which all tracking rests"
+_DANGERS = {
+    "^K": "writes the device's memory",
+    "^Y": "restarts the device",
+    "W": "resets every setting of the device",
+    "o": "changes the line, and may end the connection",
+    "T e t Y MCM MCm MCc MCi": _OTHER_PRODUCT,
+    "MCf MCC MCe MCx": _EMITTERS,
+    "MEC MLogOpen MLogClose MLogClear": "changes or erases what the device has stored",
+    "MSystemTest1 MSystemTest2": "runs a self-test; one of them is said to free a device that hangs",
+}
+"""Commands that a person must allow, and why."""
+_SET_DANGERS = {
+    "MCF": _EMITTERS,
+    "MCI": _OTHER_PRODUCT,
+    "MEthIp MEthUdp MEthUdpPort": "changes the device's network settings",
+    "MConfigLockMode": "locks or unlocks the device's configuration",
+}
+"""Commands that a person must allow where values follow."""
+_UNKNOWN = "is in no source"
+DEVICE_COMMANDS = {
+    **{name: DeviceCommand(name) for name in _HARMLESS.split()},
+    **{name: DeviceCommand(name, danger) for names, danger in _DANGERS.items() for name in names.split()},
+    **{name: DeviceCommand(name, "", danger) for names, danger in _SET_DANGERS.items() for name in names.split()},
+}
+"""Commands by name."""
+_LONGEST_FIRST = sorted(DEVICE_COMMANDS, key=len, reverse=True)
+_ARGUMENT = re.compile(r"[0-9A-Ca-c*., +-]*")
+"""Stations and numbers; other letters make a command that is in no source."""
+_SETS_WITHOUT_COMMA = ("MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode")
+
+
+def parse_command(text: str) -> Command:
+    """Parse one command as a person writes it: `O1,2,4,1`, `S`, or `^K`. Raises BadInput unless it is exactly one."""
+    if not (text.isascii() and text.isprintable()) or not 0 < len(text) <= LONGEST_LINE:
+        raise BadInput(
+            f"{text[:40]!r} is no command.",
+            f"Give 1 to {LONGEST_LINE} printable ASCII characters, and ^K, ^Q, ^S or ^Y for control characters.",
+        )
+    control = re.fullmatch(r"\^([KQSY])", text)
+    data = bytes([ord(control[1]) - ord("@")]) if control else text.encode("ascii")
+    commands = CommandReader().feed(data + b"\r")
+    if len(commands) != 1:
+        names = " and ".join(repr(command.line.decode("ascii")) for command in commands)
+        raise BadInput(f"{text!r} is {len(commands)} commands: {names}.", "Send each by itself.")
+    return commands[0]
+
+
+def find_danger(command: Command) -> str:
+    """Return why a person must allow this command; "" where nobody must."""
+    text = command.line.decode("ascii")
+    if command.immediate:
+        return DEVICE_COMMANDS[text if text.isprintable() else f"^{chr(ord(text) + ord('@'))}"].danger
+    name = next((name for name in _LONGEST_FIRST if text.startswith(name)), None)
+    if name is None or not _ARGUMENT.fullmatch(text, len(name)):
+        return _UNKNOWN
+    argument = text[len(name) :]
+    sets = "," in argument or (name in _SETS_WITHOUT_COMMA and argument != "")
+    return (sets and DEVICE_COMMANDS[name].set_danger) or DEVICE_COMMANDS[name].danger

@@ -1,7 +1,7 @@
 """The items that a data record may contain, as a table (docs/is900.md 5.1).
 
 A record is a row of a structured numpy type with one field per item, whether it was binary or ASCII. The type is the
-binary layout itself; `ascii_records` converts text to the same rows.
+binary layout itself; `records` converts text to the same rows.
 """
 
 from collections.abc import Iterable

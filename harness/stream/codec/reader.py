@@ -2,17 +2,16 @@
 
 from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, Ints
-from harness.core.names import Label
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.ranges import Label
 from harness.errors import BadInput
 from harness.stream.codec.assembler import FrameAssembler
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.clock import ClockUnwrapper
-from harness.stream.codec.datagram_decoder import DatagramDecoder
+from harness.stream.codec.datagram import DatagramDecoder
 from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, position_range_m
 from harness.stream.codec.plausibility import PlausibilityCheck
@@ -20,6 +19,22 @@ from harness.stream.codec.readings import Readings, decode_readings, has_quality
 from harness.stream.codec.records import RecordFormat, Table
 from harness.stream.codec.replies import ParsedReply, TrackingStatus, parse_reply
 from harness.stream.frame import TrackerFrame
+
+
+@dataclass(frozen=True, eq=False)
+class ByteCapture:
+    """K consecutive chunks of received bytes."""
+
+    data: bytes
+    ends: Ints
+    """(K,) number of bytes received up to the end of each chunk."""
+    received_s: Floats
+    """(K,) host clock when each chunk was received [s]."""
+
+    def __post_init__(self) -> None:
+        freeze(self, np.int64, ends=("K",))
+        freeze(self, received_s=("K",))
+
 
 LEAST_RATE_HZ, MOST_RATE_HZ = 1e-3, 1e4
 """Limits of the records per second of a station [choice]."""
@@ -68,6 +83,24 @@ class WireFormat:
             )
 
 
+class ReadingsDecoder:
+    """Decodes the records of a session: their numbers, continuous device time, and which of them are suspect."""
+
+    def __init__(self, wire: WireFormat, zeroed_s: float | None = None) -> None:
+        """`zeroed_s` is the host time at which the device's clock was set to zero, if known [s]."""
+        self._wire, self.clock = wire, ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
+        self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
+
+    def __call__(self, table: Table, received_s: Floats, lost: Bools | None = None) -> tuple[Readings, Floats]:
+        """The readings of a table (N,), and their stamps (N,) [s]. `lost` stations (S,) have quality 0."""
+        raw = decode_readings(table, received_s, self._wire.characters, self._wire.settings)
+        measured_s = self.clock.unwrap(raw.measured_s, received_s, raw.station)
+        suspect = raw.suspect | np.isnan(measured_s) if 21 in self._wire.items else raw.suspect
+        quality = raw.quality if lost is None else np.where(lost[raw.station], 0.0, raw.quality)
+        readings = replace(raw, measured_s=measured_s, quality=quality, suspect=suspect)
+        return self._plausibility.mark_suspect(readings), raw.measured_s
+
+
 class FrameReader:
     """Converts bytes to frames as they become complete, and counts everything else.
 
@@ -90,10 +123,9 @@ class FrameReader:
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
         self._decoder = make_decoder(wire)
-        self._clock = ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
-        self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
+        self._decode_readings = ReadingsDecoder(wire, zeroed_s)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
-        self._has_stamps, self._has_quality = 21 in wire.items, has_quality(wire.items)
+        self._has_quality = has_quality(wire.items)
         self._lost: Bools | None = None
         """(S,) lost stations by the latest reply to `MP`, where records have no quality."""
         self._deferred: list[tuple[Table, Floats]] = []
@@ -113,7 +145,7 @@ class FrameReader:
     @property
     def clock_resets(self) -> int:
         """Number of times the device's clock was reset."""
-        return self._clock.resets
+        return self._decode_readings.clock.resets
 
     def feed(self, data: bytes, received_s: float) -> list[TrackerFrame]:
         """Return the frames that these bytes, received at `received_s` [s], complete."""
@@ -201,17 +233,11 @@ class FrameReader:
             self._lost = np.array([character in reply.lost for character in self.wire.characters])
 
     def _readings(self, table: Table, received_s: Floats) -> Readings:
-        raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
-        measured_s = self._clock.unwrap(raw.measured_s, received_s, raw.station)
-        suspect = raw.suspect | np.isnan(measured_s) if self._has_stamps else raw.suspect
-        quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
-        position_m, quaternion = raw.position_m, raw.tracker_from_station
+        readings, _ = self._decode_readings(table, received_s, self._lost)
         if position_range_m(self.wire.items):
-            beyond = np.isnan(position_m[:, 0]) & (quality > 0.0)
-            self.out_of_range += np.bincount(raw.station[beyond], minlength=len(self.wire.stations))
-        return self._plausibility.mark_suspect(
-            Readings(raw.station, received_s, measured_s, position_m, quaternion, quality, suspect)
-        )
+            beyond = np.isnan(readings.position_m[:, 0]) & (readings.quality > 0.0)
+            self.out_of_range += np.bincount(readings.station[beyond], minlength=len(self.wire.stations))
+        return readings
 
 
 def make_decoder(wire: WireFormat) -> Decoder | DatagramDecoder:
@@ -242,3 +268,102 @@ class CaptureStream:
     def close(self) -> None:
         """End the iteration."""
         self._closed = True
+
+
+SILENCE_PERIODS = 2.0
+"""Every unfinished frame is overdue after this many periods without a byte."""
+
+
+class ContinuousFrameReader:
+    """Frames of consecutive sessions: host times strictly increase, and device time never steps back.
+
+    Each configuration resets the device's clock. Device time then continues by the host's clock from the first bytes
+    that arrive, because a replay knows that moment as exactly as the live driver.
+    """
+
+    def __init__(self) -> None:
+        self.device_zero_s = 0.0
+        """The value of `measured_s` at which the device's own clock is zero [s]."""
+        self._reader: FrameReader | None = None
+        self._period_s = 0.0
+        self._last_byte_s = self._last_frame_s = -np.inf
+        """Host time of the last byte or configuration, and of the last frame [s]."""
+        self._is_new = False
+        """True until the first bytes after a configuration."""
+        self._device_s = 0.0
+        """Latest device time of any frame [s]."""
+        self._totals = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets", "out_of_range"), 0)
+        """Counts of the earlier sessions."""
+        self._frames = 0
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of sessions, frames, records, garbage bytes, clock resets and positions beyond the list's range."""
+        reader = self._reader
+        names = [name for name in self._totals if name != "sessions"]
+        current = {} if reader is None else {name: int(np.sum(getattr(reader, name))) for name in names}
+        return {"frames": self._frames} | {name: n + current.get(name, 0) for name, n in self._totals.items()}
+
+    @property
+    def reader(self) -> FrameReader | None:
+        """Reader of the present session; None before the first configuration."""
+        return self._reader
+
+    @property
+    def silent_from_s(self) -> float:
+        """When every unfinished frame is overdue if no byte arrives before [s]."""
+        return self._last_byte_s + SILENCE_PERIODS * self._period_s
+
+    def begin_session(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
+        """Start a session: later bytes have this format, and the device's clock starts at zero if `wire` says so.
+
+        Returns the unfinished frame of the session before.
+        """
+        frames = self.finish()
+        self._totals["sessions"] += 1
+        self._reader, self._period_s = FrameReader(wire, now_s if wire.zeroed else None), 1.0 / wire.rate_hz
+        self._last_byte_s, self._is_new = now_s, True
+        return frames
+
+    def feed(self, data: bytes, now_s: float) -> list[TrackerFrame]:
+        """Return the frames that these bytes complete; none before the first configuration."""
+        return self.feed_all(ByteCapture(data, np.array([len(data)]), np.array([now_s])))
+
+    def feed_all(self, capture: ByteCapture) -> list[TrackerFrame]:
+        """Return the frames that one or more chunks complete."""
+        if self._reader is None or not len(capture.ends):
+            return []
+        if self._is_new and self._frames:
+            self.device_zero_s = self._device_s + max(float(capture.received_s[0]) - self._last_frame_s, 0.0)
+        self._is_new = False
+        self._last_byte_s = float(capture.received_s[-1])
+        return self._to_stream_time(self._reader.feed_all(capture))
+
+    def expire(self, now_s: float) -> list[TrackerFrame]:
+        """Return the frame that is overdue at `now_s` [s].
+
+        Call it only after a read that found nothing: bytes that a busy host has not read yet must not cost their frame.
+        """
+        return [] if self._reader is None else self._to_stream_time(self._reader.expire(now_s))
+
+    def finish(self) -> list[TrackerFrame]:
+        """End the session and return its unfinished frame."""
+        if self._reader is None:
+            return []
+        frames = self._to_stream_time(self._reader.finish())
+        self._totals, self._reader = {name: n for name, n in self.counts.items() if name != "frames"}, None
+        return frames
+
+    def _to_stream_time(self, frames: list[TrackerFrame]) -> list[TrackerFrame]:
+        """Convert the frames to the time of the whole stream."""
+        out = []
+        for frame in frames:
+            if self.device_zero_s:
+                frame = replace(frame, measured_s=frame.measured_s + self.device_zero_s)
+            if frame.received_s <= self._last_frame_s:
+                frame = replace(frame, received_s=float(np.nextafter(self._last_frame_s, np.inf)))
+            self._last_frame_s = frame.received_s
+            self._device_s = float(np.fmax.reduce(frame.measured_s, initial=self._device_s))
+            out.append(frame)
+        self._frames += len(out)
+        return out

@@ -2,8 +2,8 @@
 
 from harness.stream.driver.broadcast import Is900Broadcast
 from harness.stream.driver.config import DriverConfig, DriverTiming
-from harness.stream.driver.is900 import Is900
-from harness.stream.driver.opening import Tracker, open_tracker
+from harness.stream.driver.is900 import Is900, open_tracker
+from harness.stream.driver.tracker import Tracker
 from harness.stream.line_events import LineEvent, LineObserver
 
 __all__ = [

@@ -1,68 +1,41 @@
 """An IS-900 that broadcasts UDP packets, as a `TrackerStream`. Nothing is sent to it, so it must be set up already."""
 
 import contextlib
-import threading
-from collections import Counter, deque
-from collections.abc import Callable, Iterator
-from types import TracebackType
+from collections import Counter
 
 import numpy as np
 
 from harness.errors import BadInput
-from harness.stream.codec.continuous_reader import ContinuousFrameReader
-from harness.stream.codec.datagram import Datagram
-from harness.stream.codec.datagram_decoder import DATAGRAM_FORMAT, DATAGRAM_LIST, split_packets
+from harness.stream.codec.datagram import DATAGRAM_FORMAT, DATAGRAM_LIST, Datagram, split_packets
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.reader import WireFormat
-from harness.stream.driver.config import DriverConfig, DriverTiming
-from harness.stream.driver.connection import DeviceConnection, DriverClosed
-from harness.stream.driver.detection import NoAnswer
-from harness.stream.driver.health import describe_health
-from harness.stream.driver.host import Host
-from harness.stream.driver.rate_measurement import MIN_RECORDS, estimate_rate_hz
-from harness.stream.driver.station_watch import StationWatch
+from harness.stream.driver.configurator import MIN_RECORDS, estimate_rate_hz
+from harness.stream.driver.connection import NoAnswer
+from harness.stream.driver.stations import StationWatch
+from harness.stream.driver.tracker import Tracker
 from harness.stream.driver.transport import LineLost
-from harness.stream.frame import TrackerFrame
-from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, NullLineObserver
+from harness.stream.line_events import LineEventKind, NullLineObserver
 
-_RATE_WINDOW_FRAMES = 50
-"""Number of frames over which the present frame rate is computed."""
 _MIN_TIME_STEPS = 2
 """Fewest different stamps of a clock that counts. Where the time was not requested, the field may be constant."""
 
 
-class Is900Broadcast:
+class Is900Broadcast(Tracker):
     """Receiver of the UDP packets of an IS-900. It listens, finds stations and rate, and streams while it is iterated.
 
     Packets can be lost or doubled on a network; a station without a packet is an invalid row. `close` may be called
     from any thread. Raises BadInput when no packets arrive, or when the configuration needs commands.
     """
 
-    def __init__(
-        self,
-        port: str,
-        config: DriverConfig | None = None,
-        *,
-        observer: LineObserver | None = None,
-        on_event: Callable[[LineEvent], None] = lambda event: None,
-        timing: DriverTiming | None = None,
-        host: Host | None = None,
-    ) -> None:
-        """Listen at `udp://host:port` until the stations and their rate are known."""
-        self.port, self.config = port, config or DriverConfig()
-        self._timing, self._host = timing or DriverTiming(), host or Host()
-        self._observer, self._on_event = observer or NullLineObserver(), on_event
+    def _open(self) -> None:
+        """Listen until the stations and their rate are known."""
         if self.config.boresight or self.config.alignment is not None:
-            raise BadInput(f"Port {port}: packets carry no commands.", "Set boresight and alignment by a line.")
-        self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
-        self._reader = ContinuousFrameReader()
-        self._frames: deque[TrackerFrame] = deque()
-        self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
-        self._closing = threading.Event()
-        self._transport = self._host.open(port, 0)
+            raise BadInput(f"Port {self.port}: packets carry no commands.", "Set boresight and alignment by a line.")
+        self._transport = self._host.open(self.port, 0)
         try:
             # These packets belong to no session, so the observer does not see them.
-            self._line = self._connect(NullLineObserver())
+            self._line = self._connect_line(self._transport, NullLineObserver())
+            self._line.on_data = lambda data, now_s: None
             self._wire = self._read_wire_format()
         except BaseException:
             self.close()
@@ -72,17 +45,6 @@ class Is900Broadcast:
         """Packets of this session by station."""
         self._trouble: LineEventKind | None = "stalled"
         self._last_byte_s = self._host.monotonic_s()
-        self._streaming = False
-
-    @property
-    def stations(self) -> tuple[str, ...]:
-        """Station names, in the order of the device's stations."""
-        return self._wire.stations
-
-    @property
-    def wire(self) -> WireFormat:
-        """Content of the packets."""
-        return self._wire
 
     @property
     def identification(self) -> str:
@@ -90,43 +52,9 @@ class Is900Broadcast:
         return "a broadcast"
 
     @property
-    def station_list(self) -> str:
-        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
-        return ", ".join(f"{c} {name}" for c, name in zip(self._wire.characters.decode(), self.stations, strict=True))
-
-    @property
     def setup_note(self) -> str:
         """What a person at the device should know of its set-up, in one line."""
         return "a broadcast takes no commands: settings of other programs are as they were, and cannot be read"
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of `sessions`, `reconnects`, `frames`, `records`, `garbage_bytes` and `clock_resets` so far."""
-        return self._reader.counts | {"reconnects": 0}
-
-    def health(self) -> dict[str, float]:
-        """Return the counts, the present frame rate [Hz] and the time since the last packet [s].
-
-        `rate_hz` is absent until enough frames have arrived to tell it.
-        """
-        return describe_health(self.counts, self._recent_s, self._host.monotonic_s() - self._last_byte_s)
-
-    def wall_s(self, received_s: float) -> float:
-        """Convert a time on the host's monotonic clock to seconds since 1970."""
-        return received_s + self._wall_ahead_s
-
-    def __iter__(self) -> Iterator[TrackerFrame]:
-        """Yield frames as they become complete, until the receiver is closed."""
-        while not self._closing.is_set():
-            if self._frames:
-                yield self._frames.popleft()
-                continue
-            try:
-                self._step()
-            except (DriverClosed, LineLost):
-                if self._closing.is_set():
-                    return
-                raise
 
     def close(self) -> None:
         """Stop listening and end every iteration. May be called from any thread, and more than once."""
@@ -135,34 +63,16 @@ class Is900Broadcast:
             with contextlib.suppress(LineLost):
                 self._transport.close()
 
-    def __enter__(self) -> "Is900Broadcast":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _step(self) -> None:
         """Wait once for packets and process them."""
         if not self._streaming:
             self._start()
-        received, now_s = self._line.receive(self._timing.poll_s), self._host.monotonic_s()
-        if not received:
-            overdue = self._reader.expire(now_s)
-            if overdue:
-                self._observer.on_received(b"", now_s, self._host.wall_s())
-            self._add_frames(overdue)
+        _, now_s = self._receive()
         self._report_trouble(now_s)
 
     def _on_data(self, data: bytes, now_s: float) -> None:
-        self._last_byte_s = now_s
         self._packets.update(map(_character, split_packets(data)))
-        self._add_frames(self._reader.feed(data, now_s))
-
-    def _add_frames(self, frames: list[TrackerFrame]) -> None:
-        self._frames.extend(frames)
-        self._recent_s.extend(frame.received_s for frame in frames)
+        super()._on_data(data, now_s)
 
     def _report_trouble(self, now_s: float) -> None:
         """Report silence once, the return of packets, and stations that come and go."""
@@ -180,25 +90,15 @@ class Is900Broadcast:
             self._trouble = "silent"
             self._report("silent", f"no packet for {silent_s:.1f} s")
 
-    def _report(self, kind: LineEventKind, text: str) -> None:
-        event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
-        self._observer.on_event(event)
-        self._on_event(event)
-
-    def _connect(self, observer: LineObserver) -> DeviceConnection:
-        line = DeviceConnection(self._transport, self._host, observer, self._timing)
-        line.closing = self._closing.is_set
-        return line
-
     def _start(self) -> None:
         """Begin a session. Packets that waited since the set-up are dropped, because nobody knows when they arrived."""
         while self._transport.read(0.0):
             pass
-        self._line = self._connect(self._observer)
+        self._line = self._connect_line(self._transport, self._observer)
         self._observer.on_configured(self._wire)
         self._stations.start(self._wire, self._host.monotonic_s(), self._heard)
         self._reader.begin_session(self._wire, self._host.monotonic_s())
-        self._line.on_data, self._streaming = self._on_data, True
+        self._streaming = True
 
     def _read_wire_format(self) -> WireFormat:
         """Listen for a while, and find the stations, the rate and whether packets have a time."""

@@ -6,16 +6,74 @@ No setter is acknowledged (docs/is900.md 1).
 import re
 from dataclasses import replace
 
+import numpy as np
+
+from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.stream.codec import commands
+from harness.stream.codec.capacity import check_capacity, required_bit_rate
+from harness.stream.codec.commands import STREAM, station_command
+from harness.stream.codec.decoder import Decoder, RecordRun
 from harness.stream.codec.items import SINCE_FIRMWARE, missing_items
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.replies import OutputList, StatusRecord, SystemRecord, TrackingStatus
-from harness.stream.driver.capacity import check_capacity, required_bit_rate
 from harness.stream.driver.config import QUALITY_ITEMS, DriverConfig
 from harness.stream.driver.connection import DeviceConnection
-from harness.stream.driver.rate_measurement import measure_rate_hz
 from harness.stream.driver.stations import StationSelection
+
+MIN_RECORDS = 3
+"""Fewest records of a station that give a rate."""
+PERIOD_QUANTILE = 0.1
+"""Quantile of the stamp differences that is taken as the period at first. Many rounds may be missing, but some pairs
+are adjacent [choice]."""
+MAX_INTERVAL_S = 10.0
+"""No two rounds are further apart [s] [choice]."""
+
+
+def measure_rate_hz(line: DeviceConnection, wire: WireFormat) -> float | None:
+    """Measure rounds per second from the device's stamps, or from the record count where there are none.
+
+    Returns None for too few records. The device is configured for this format, and stopped before and after.
+    """
+    line.send(STREAM)
+    data = line.listen(line.timing.measure_s)
+    line.stop()
+    runs = [event for event in _decoder(wire).feed(data) if isinstance(event, RecordRun)]
+    tables = [run.table[run.table["station"] == wire.characters[0]] for run in runs]
+    count = sum(map(len, tables))
+    if count < MIN_RECORDS:
+        return None
+    table = np.concatenate(tables)
+    if "time" in (table.dtype.names or ()):
+        rate_hz = estimate_rate_hz(table["time"].astype(float) * wire.settings.seconds_per_tick)
+        if rate_hz is not None:
+            return rate_hz
+    return count / line.timing.measure_s
+
+
+def estimate_rate_hz(stamps_s: Floats) -> float | None:
+    """Estimate rounds per second from the stamps (n,) [s] of one station; None for too few stamps.
+
+    Stamps may have jitter, be damaged or be missing. A short difference is about one period. The number of periods in
+    all differences is divided by their sum, in which the jitter of interior stamps cancels.
+    """
+    steps_s = np.diff(stamps_s)
+    steps_s = steps_s[(steps_s > 0.0) & (steps_s < MAX_INTERVAL_S)]  # other differences involve a damaged stamp
+    if len(steps_s) < MIN_RECORDS - 1:
+        return None
+    period_s = float(np.quantile(steps_s, PERIOD_QUANTILE))
+    for _ in range(2):  # the first estimate is a short period
+        period_s = float(np.median(steps_s / _count_periods(steps_s, period_s)))
+    return float(_count_periods(steps_s, period_s).sum() / steps_s.sum())
+
+
+def _count_periods(steps_s: Floats, period_s: float) -> Floats:
+    return np.maximum(np.rint(steps_s / period_s), 1.0)
+
+
+def _decoder(wire: WireFormat) -> Decoder:
+    return Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
+
 
 SATURATED_SHARE = 0.95
 """A line that carries this share of its capacity may have dropped records [choice]."""
@@ -133,9 +191,9 @@ class DeviceConfigurator:
         self._line.send(commands.CENTIMETRES if config.centimetres else commands.INCHES)
         self._line.send(commands.MILLISECONDS if config.milliseconds else commands.MICROSECONDS)
         for station in wire.characters.decode():
-            self._line.send(commands.set_output_list(station, wire.items))
+            self._line.send(station_command("O", station, wire.items))
             # Wait for the reply, because the device's input buffer is small (error -5, docs/is900.md 6.4).
-            self._line.ask(commands.query_output_list(station), OutputList, self._line.timing.answer_s)
+            self._line.ask(station_command("O", station), OutputList, self._line.timing.answer_s)
 
     def _differences(self, wire: WireFormat) -> str:
         """Describe where the device differs from the configuration; empty when it agrees."""
@@ -155,7 +213,7 @@ class DeviceConfigurator:
             else "",
         ]
         for station in wire.characters.decode():
-            reply = line.ask(commands.query_output_list(station), OutputList, answer_s)
+            reply = line.ask(station_command("O", station), OutputList, answer_s)
             if reply is None:
                 texts.append(f"no answer to O{station}")
             elif reply.station != station or reply.items != wire.items:
@@ -167,10 +225,10 @@ class DeviceConfigurator:
         self._line.errors.clear()
         for station, name in zip(wire.characters.decode(), wire.stations, strict=True):
             if (frame := self._config.alignment_of(name)) is not None:
-                self._line.send(commands.undo_alignment(station))
-                self._line.send(commands.alignment(station, *([100.0 * value for value in point] for point in frame)))
+                self._line.send(station_command("R", station))
+                self._line.send(station_command("A", station, (100.0 * value for point in frame for value in point), 2))
             if boresight:
-                self._line.send(commands.boresight(station))
+                self._line.send(station_command("B", station))
         if boresight or self._config.alignment is not None:
             self._line.ask(commands.STATUS, StatusRecord, self._line.timing.answer_s)  # error records come before it
         if self._line.errors:

@@ -1,56 +1,28 @@
 """Commands and their answers, one after another, with a device that is left as it is: nothing else is set."""
 
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from harness.errors import BadInput
-from harness.stream.codec import commands
-from harness.stream.codec.command_table import parse_command
-from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
+from harness.stream.codec import commands, replies
+from harness.stream.codec.commands import parse_command
+from harness.stream.codec.decoder import Decoder, DecoderEvent, RecordRun, Reply
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.readings import decode_readings
 from harness.stream.codec.records import RecordFormat
-from harness.stream.codec.replies import (
-    OutputList,
-    StationStates,
-    StatusRecord,
-    SystemRecord,
-    TrackingStatus,
-    UnknownReply,
-    parse_reply,
-)
 from harness.stream.driver.connection import DeviceConnection
 
 Answer = dict[str, Any]
-"""A decoded answer: its kind and its values."""
+"""A decoded answer: its kind and its values; or a command with all of its answers."""
 _CONTROLS = ("buttons", "joystick")
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """A command and what came back."""
+def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Answer:
+    """Send a command as a person writes it, and return it with what comes back until silence; bytes are hexadecimal.
 
-    command: str
-    """The command as a person writes it, such as `O1` or `^Q`."""
-    sent: bytes
-    received: bytes
-    answers: tuple[Answer, ...]
-    """Each reply, data record and stretch of other bytes, in sequence. Records have SI units."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the content as JSON has it; bytes are hexadecimal."""
-        return {
-            "command": self.command,
-            "sent": self.sent.hex(" "),
-            "received": self.received.hex(" "),
-            "answers": list(self.answers),
-        }
-
-
-def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exchange:
-    """Send a command and collect what comes back, until silence. `wire` is the format of data records, if known.
+    `answers` are each reply, data record and stretch of other bytes, in sequence, with SI units. `wire` is the format
+    of data records, if known.
 
     A device that streams never falls silent; it is heard for twice `answer_s`. `C` has no answer but the stream itself,
     of which nothing is collected.
@@ -59,7 +31,12 @@ def exchange(line: DeviceConnection, text: str, wire: WireFormat | None) -> Exch
     sent = command.line if command.immediate else command.line + b"\r\n"
     line.send(sent)
     received = b"" if sent == commands.STREAM else line.listen_until_silence()
-    return Exchange(text, sent, received, decode_answers(received, wire))
+    return {
+        "command": text,
+        "sent": sent.hex(" "),
+        "received": received.hex(" "),
+        "answers": decode_answers(received, wire),
+    }
 
 
 def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireFormat:
@@ -68,19 +45,20 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
     `rate_hz` is the rate of a device that does not report it [Hz]. Raises BadInput where the answers do not suffice.
     """
     answer_s = line.timing.answer_s
-    status = line.ask(commands.STATUS, StatusRecord, answer_s)
-    system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
-    states = line.ask(commands.STATION_STATES, StationStates, answer_s)
+    status = line.ask(commands.STATUS, replies.StatusRecord, answer_s)
+    system = line.ask(commands.SYSTEM, replies.SystemRecord, answer_s)
+    states = line.ask(commands.STATION_STATES, replies.StationStates, answer_s)
     if status is None or states is None or not states.stations:
         raise BadInput("The device does not tell its format and its active stations (S, l*).", "")
     lists = {
-        station: line.ask(commands.query_output_list(station), OutputList, answer_s) for station in states.stations
+        station: line.ask(commands.station_command("O", station), replies.OutputList, answer_s)
+        for station in states.stations
     }
     items = {answer.items for answer in lists.values() if answer is not None}
     if None in lists.values() or len(items) != 1:
         raise BadInput("The stations have different output lists, or do not tell them (O).", "")
     if rate_hz is None:
-        tracking = line.ask(commands.TRACKING, TrackingStatus, answer_s)
+        tracking = line.ask(commands.TRACKING, replies.TrackingStatus, answer_s)
         rate_hz = tracking.rate_hz if tracking is not None else 0.0
     if not rate_hz > 0.0:
         raise BadInput("The device does not report its rate (MP).", "Give --rate.")
@@ -93,34 +71,31 @@ def read_wire_format(line: DeviceConnection, rate_hz: float | None) -> WireForma
     return WireFormat(states.stations, rate_hz, items.pop(), settings, characters, zeroed=False)
 
 
-def decode_answers(data: bytes, wire: WireFormat | None) -> tuple[Answer, ...]:
+def decode_answers(data: bytes, wire: WireFormat | None) -> list[Answer]:
     """Decode replies, and data records where their format is known."""
     if wire is None:
-        return tuple(_decode_reply(line) for line in data.split(b"\n") if line.strip(b"\r"))
+        return [_decode_reply(line) for line in data.split(b"\n") if line.strip(b"\r")]
     decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
     events: list[DecoderEvent] = [*decoder.feed(data), *decoder.finish()]
-    return tuple(answer for event in events for answer in _decode_event(event, data, wire))
-
-
-def _decode_event(event: DecoderEvent, data: bytes, wire: WireFormat) -> list[Answer]:
-    match event:
-        case Reply():
-            return [_decode_reply(event.line)]
-        case Garbage():
-            return [_decode_reply(data[event.offset : event.offset + event.size])]
-        case RecordRun():
-            return _decode_records(event, wire)
+    answers: list[Answer] = []
+    for event in events:
+        if isinstance(event, RecordRun):
+            answers += _decode_records(event, wire)
+        else:
+            line = event.line if isinstance(event, Reply) else data[event.offset : event.offset + event.size]
+            answers.append(_decode_reply(line))
+    return answers
 
 
 def _decode_reply(line: bytes) -> Answer:
-    reply = parse_reply(line)
+    reply = replies.parse_reply(line)
     match reply:
-        case UnknownReply():
+        case replies.UnknownReply():
             values: Answer = {"text": reply.text.decode("latin-1")}
-        case StationStates():
+        case replies.StationStates():
             values = {"station": reply.station, "active": "".join(reply.stations)}
         case _:
-            values = asdict(reply)
+            values = dict(vars(reply))
     return {"kind": type(reply).__name__, **values}
 
 

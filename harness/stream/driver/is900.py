@@ -2,38 +2,41 @@
 
 import contextlib
 import threading
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from types import TracebackType
 
 from harness.errors import BadInput
 from harness.stream.codec import commands
-from harness.stream.codec.continuous_reader import ContinuousFrameReader
+from harness.stream.codec.capacity import emitter_reach_m
+from harness.stream.codec.commands import station_command
 from harness.stream.codec.items import STANDARD_LIST, position_range_m
 from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.replies import Emitter, OutputList, StatusRecord
-from harness.stream.driver.config import DriverConfig, DriverTiming
+from harness.stream.driver.broadcast import Is900Broadcast
+from harness.stream.driver.config import DriverConfig
 from harness.stream.driver.configurator import DeviceConfigurator
-from harness.stream.driver.connection import DeviceConnection, DriverClosed
-from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
-from harness.stream.driver.emitter_reach import emitter_reach_m
-from harness.stream.driver.health import describe_health
-from harness.stream.driver.host import Host
+from harness.stream.driver.connection import (
+    DetectedDevice,
+    DeviceConnection,
+    DriverClosed,
+    NoAnswer,
+    candidate_baud_rates,
+    detect_device,
+    query_status,
+)
 from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
 from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
-from harness.stream.driver.transport import LineLost
+from harness.stream.driver.tracker import Tracker
+from harness.stream.driver.transport import UDP_SCHEME, LineLost
 from harness.stream.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
 from harness.stream.frame import TrackerFrame
-from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, NullLineObserver
+from harness.stream.line_events import LineEvent, LineEventKind, LineObserver
 
-_RATE_WINDOW_FRAMES = 50
-"""Number of frames over which the present frame rate is computed."""
 MAX_EMITTERS = 200
 """More emitters than any constellation has."""
 
 
-class Is900:
+class Is900(Tracker):
     """Driver of a real IS-900: opens the port, detects the device and configures it; streams while it is iterated.
 
     It has no thread: frames are read in the thread that iterates. `close` may be called from any thread. Use it as a
@@ -41,32 +44,12 @@ class Is900:
     trouble is reported as events, and the driver reconnects by itself.
     """
 
-    def __init__(
-        self,
-        port: str,
-        config: DriverConfig | None = None,
-        *,
-        observer: LineObserver | None = None,
-        on_event: Callable[[LineEvent], None] = lambda event: None,
-        timing: DriverTiming | None = None,
-        host: Host | None = None,
-    ) -> None:
-        """Open and configure the device.
-
-        `observer` receives all bytes and events, `on_event` the events only. Both are called in the thread that
-        iterates.
-        """
-        self.port, self.config = port, config or DriverConfig()
-        self._timing, self._host = timing or DriverTiming(), host or Host()
-        self._observer, self._on_event = observer or NullLineObserver(), on_event
-        self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
-        self._reader, self._watchdog = ContinuousFrameReader(), Watchdog(self._timing)
-        self._frames: deque[TrackerFrame] = deque()
-        self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
-        self._line_lock, self._closing = threading.RLock(), threading.Event()
-        self._streaming = self._closed = False
-        self._last_byte_s = self._tracked_s = self._zeroed_s = self._host.monotonic_s()
-        self._reconnects = 0
+    def _open(self) -> None:
+        """Open and configure the device."""
+        port = self.port
+        self._watchdog = Watchdog(self._timing)
+        self._line_lock, self._closed = threading.RLock(), False
+        self._tracked_s = self._zeroed_s = self._last_byte_s
         detected = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = detected.line, detected.baud, detected.status
         self._stations = StationSelection("", (), "")
@@ -87,16 +70,6 @@ class Is900:
             raise
 
     @property
-    def stations(self) -> tuple[str, ...]:
-        """Station names, in the order of the device's stations."""
-        return self._stations.names
-
-    @property
-    def wire(self) -> WireFormat:
-        """Wire format of the latest configuration."""
-        return self._wire
-
-    @property
     def baud(self) -> int | None:
         """Baud rate of the serial port [bit/s]; None over TCP."""
         return self._baud
@@ -114,8 +87,8 @@ class Is900:
     @property
     def station_list(self) -> str:
         """Characters of the device's stations, with their names: `1 torso, 3 head`; and the active ones not read."""
-        read = ", ".join(f"{c} {name}" for c, name in zip(self._stations.characters, self.stations, strict=True))
-        return f"{read}; not read: {', '.join(self._stations.others)}" if self._stations.others else read
+        others = self._stations.others
+        return super().station_list + (f"; not read: {', '.join(others)}" if others else "")
 
     @property
     def setup_note(self) -> str:
@@ -125,39 +98,6 @@ class Is900:
         note = f"boresight of station {', '.join(self._stations.characters)} undone: it cannot be read or put back"
         unreadable = self._found.unreadable if self._found else ()
         return note + (f"; nor can {', '.join(unreadable)}, now at their defaults" if unreadable else "")
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of `sessions`, `reconnects`, `frames`, `records`, `garbage_bytes` and `clock_resets` so far."""
-        return self._reader.counts | {"reconnects": self._reconnects}
-
-    def health(self) -> dict[str, float]:
-        """Return the counts, the present frame rate [Hz] and the time since the last byte [s].
-
-        `rate_hz` is absent until enough frames have arrived to tell it.
-        """
-        return describe_health(self.counts, self._recent_s, self._host.monotonic_s() - self._last_byte_s)
-
-    def wall_s(self, received_s: float) -> float:
-        """Convert a time on the host's monotonic clock to seconds since 1970."""
-        return received_s + self._wall_ahead_s
-
-    def __iter__(self) -> Iterator[TrackerFrame]:
-        """Yield frames as they become complete, until the driver is closed.
-
-        A new iteration continues where another ended.
-        """
-        while not self._closing.is_set():
-            if self._frames:
-                yield self._frames.popleft()
-                continue
-            try:
-                self._step()
-            except DriverClosed:
-                return
-            except BaseException:
-                self.close()
-                raise
 
     def close(self) -> None:
         """Stop the device, put its settings back and end every iteration.
@@ -188,7 +128,7 @@ class Is900:
             line.stop()
             is_back = found is not None and put_back(line, found, keep, aligned, config.boresight)
             for station in self._stations.others + self._stations.woken:
-                line.send(commands.switch_station(station, station in self._stations.others))
+                line.send(station_command("l", station, [station in self._stations.others]))
             # A port that is closed may drop bytes that have not left it, so wait until the device has answered.
             is_back = is_back and line.ask(commands.STATUS, StatusRecord, self._timing.answer_s) is not None
         if found is not None and (text := found.describe()) and not keep:
@@ -212,30 +152,16 @@ class Is900:
             kept = "kept, as asked" if self.config.keep_settings else "at defaults for this session, then put back"
             self._report("settings", f"settings of another program: {text}; {kept}")
 
-    def __enter__(self) -> "Is900":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _step(self) -> None:
         """Wait once for bytes and process them."""
         with self._line_lock:
             try:
                 if not self._streaming:
                     self._start()
-                received = self._line.receive(self._timing.poll_s)
-                now_s = self._host.monotonic_s()
-                if not received:  # the wait exceeds the delay of USB adapters, so that late bytes do not split a frame
-                    overdue = self._reader.expire(now_s)
-                    if overdue:
-                        self._observer.on_received(b"", now_s, self._host.wall_s())
-                    self._add_frames(overdue, now_s)
+                received, now_s = self._receive()
                 self._send_periodic_commands(now_s)
                 if (reader := self._reader.reader) is not None:
-                    for diagnosis in self._watchdog.check(now_s, bool(received), reader):
+                    for diagnosis in self._watchdog.check(now_s, received, reader):
                         self._handle(diagnosis)
                         if diagnosis.action in ("configure", "reopen"):
                             break
@@ -259,14 +185,14 @@ class Is900:
             text += "; it is switched off until the session ends, since it would load the line"
             others = "".join(sorted({*self._stations.others, station}))
             self._stations = replace(self._stations, others=others)
-            self._line.send(commands.switch_station(station, False))
+            self._line.send(station_command("l", station, [False]))
         if diagnosis.kind is not None:
             self._report(diagnosis.kind, text)
         if diagnosis.action == "ask":
             self._line.send(commands.STATUS)
             self._line.send(commands.STATION_STATES)
             for station in self._stations.characters:
-                self._line.send(commands.query_output_list(station))
+                self._line.send(station_command("O", station))
         elif diagnosis.action != "none" and self._streaming:
             self._reconnect(reopen=diagnosis.action == "reopen")
 
@@ -281,26 +207,17 @@ class Is900:
         """Send an event to the observer and the callback."""
         if kind == "reset" and self.config.boresight:
             text += "; boresight is lost and not repeated, since nobody may stand in the reference pose now"
-        event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
-        self._observer.on_event(event)
-        self._on_event(event)
+        super()._report(kind, text)
 
     def _connect(self, baud: int | None) -> DeviceConnection:
         try:
             transport = self._host.open(self.port, baud or 115200)
         except BadInput as error:
             raise NoAnswer(error.what, error.advice) from error
-        line = DeviceConnection(transport, self._host, self._observer, self._timing)
-        line.closing, line.on_data = self._closing.is_set, self._on_data
-        return line
+        return self._connect_line(transport, self._observer)
 
-    def _on_data(self, data: bytes, now_s: float) -> None:
-        self._last_byte_s = now_s
-        self._add_frames(self._reader.feed(data, now_s), now_s)
-
-    def _add_frames(self, frames: list[TrackerFrame], now_s: float) -> None:
-        self._frames.extend(frames)
-        self._recent_s.extend(frame.received_s for frame in frames)
+    def _add_frames(self, frames: Sequence[TrackerFrame], now_s: float) -> None:
+        super()._add_frames(frames, now_s)
         for diagnosis in self._watchdog.add_frames(frames, now_s):
             self._handle(diagnosis)
 
@@ -362,7 +279,7 @@ class Is900:
             self._handle(self._watchdog.report(kind, text, now_s))
             return
         for station in self._stations.characters:
-            answer = line.ask(commands.query_output_list(station), OutputList, self._timing.answer_s)
+            answer = line.ask(station_command("O", station), OutputList, self._timing.answer_s)
             if answer is not None:
                 kind, text = diagnose_reply(self._wire, answer)
                 if kind is not None:
@@ -380,3 +297,15 @@ class Is900:
             if self._closing.is_set():
                 raise DriverClosed
             self._host.sleep(min(left_s, self._timing.poll_s))
+
+
+def open_tracker(
+    port: str,
+    config: DriverConfig | None = None,
+    *,
+    observer: LineObserver | None = None,
+    on_event: Callable[[LineEvent], None] = lambda event: None,
+) -> Tracker:
+    """Open and set up a tracker: a serial line or TCP, or a broadcast at `udp://host:port`. Raises BadInput."""
+    kind = Is900Broadcast if port.startswith(UDP_SCHEME) else Is900
+    return kind(port, config, observer=observer, on_event=on_event)

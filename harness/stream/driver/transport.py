@@ -7,6 +7,7 @@ on Windows.
 """
 
 import contextlib
+import errno
 import os
 import select
 import socket
@@ -15,19 +16,89 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from typing import Protocol
+from urllib.parse import urlsplit
 
 import serial
+from serial.tools import list_ports
 
 from harness.core.network import resolve_host
-from harness.errors import HarnessError
+from harness.errors import BadInput, HarnessError
 from harness.stream.codec.datagram import DATAGRAM_START
-from harness.stream.driver.transport_errors import (
-    parse_network_address,
-    serial_port_error,
-    tcp_connection_error,
-    udp_port_error,
-    unknown_scheme_error,
-)
+from harness.stream.codec.items import BAUD_RATES
+
+_BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN)
+_TCP_EXAMPLE = "tcp://HOST:PORT, such as tcp://127.0.0.1:5005"
+_BAUD_RATES_TEXT = f"{', '.join(map(str, BAUD_RATES[:-1]))} and {BAUD_RATES[-1]}"
+
+
+def parse_network_address(port: str) -> tuple[str, int]:
+    """Split `tcp://host:port` or `udp://host:port` into host and port number. Raises BadInput when one is missing."""
+    example = "udp://HOST:PORT, such as udp://127.0.0.1:5001" if port.startswith("udp:") else _TCP_EXAMPLE
+    try:
+        parts = urlsplit(port)
+        host, number = parts.hostname, parts.port
+    except ValueError as error:
+        raise BadInput(f"Port {port}: {error}.", f"Write {example}.") from error
+    if not host or not number:
+        raise BadInput(f"Port {port}: host or port number is missing.", f"Write {example}.")
+    return host, number
+
+
+def network_error(port: str, address: tuple[str, int], error: Exception) -> BadInput:
+    """Return the error for a host that could not be reached, or an address at which packets cannot be received."""
+    host, number = address
+    if isinstance(error, (socket.gaierror, UnicodeError)):
+        return BadInput(f"Port {port}: there is no host called {host}.", "Check the name, or give its address.")
+    if isinstance(error, TimeoutError):
+        return BadInput(f"Port {port}: {host} does not answer.", "Check the address, the cable and any firewall.")
+    if isinstance(error, ConnectionRefusedError):
+        return BadInput(
+            f"Port {port}: nothing listens at {host}, port {number}.",
+            "Start the device (or `harness emulate`) first, and check the port number.",
+        )
+    if getattr(error, "errno", None) == errno.EADDRINUSE:
+        return BadInput(
+            f"Port {port}: another program receives at port {number}.", "Close that program, or choose another port."
+        )
+    advice = "Check the address and the network."
+    if port.startswith(UDP_SCHEME):
+        advice = "Name an address of this computer: 127.0.0.1, or 0.0.0.0 for packets from the network."
+    return BadInput(f"Port {port}: {_error_text(error)}.", advice)
+
+
+def serial_port_error(port: str, baud: int, error: Exception) -> BadInput:
+    """Return the error for a serial port that could not be opened."""
+    number = getattr(error, "errno", None)
+    if isinstance(error, ValueError):
+        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 uses {_BAUD_RATES_TEXT}.")
+    if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or isinstance(error, FileNotFoundError):
+        ports = ", ".join(sorted(known.device for known in list_ports.comports())) or "none"
+        return BadInput(f"Port {port}: there is no such port.", f"Serial ports of this computer: {ports}.")
+    if number == errno.EACCES and os.name == "posix":
+        return BadInput(
+            f"Port {port}: permission denied.",
+            f"Join the group that may open it ({_owner_group(port)}), then log in again.",
+        )
+    if number in (*_BUSY_ERRNOS, errno.EACCES):
+        return BadInput(f"Port {port}: another program has it open.", "Close that program; only one may use the port.")
+    return BadInput(
+        f"Port {port} cannot be used as a serial port: {_error_text(error)}.", "Name the port of the device."
+    )
+
+
+def _error_text(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def _owner_group(port: str) -> str:
+    """Return the group that owns a port file, or a guess where that cannot be determined."""
+    try:
+        import grp
+
+        return grp.getgrgid(os.stat(port).st_gid).gr_name
+    except (ImportError, KeyError, OSError):
+        return "often dialout"
+
 
 if sys.platform == "win32":
     _IO_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError)
@@ -87,12 +158,18 @@ def open_transport(port: str, baud: int = 115200) -> Transport:
     A serial port is opened for this process alone: 8N1, no handshake, as every IS-900 client does (docs/is900.md 2).
     Raises BadInput when there is no such port or host, or when it is in use or may not be opened.
     """
-    if port.startswith(("tcp://", "socket://")):
-        return _TcpTransport(port, parse_network_address(port))
-    if port.startswith(UDP_SCHEME):
-        return _UdpTransport(port, parse_network_address(port))
+    kind = {"tcp": _TcpTransport, "socket": _TcpTransport, "udp": _UdpTransport}.get(port.partition("://")[0])
+    if "://" in port and kind is not None:
+        address = parse_network_address(port)
+        try:
+            return kind(port, *address)
+        except (OSError, UnicodeError) as error:
+            raise network_error(port, address, error) from error
     if "://" in port:
-        raise unknown_scheme_error(port)
+        raise BadInput(
+            f"Port {port}: this kind of address is not known.",
+            "Name a serial port (/dev/ttyUSB0, COM3), tcp://HOST:PORT, socket://HOST:PORT or udp://HOST:PORT.",
+        )
     try:
         opened = serial.Serial(port, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
     except _IO_ERRORS as error:
@@ -231,20 +308,27 @@ class PolledSerialTransport(_BaseTransport):
         self._port.close()
 
 
-class _TcpTransport(SelectTransport):
-    """A TCP connection that sends small packets at once."""
+class _SocketTransport(SelectTransport):
+    """A socket of our own. Making one raises OSError, and UnicodeError for a name that no host can have."""
 
-    def __init__(self, name: str, address: tuple[str, int]) -> None:
-        try:
-            self._socket = self._connect(*address)
-        except (OSError, UnicodeError) as error:
-            raise tcp_connection_error(name, address, error) from error
+    def __init__(self, name: str, host: str, port: int) -> None:
+        self._socket = self._open(host, port)
         super().__init__(name, self._socket.fileno())
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.settimeout(WRITE_TIMEOUT_S)
 
     @staticmethod
-    def _connect(host: str, port: int) -> socket.socket:
+    @abstractmethod
+    def _open(host: str, port: int) -> socket.socket: ...
+
+    def _release(self) -> None:
+        self._socket.close()
+        super()._release()
+
+
+class _TcpTransport(_SocketTransport):
+    """A TCP connection that sends small packets at once."""
+
+    @staticmethod
+    def _open(host: str, port: int) -> socket.socket:
         """A connection to the first address of the host that answers; OSError of the first one if none does."""
         errors = []
         for family, resolved in resolve_host(host, port, socket.SOCK_STREAM):
@@ -256,6 +340,8 @@ class _TcpTransport(SelectTransport):
                 opened.close()
                 errors.append(error)
             else:
+                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                opened.settimeout(WRITE_TIMEOUT_S)
                 return opened
         raise errors[0]
 
@@ -268,31 +354,26 @@ class _TcpTransport(SelectTransport):
     def _send(self, data: bytes) -> None:
         self._socket.sendall(data)
 
-    def _release(self) -> None:
-        self._socket.close()
-        super()._release()
 
-
-class _UdpTransport(SelectTransport):
+class _UdpTransport(_SocketTransport):
     """Packets that are sent to an address of this computer; it sends nothing.
 
     The host that first sends station data is the tracker. Packets of other hosts are left out.
     """
 
-    def __init__(self, name: str, address: tuple[str, int]) -> None:
+    _sender = ""
+
+    @staticmethod
+    def _open(host: str, port: int) -> socket.socket:
+        family, resolved = resolve_host(host, port, socket.SOCK_DGRAM)[0]
+        opened = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            family, resolved = resolve_host(*address, socket.SOCK_DGRAM)[0]
-            self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        except (OSError, UnicodeError) as error:
-            raise udp_port_error(name, address, error) from error
-        try:
-            self._socket.bind(resolved)
-        except OSError as error:
-            self._socket.close()
-            raise udp_port_error(name, address, error) from error
-        super().__init__(name, self._socket.fileno())
-        self._socket.setblocking(False)
-        self._sender = ""
+            opened.bind(resolved)
+        except OSError:
+            opened.close()
+            raise
+        opened.setblocking(False)
+        return opened
 
     def _take(self) -> bytes:
         """Return the packets that have arrived, one after another."""
@@ -309,7 +390,3 @@ class _UdpTransport(SelectTransport):
 
     def _send(self, data: bytes) -> None:
         raise OSError("packets carry no commands")
-
-    def _release(self) -> None:
-        self._socket.close()
-        super()._release()

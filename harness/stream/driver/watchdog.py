@@ -21,7 +21,7 @@ from harness.stream.codec.replies import (
     parse_reply,
 )
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.station_watch import StationEvent, StationWatch
+from harness.stream.driver.stations import StationEvent, StationWatch
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEventKind
 

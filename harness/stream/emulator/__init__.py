@@ -7,18 +7,18 @@ at a port.
 
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
+from harness.stream.emulator.device_state import Message, SentMessage
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import Message, SentMessage
-from harness.stream.emulator.server import RunningEmulator, serve_emulator
+from harness.stream.emulator.server import EmulatorServer, serve_emulator
 
 __all__ = [
     "Device",
     "Emulator",
     "EmulatorConfig",
+    "EmulatorServer",
     "Fault",
     "Message",
-    "RunningEmulator",
     "SentMessage",
     "serve_emulator",
 ]

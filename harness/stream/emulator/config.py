@@ -1,11 +1,51 @@
 """Configuration of the emulated IS-900 and its line."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
+from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
 from harness.stream.codec.items import STATION_CHARACTERS
-from harness.stream.emulator.controls import check_control_pattern
 from harness.stream.emulator.faults import Fault, check_firmware
+
+PERIOD_S = 8.0
+"""Duration of a cycle [s]."""
+BUTTON_BITS = 6
+"""Buttons 1 to 4, the pressed joystick and the trigger have bits 0 to 5 (docs/is900.md 5.1)."""
+CENTRE, SWING = 127, 128
+"""Joystick value at rest, and its greatest distance from there; the extremes are cut to 0 and 255."""
+
+ControlPattern = Callable[[Floats], tuple[Ints, Ints]]
+"""Converts times (N,) [s] to button bits (N,) and joystick values (N, 2), left to right and rear to front."""
+
+
+def _still(time_s: Floats) -> tuple[Ints, Ints]:
+    """Press nothing and leave the joystick at its centre."""
+    return np.zeros(len(time_s), np.int64), np.full((len(time_s), 2), CENTRE)
+
+
+def _cycle(time_s: Floats) -> tuple[Ints, Ints]:
+    """Press each button for a second in turn, and none for two. Move the joystick sideways, then back and forth."""
+    phase_s = time_s % PERIOD_S
+    pressed = phase_s.astype(np.int64)
+    buttons = np.where(pressed < BUTTON_BITS, 1 << pressed, 0)
+    swing = SWING * np.sin(2.0 * np.pi * phase_s / (0.5 * PERIOD_S))
+    sideways = phase_s < 0.5 * PERIOD_S
+    offset = np.stack([np.where(sideways, swing, 0.0), np.where(sideways, 0.0, swing)], axis=-1)
+    return buttons, np.clip(np.rint(CENTRE + offset), 0, 255).astype(np.int64)
+
+
+CONTROL_PATTERNS: dict[str, ControlPattern] = {"cycle": _cycle, "still": _still}
+"""Patterns by name."""
+
+
+def check_control_pattern(name: str) -> None:
+    """Raise BadInput unless there is a pattern of this name."""
+    if name not in CONTROL_PATTERNS:
+        raise BadInput(f"controls {name!r} are not known.", f"Use {' or '.join(CONTROL_PATTERNS)}.")
+
 
 SUPPORTED_BAUD_RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 """Baud rates of the serial line [bit/s] (docs/is900.md 2)."""
@@ -58,20 +98,17 @@ class EmulatorConfig:
             raise BadInput(
                 f"identification {self.identification!r} is not possible.", "Give up to 31 ASCII characters."
             )
-        if self.status_bytes not in (54, 55):
-            raise BadInput(
-                f"status_bytes = {self.status_bytes} is not possible.", "Status records have 55 or 54 bytes."
-            )
         if self.baud not in SUPPORTED_BAUD_RATES:
             raise BadInput(f"{self.baud} baud.", f"An IS-900 supports {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
-        if self.stylus_bytes not in (1, 2):
-            raise BadInput(f"stylus_bytes = {self.stylus_bytes} is not possible.", "Item 16 has 1 or 2 bytes.")
-        if self.queue_records < 1:
-            raise BadInput(f"queue_records = {self.queue_records} is not possible.", "Give at least 1.")
-        if not 0 < self.udp_port < 65536:
-            raise BadInput(f"udp_port = {self.udp_port} is not possible.", "Give a number from 1 to 65535.")
-        if not 0.0 <= self.restart_s <= 3600.0:
-            raise BadInput(f"restart_s = {self.restart_s:g} is not possible.", "Give a number from 0 to 3600.")
+        for name, possible, advice in (
+            ("status_bytes", self.status_bytes in (54, 55), "Status records have 55 or 54 bytes."),
+            ("stylus_bytes", self.stylus_bytes in (1, 2), "Item 16 has 1 or 2 bytes."),
+            ("queue_records", self.queue_records >= 1, "Give at least 1."),
+            ("udp_port", 0 < self.udp_port < 65536, "Give a number from 1 to 65535."),
+            ("restart_s", 0.0 <= self.restart_s <= 3600.0, "Give a number from 0 to 3600."),
+        ):
+            if not possible:
+                raise BadInput(f"{name} = {getattr(self, name):g} is not possible.", advice)
 
     def plugged(self, stations: int) -> str:
         """Return the characters of this many stations. Raises BadInput when they do not fit."""

@@ -5,7 +5,7 @@ an additional fault leaves the others unchanged.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
@@ -14,22 +14,11 @@ import numpy as np
 from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadInput
+from harness.stream.codec.reader import ByteCapture
 
 ByteFaultKind = Literal["lost", "garbled", "duplicated", "added", "repeated"]
 FaultEpisodeKind = Literal["burst", "stall", "disconnect", "reset", "lost_station"]
-FaultKind = Literal[
-    "lost",
-    "garbled",
-    "duplicated",
-    "added",
-    "repeated",
-    "burst",
-    "stall",
-    "disconnect",
-    "reset",
-    "lost_station",
-    "firmware",
-]
+FaultKind = Literal[ByteFaultKind, FaultEpisodeKind, "firmware"]
 BYTE_FAULT_KINDS: tuple[str, ...] = get_args(ByteFaultKind)
 FAULT_EPISODE_KINDS: tuple[str, ...] = get_args(FaultEpisodeKind)
 _INSTANT_KINDS = (*BYTE_FAULT_KINDS, "reset")
@@ -191,3 +180,24 @@ class _FaultSchedule:
             now_s += self.fault.lasts_s
         while True:
             yield float("inf")
+
+
+def add_byte_faults(capture: ByteCapture, faults: Sequence[Fault], seed: int) -> ByteCapture:
+    """The capture, one record a chunk, with the faults that change single records, drawn as an emulator draws them."""
+    kept = [fault for fault in faults if fault.kind in BYTE_FAULT_KINDS]
+    if not kept or not len(capture.ends):
+        return capture
+    times_s = capture.received_s.tolist()
+    injector = FaultInjector(kept, seed, times_s[0])
+    ends = capture.ends.tolist()
+    chunks = [
+        injector.corrupt(capture.data[begin:end], False, now_s)[0]
+        for begin, end, now_s in zip([0, *ends], ends, times_s, strict=False)
+    ]
+    sizes = np.array([len(chunk) for chunk in chunks], dtype=np.int64)
+    return ByteCapture(b"".join(chunks), np.cumsum(sizes), capture.received_s)
+
+
+def unapplied_kinds(faults: Sequence[Fault]) -> list[str]:
+    """Kinds of the faults that a capture without a line cannot have."""
+    return sorted({fault.kind for fault in faults if fault.kind not in BYTE_FAULT_KINDS})

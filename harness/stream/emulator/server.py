@@ -16,14 +16,11 @@ import numpy as np
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.codec.samples import DeviceSamples
-from harness.stream.emulator.addresses import parse_address
 from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.device_state import SentMessage
 from harness.stream.emulator.emulator import Emulator
-from harness.stream.emulator.message import SentMessage
-from harness.stream.emulator.port import Port
-from harness.stream.emulator.tcp_port import LogCallback, TcpPort
-from harness.stream.emulator.udp_broadcast import UdpBroadcast
-from harness.stream.emulator.udp_port import LOOPBACK, UdpPort
+from harness.stream.emulator.tcp_port import LogCallback, Port, TcpPort, parse_address
+from harness.stream.emulator.udp_broadcast import LOOPBACK, UdpBroadcast, UdpPort
 
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0
@@ -71,6 +68,8 @@ class EmulatorServer:
     ) -> None:
         """`udp_host` is the address to which the device broadcasts while `MEthUdp` is on."""
         self.emulator, self.port, self.counts = emulator, port, ServerCounts()
+        self.name = port.name
+        """The name that a client opens: a link to a pty, or tcp://host:port."""
         self._broadcast, self._udp = UdpBroadcast(emulator.device, time.monotonic()), UdpPort(udp_host)
         self._on_sent = on_sent
         self._woken, self._waker = socket.socketpair()
@@ -164,24 +163,6 @@ def play_samples(
     return server.summary()
 
 
-@dataclass(frozen=True)
-class RunningEmulator:
-    """An emulator that runs in its own thread."""
-
-    name: str
-    """The name that a client opens: a link to a pty, or tcp://host:port."""
-    server: EmulatorServer
-
-    @property
-    def emulator(self) -> Emulator:
-        """The emulator that is served."""
-        return self.server.emulator
-
-    def summary(self) -> dict[str, float]:
-        """Return `EmulatorServer.summary`."""
-        return self.server.summary()
-
-
 @contextlib.contextmanager
 def serve_emulator(
     samples: DeviceSamples,
@@ -190,14 +171,12 @@ def serve_emulator(
     pty: Path | str | None = None,
     tcp: str | None = None,
     on_sent: SentCallback | None = None,
-) -> Iterator[RunningEmulator]:
+) -> Iterator[EmulatorServer]:
     """Play samples at a pty behind a link, or at `host:port` (port 0 takes a free one), while the block runs.
 
     `on_sent` receives each record and reply that was written, with its times and damage, in the emulator's thread.
     """
-    port = open_port(pty, tcp)
-    server = EmulatorServer(Emulator(samples, config, time.monotonic()), port, on_sent)
-    name = port.name
+    server = EmulatorServer(Emulator(samples, config, time.monotonic()), open_port(pty, tcp), on_sent)
     errors: list[BaseException] = []
 
     def run() -> None:
@@ -209,7 +188,7 @@ def serve_emulator(
     thread = threading.Thread(target=run, name="emulator")
     thread.start()
     try:
-        yield RunningEmulator(name, server)
+        yield server
     finally:
         server.stop()
         thread.join()

@@ -1,13 +1,137 @@
-"""A TCP port of the emulator: it carries the same bytes as the serial line (docs/is900.md 9)."""
+"""Ports at which a client finds an emulator: their interface, and TCP with the bytes of the serial line
+(docs/is900.md 9).
+"""
 
 import socket
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 from harness.core.network import resolve_host
 from harness.errors import BadInput
-from harness.stream.emulator.addresses import check_loopback
-from harness.stream.emulator.tcp_client import MAX_UNREAD_BYTES, TcpClient
+from harness.stream.codec.commands import CommandReader
+
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
+
+def parse_address(text: str, default_host: str = "") -> tuple[str, int]:
+    """Split `HOST:PORT`, or `PORT` where there is a default host. Raises BadInput."""
+    host, _, number = text.rpartition(":")
+    host = host or default_host
+    if not host or not (number.isascii() and number.isdecimal() and len(number) <= 5) or int(number) > 65535:
+        raise BadInput(f"{text!r} is no HOST:PORT.", "An example is 127.0.0.1:5005.")
+    return host.strip("[]"), int(number)
+
+
+def check_loopback(host: str, anywhere: bool, risk: str) -> None:
+    """Raise BadInput for an address outside this computer, unless `anywhere`. `risk` says what others could do."""
+    if host not in _LOOPBACK and not anywhere:
+        raise BadInput(f"{host} is reachable from other computers.", f"Use 127.0.0.1, or --anywhere: {risk}.")
+
+
+class Port(Protocol):
+    """The client's end of a line. A client may come and go."""
+
+    @property
+    def name(self) -> str:
+        """The name that a client opens."""
+        ...
+
+    def readable(self) -> list[int]:
+        """Return the descriptors to wait for bytes or clients from."""
+        ...
+
+    def writable(self) -> list[int]:
+        """Return the descriptors that must take the rest of a message."""
+        ...
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived, without waiting."""
+        ...
+
+    def write(self, data: bytes) -> bool:
+        """Send all of the data sooner or later, or nothing.
+
+        Returns False when the client is absent or leaves no room.
+        """
+        ...
+
+    def baud(self) -> int | None:
+        """Return the baud rate that the client has set [bit/s]; None where there is none."""
+        ...
+
+    def unplug(self) -> None:
+        """Make the port unusable for the client, as if the cable were pulled out."""
+        ...
+
+    def plug(self) -> None:
+        """Make the port usable again; no effect if it is usable."""
+        ...
+
+    def close(self) -> None:
+        """Release the port for good."""
+        ...
+
+
+MAX_UNREAD_BYTES = 1 << 16
+"""Bytes that wait here for a client, beyond those in the operating system's buffers: six seconds of a full line of
+115200 baud [bytes]."""
+_READ_BYTES = 4096
+_SEND_BUFFER_BYTES = 1 << 16
+
+
+class TcpClient:
+    """One connection. It never blocks, and a command that the client has not finished disturbs no other client."""
+
+    def __init__(self, connection: socket.socket, name: str) -> None:
+        self.name = name
+        self.open = True
+        """False once the client has closed the connection or lost it."""
+        self._connection, self._unsent = connection, b""
+        self._commands = CommandReader()
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+
+    def fileno(self) -> int:
+        """Return the descriptor of the connection."""
+        return self._connection.fileno()
+
+    @property
+    def unread_bytes(self) -> int:
+        """Number of bytes that the client has left no room for."""
+        return len(self._unsent)
+
+    def read(self) -> bytes:
+        """Return the commands that have become complete."""
+        try:
+            data = self._connection.recv(_READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        self.open &= bool(data)
+        return b"".join(command.encode() for command in self._commands.feed(data))
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, or keep them until the client reads."""
+        self._unsent += data
+        self.flush()
+
+    def flush(self) -> None:
+        """Send as many of the waiting bytes as the client takes."""
+        try:
+            while self._unsent:
+                self._unsent = self._unsent[self._connection.send(self._unsent) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.open = False
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
+
 
 LogCallback = Callable[[str], None]
 """Receives one line of text for the user."""

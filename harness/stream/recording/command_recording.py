@@ -1,22 +1,67 @@
-"""Recording of single commands and what a device answers, without any other set-up."""
+"""Recording of single commands and what a device answers, without any other set-up; and the answers as text."""
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from typing import Any
 
 from harness.errors import BadInput
-from harness.stream.codec.blocks import RECEIVED
-from harness.stream.codec.command_table import find_danger, parse_command
+from harness.stream.codec.commands import find_danger, parse_command
 from harness.stream.codec.reader import WireFormat
 from harness.stream.driver import DriverConfig, DriverTiming
-from harness.stream.driver.connection import WAKE_UP, DeviceConnection
-from harness.stream.driver.detection import NoAnswer, candidate_baud_rates, detect_device
-from harness.stream.driver.exchange import Exchange, exchange, read_wire_format
-from harness.stream.driver.host import Host
+from harness.stream.driver.connection import (
+    WAKE_UP,
+    DeviceConnection,
+    Host,
+    NoAnswer,
+    candidate_baud_rates,
+    detect_device,
+)
+from harness.stream.driver.exchange import Answer, exchange, read_wire_format
 from harness.stream.driver.transport import LineLost
+from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
 from harness.stream.recording.recording import RecordingWriter
+
+_SHOWN_BYTES = 120
+"""Bytes of an answer that are printed; the recording has all."""
+_SHOWN_RECORDS = 12
+"""Data records of an answer that are printed: one of each station that a device can have."""
+
+_LONGEST_LINE = 240
+"""Characters of a printed line."""
+
+
+def format_exchanges(exchanges: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Format commands with their answers (`driver.exchange`) as lines."""
+    return [line for exchange in exchanges for line in _format_exchange(exchange)]
+
+
+def _format_exchange(exchange: Mapping[str, Any]) -> list[str]:
+    received, answers = bytes.fromhex(exchange["received"]), exchange["answers"]
+    cut = f"... ({len(received)} bytes)" if len(received) > _SHOWN_BYTES else ""
+    text = repr(received[:_SHOWN_BYTES])[2:-1] + cut if received else "no answer"
+    lines = [f"{exchange['command']}: {text if exchange['command'] != 'C' else 'starts the stream'}"]
+    records = 0
+    for answer in answers:
+        records += answer["kind"] == "record"
+        if answer["kind"] == "record" and records > _SHOWN_RECORDS:
+            continue
+        values = (f"{name} {_format_value(value)}" for name, value in answer.items() if name != "kind" and value != "")
+        lines.append(f"    {answer['kind']}: {', '.join(values)}"[:_LONGEST_LINE])
+    if records > _SHOWN_RECORDS:
+        lines.append(f"    and {records - _SHOWN_RECORDS} more records")
+    return lines
+
+
+def _format_value(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(_format_value, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4f}" if isinstance(value, float) else str(value).strip() or "blank"
+
 
 STREAM, STOP, POLL = "C", "c", "P"
 
@@ -40,7 +85,7 @@ def record_commands(
     progress: Callable[[str], None] = lambda line: None,
     timing: DriverTiming | None = None,
     host: Host | None = None,
-) -> list[Exchange]:
+) -> list[Answer]:
     """Send commands one after another, record everything that passes, and return the commands with their answers.
 
     The device is stopped before the first command and after the last. A device that streams at the end is
@@ -52,7 +97,7 @@ def record_commands(
     def connect(baud: int | None) -> DeviceConnection:
         return DeviceConnection(used_host.open(port, baud or 115200), used_host, writer, used_timing)
 
-    exchanges: list[Exchange] = []
+    exchanges: list[Answer] = []
     streaming = False
     detected = detect_device(port, candidate_baud_rates(port, config), connect, used_timing.answer_s)
     line = detected.line
@@ -66,7 +111,7 @@ def record_commands(
                 streaming = text == STREAM or (streaming and text != STOP)
                 answer = exchange(line, text, wire)
                 exchanges.append(answer)
-                writer.on_answer(answer.as_dict())
+                writer.on_answer(answer)
             _listen(line, math.inf if seconds is None and streaming else seconds or 0.0, writer, progress)
     except LineLost as lost:
         raise NoAnswer(f"Port {port}: {lost.why}.", "What arrived before is recorded.") from lost

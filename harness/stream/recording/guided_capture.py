@@ -18,8 +18,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.driver import DriverConfig, Tracker, open_tracker
-from harness.stream.event_counter import EventCounter
 from harness.stream.frame import TrackerFrame
+from harness.stream.line_events import EventCounter
+from harness.stream.recording.recorder import tracked_text
 from harness.stream.recording.recording import RecordingWriter, read_marks
 
 WATCHED_S = 2.0
@@ -112,7 +113,7 @@ def _record_stretch(
 ) -> None:
     log(f"{stretch.name}, {_duration_text(stretch.seconds)}: {stretch.instruction}")
     for frame in _until_ready(frames, ready, writer.path):
-        progress(f"{stretch.name}: waiting ({_tracked_text(frame)})")
+        progress(f"{stretch.name}: waiting ({tracked_text(frame)})")
     watch = _RestWatch()
     for frame in frames:
         watch.add(frame)
@@ -120,7 +121,7 @@ def _record_stretch(
         if moving is not None and bool(moving) != stretch.at_rest:
             break
         hint = f"{', '.join(moving)} move" if moving else "move the stations"
-        progress(f"{stretch.name}: waiting ({hint if moving is not None else _tracked_text(frame)})")
+        progress(f"{stretch.name}: waiting ({hint if moving is not None else tracked_text(frame)})")
     writer.on_mark({"stretch": stretch.name, "seconds": stretch.seconds})
     began_s: float | None = None
     for frame in frames:
@@ -128,7 +129,7 @@ def _record_stretch(
         left_s = stretch.seconds - (frame.received_s - began_s)
         if left_s <= 0.0:
             break
-        progress(f"{stretch.name}: {left_s:.0f} s left ({_tracked_text(frame)})")
+        progress(f"{stretch.name}: {left_s:.0f} s left ({tracked_text(frame)})")
     writer.on_mark({"stretch": "", "finished": stretch.name})
     log(f"{stretch.name}: recorded")
 
@@ -182,8 +183,3 @@ def _changes(place_m: Floats, turn: Floats) -> bool:
 
 def _duration_text(seconds: float) -> str:
     return f"{seconds / 60.0:.3g} min" if seconds >= 120.0 else f"{seconds:.3g} s"
-
-
-def _tracked_text(frame: TrackerFrame) -> str:
-    tracked = int((frame.position_valid | frame.orientation_valid).sum())
-    return f"{tracked} of {len(frame.quality)} stations tracked"

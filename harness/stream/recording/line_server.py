@@ -14,18 +14,15 @@ from pathlib import Path
 
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import RECEIVED, SENT
 from harness.stream.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
 from harness.stream.codec.reader import WireFormat
 from harness.stream.driver.config import DriverConfig, DriverTiming
-from harness.stream.driver.connection import DeviceConnection
-from harness.stream.driver.detection import NoAnswer, candidate_baud_rates, detect_device
+from harness.stream.driver.connection import DeviceConnection, Host, NoAnswer, candidate_baud_rates, detect_device
 from harness.stream.driver.exchange import read_wire_format
-from harness.stream.driver.host import Host
 from harness.stream.driver.transport import LineLost, SelectTransport
-from harness.stream.emulator.pty_port import check_link_is_free
+from harness.stream.emulator.pty_port import ClientPty, check_link_is_free
 from harness.stream.line_events import LineEvent, LineEventKind
-from harness.stream.recording.client_pty import ClientPty
+from harness.stream.recording.blocks import RECEIVED, SENT
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
 from harness.stream.recording.recording import RecordingWriter
 
@@ -79,14 +76,8 @@ class _LineServer:
         log: Callable[[str], None],
         host: Host,
     ) -> None:
-        self._port, self._link, self._config, self._writer, self._log, self._host = (
-            port,
-            link,
-            config,
-            writer,
-            log,
-            host,
-        )
+        self._port, self._link, self._config = port, link, config
+        self._writer, self._log, self._host = writer, log, host
         self._line: DeviceConnection | None = None
         self._transport: SelectTransport | None = None
         self._pty: ClientPty | None = None

@@ -37,7 +37,9 @@ from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
-from harness.stream.codec.blocks import (
+from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.line_events import LineEvent
+from harness.stream.recording.blocks import (
     ANSWERED,
     CONFIGURED,
     EVENT,
@@ -55,9 +57,6 @@ from harness.stream.codec.blocks import (
     read_version,
     scan_blocks,
 )
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
-from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
 PLAN = "plan"
@@ -117,14 +116,16 @@ class Recording:
     @property
     def marks(self) -> list[dict[str, Any]]:
         """Marks of stretches, with the time on the host's clock [s] at which each begins."""
-        blocks = [block for block in self.blocks() if block.kind == MARK]
-        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
+        return self.timed_contents(MARK, self.blocks())
 
     @property
     def answers(self) -> list[dict[str, Any]]:
         """Commands that a person sent, with their answers and the time on the host's clock [s]."""
-        blocks = [block for block in self.blocks() if block.kind == ANSWERED]
-        return [{"monotonic_s": block.monotonic_s, **self.parse_json(block)} for block in blocks]
+        return self.timed_contents(ANSWERED, self.blocks())
+
+    def timed_contents(self, kind: str, blocks: Iterable[RecordingBlock]) -> list[dict[str, Any]]:
+        """The JSON of the blocks of a kind, with their time on the host's clock [s]."""
+        return [{"monotonic_s": b.monotonic_s, **self.parse_json(b)} for b in blocks if b.kind == kind]
 
     def format_of(self, configured: RecordingBlock) -> WireFormat:
         """Parse the wire format in a "conf" block. Raises BadFile."""
@@ -188,10 +189,8 @@ def _seek_first_block(path: Path, file: BinaryIO) -> bool:
 
 def read_marks(path: Path) -> list[dict[str, Any]]:
     """Return what `Recording.marks` has, from a file that is read in pieces. Raises BadFile as `read_recording`."""
-    parser = Recording(path, b"")
     with open_recording(path) as file:
-        blocks = (block for block in _whole_blocks(file) if block.kind == MARK)
-        return [{"monotonic_s": block.monotonic_s, **parser.parse_json(block)} for block in blocks]
+        return Recording(path, b"").timed_contents(MARK, _whole_blocks(file))
 
 
 def _noted_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
@@ -312,7 +311,7 @@ class RecordingWriter:
         self.counts[MARK] += 1
 
     def on_answer(self, content: Mapping[str, Any]) -> None:
-        """Write a command with its answer (`Exchange.as_dict`), as much of it as fits; `recv` blocks have all of it."""
+        """Write a command with its answer (`driver.exchange`), as much of it as fits; `recv` blocks have all of it."""
         fitting = {**content, "received": content["received"][: 3 * _MAX_ANSWER_BYTES]}
         while len(json.dumps(fitting)) > MAX_PAYLOAD_BYTES:
             fitting["answers"] = fitting["answers"][: len(fitting["answers"]) // 2]

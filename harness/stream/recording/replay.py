@@ -15,11 +15,9 @@ from typing import Literal
 import numpy as np
 
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import CONFIGURED, RECEIVED
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.continuous_reader import ContinuousFrameReader
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
 from harness.stream.frame import TrackerFrame
+from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 
 CHUNKS_PER_BATCH = 1000
@@ -122,20 +120,31 @@ class RecordingStream:
         self._reader = reader = ContinuousFrameReader()
         batch_size = 1 if isinstance(self._speed, float) else CHUNKS_PER_BATCH
         now_s, wall_s, shift_s = -math.inf, 0.0, 0.0
-        chunks_waiting: list[tuple[float, bytes]] = []
+        waiting: list[tuple[float, bytes]] = []
+
+        def due(frames: list[TrackerFrame]) -> list[tuple[float, TrackerFrame]]:
+            return [(now_s, frame) for frame in frames]
+
+        def decode() -> list[tuple[float, TrackerFrame]]:
+            """The frames of the chunks that wait."""
+            times_s, chunks = [at_s for at_s, _ in waiting], [data for _, data in waiting]
+            waiting.clear()
+            ends = np.cumsum([len(data) for data in chunks], dtype=np.int64)
+            return due(reader.feed_all(ByteCapture(b"".join(chunks), ends, np.array(times_s))))
+
         for block in self.recording.blocks():
             if block.kind == RECEIVED and block.payload:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-                chunks_waiting.append((now_s, block.payload))
-                if len(chunks_waiting) >= batch_size:
-                    yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
+                waiting.append((now_s, block.payload))
+                if len(waiting) >= batch_size:
+                    yield from decode()
             elif block.kind == RECEIVED:
-                yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
+                yield from decode()
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-                yield from _with_due_time(now_s, reader.expire(now_s))
+                yield from due(reader.expire(now_s))
             elif block.kind == CONFIGURED:
-                yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
-                yield from _with_due_time(now_s, reader.finish())
+                yield from decode()
+                yield from due(reader.finish())
                 wire = self.recording.format_of(block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
                     pause_s = max(block.wall_s - wall_s, 1.0 / wire.rate_hz)
@@ -143,18 +152,5 @@ class RecordingStream:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 self._wall_ahead_s = wall_s - now_s
                 reader.begin_session(wire, now_s)
-        yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
-        yield from _with_due_time(now_s, reader.finish())
-
-
-def _with_due_time(now_s: float, frames: list[TrackerFrame]) -> Iterator[tuple[float, TrackerFrame]]:
-    return ((now_s, frame) for frame in frames)
-
-
-def _concatenate_chunks(chunks_waiting: list[tuple[float, bytes]]) -> ByteCapture:
-    """Return the waiting chunks as one capture, and empty the list."""
-    received_s, chunks = [now_s for now_s, _ in chunks_waiting], [data for _, data in chunks_waiting]
-    chunks_waiting.clear()
-    return ByteCapture(
-        b"".join(chunks), np.cumsum([len(data) for data in chunks], dtype=np.int64), np.array(received_s)
-    )
+        yield from decode()
+        yield from due(reader.finish())

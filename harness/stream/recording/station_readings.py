@@ -16,13 +16,10 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadFile
-from harness.stream.codec.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
-from harness.stream.codec.clock import ClockUnwrapper
 from harness.stream.codec.decoder import Garbage, RecordRun
-from harness.stream.codec.plausibility import PlausibilityCheck
-from harness.stream.codec.reader import WireFormat, make_decoder
-from harness.stream.codec.readings import Readings, concatenate_readings, decode_readings
-from harness.stream.codec.records import Table
+from harness.stream.codec.reader import ReadingsDecoder, WireFormat, make_decoder
+from harness.stream.codec.readings import Readings, concatenate_readings
+from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
 
 BLOCK_S = 600.0
@@ -145,10 +142,8 @@ class _Session:
 
     def __init__(self, wire: WireFormat, number: int, configured_s: float) -> None:
         self.wire, self.number, self._configured_s = wire, number, configured_s
-        period_s = 1.0 / wire.rate_hz
         self._decoder = make_decoder(wire)
-        self._clock = ClockUnwrapper(period_s, configured_s if wire.zeroed else None)
-        self._plausibility = PlausibilityCheck(len(wire.stations), period_s)
+        self._decode_readings = ReadingsDecoder(wire, configured_s if wire.zeroed else None)
         self._chunks: list[bytes] = []
         self._ends: list[int] = []
         self._ends_s: list[float] = []
@@ -197,7 +192,7 @@ class _Session:
         for event in events:
             if isinstance(event, RecordRun):
                 last_byte = event.offset + event.size * np.arange(1, len(event.table) + 1)
-                decoded.append(self._readings(event.table, ends_s[ends.searchsorted(last_byte)]))
+                decoded.append(self._decode_readings(event.table, ends_s[ends.searchsorted(last_byte)]))
             elif isinstance(event, Garbage):
                 self._garbage += event.size
         if decoded:
@@ -207,16 +202,6 @@ class _Session:
                 parts.append(_select(readings, stamps_s, row))
         decided = int(ends.searchsorted(self._fed - self._decoder.pending, side="right"))
         self._ends, self._ends_s = self._ends[decided:], self._ends_s[decided:]
-
-    def _readings(self, table: Table, received_s: Floats) -> tuple[Readings, Floats]:
-        """The readings of a table as `FrameReader` has them, and their stamps (N,) [s]."""
-        raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
-        measured_s = self._clock.unwrap(raw.measured_s, received_s, raw.station)
-        suspect = raw.suspect | np.isnan(measured_s) if 21 in self.wire.items else raw.suspect
-        readings = Readings(
-            raw.station, received_s, measured_s, raw.position_m, raw.tracker_from_station, raw.quality, suspect
-        )
-        return self._plausibility.mark_suspect(readings), raw.measured_s
 
 
 def _select(readings: Readings, stamps_s: Floats, row: int) -> StationReadings:

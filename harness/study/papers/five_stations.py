@@ -10,7 +10,7 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, CellRow, errors_by_unit, mean_table
+from harness.study.papers.tables import SummaryRow, errors_by_unit, mean_table
 
 KERNEL_CCA, WEIGHTED_BLEND = "kernel_cca", "weighted_blend"
 KERNEL_CCA_LITERAL, WEIGHTED_BLEND_LITERAL = "kernel_cca:literal", "weighted_blend:literal"
@@ -108,36 +108,35 @@ def claim_in_run(
     return claim_lower_error(text, less, more, published=published, kind=kind, reading=reading)
 
 
-def performers(rows: Iterable[CellRow]) -> tuple[str, ...]:
+def performers(rows: Iterable[SummaryRow]) -> tuple[str, ...]:
     """The kinds of performers, "known" first; they are never pooled."""
     return tuple(sorted({row["performer"] for row in rows}))
 
 
-def errors_by_method(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
+def errors_by_method(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
     """Method -> unit -> error, of rows that differ in nothing else."""
-    by_method: dict[str, list[CellRow]] = {}
+    by_method: dict[str, list[SummaryRow]] = {}
     for row in rows:
         by_method.setdefault(row["method"], []).append(row)
     return {method: errors_by_unit(each, metric) for method, each in by_method.items()}
 
 
-def method_tables(title: str, rows: Sequence[CellRow], metrics: Mapping[str, str]) -> Iterator[FindingsTable]:
+def method_tables(title: str, rows: Sequence[SummaryRow], metrics: Mapping[str, str]) -> Iterator[FindingsTable]:
     """Tables of methods by performers and calibrations, one for each metric; joint angles have their RMS as well."""
     for metric, unit in metrics.items():
-        sides: list[dict[str, dict[str, Errors]]] = [{} for _ in ((metric, RMS) if metric == METRIC else (metric,))]
+        groups: dict[str, dict[str, Errors]] = {}
         for performer, calibration in product(performers(rows), _calibrations(rows)):
             selected = [row for row in rows if (row["performer"], row["calibration"]) == (performer, calibration)]
-            for groups, name in zip(sides, (metric, RMS), strict=False):
-                for method, errors in errors_by_method(selected, name).items():
-                    groups.setdefault(method, {})[f"{performer}, {calibration}"] = errors
-        yield mean_table(f"{title} [{unit}]", "method", *sides)
+            for method, errors in errors_by_method(selected, metric).items():
+                groups.setdefault(method, {})[f"{performer}, {calibration}"] = errors
+        yield mean_table(f"{title} [{unit}]", "method", groups)
 
 
-def _calibrations(rows: Iterable[CellRow]) -> tuple[str, ...]:
+def _calibrations(rows: Iterable[SummaryRow]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(row["calibration"] for row in rows))
 
 
-def _gains(behaviour: str, rows: Sequence[CellRow]) -> Iterator[tuple[str, ...]]:
+def _gains(behaviour: str, rows: Sequence[SummaryRow]) -> Iterator[tuple[str, ...]]:
     for performer, calibration in product(performers(rows), _calibrations(rows)):
         selected = [row for row in rows if (row["performer"], row["calibration"]) == (performer, calibration)]
         errors = errors_by_method(selected)

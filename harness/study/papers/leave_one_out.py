@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 from harness.compare.claims import claim_lower_error
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.tables import RMS, errors_by_unit, mean_bars, mean_table
+from harness.study.papers.tables import UnitErrors, errors_by_unit, mean_bars, mean_table
 
 BEHAVIOURS = ("walking", "boxing", "jumping", "golf", "table_tennis")
 STAND_INS = {"racket_proxy": "table_tennis"}
@@ -81,10 +80,10 @@ class ExperimentCondition:
         new = f", {self.performer} performers" if self.performer == "new" else ""
         return f"{behaviour_label(self.behaviour)}{new}"
 
-    def errors(self, study: PaperStudy, method: str, metric: str = METRIC) -> dict[str, float]:
+    def errors(self, study: PaperStudy, method: str) -> UnitErrors:
         """Unit -> error of a method."""
         where = {"behaviour": self.behaviour, "performer": self.performer, "inputs": self.inputs}
-        return errors_by_unit(study.rows(self.run, method=method, **where), metric)
+        return errors_by_unit(study.rows(self.run, method=method, **where))
 
 
 def list_conditions(study: PaperStudy) -> list[ExperimentCondition]:
@@ -191,7 +190,6 @@ def _compare_methods(
                 "Joint-angle error [deg]",
                 "condition",
                 {str(s): each for s, each in errors.items()},
-                {str(s): {method: s.errors(study, method, RMS) for method in METHODS} for s in errors},
             ),
             *_performer_tables(study, errors, orders),
         ),

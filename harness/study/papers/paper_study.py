@@ -1,13 +1,14 @@
 """A paper study: named runs in one folder, which are run by `engine.run`, resumed, and read back.
 
 The folder has study.json (the identity of the study), a folder for each run, and measured/ for other measurements.
+Its quick form has a few short clips, to see that everything works. It decides no statement.
 """
 
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -17,12 +18,18 @@ from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.cells import cell_names
+from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
 from harness.results.digests import STUDY_FILE, check_key, read_result_json, write_result_json
 from harness.results.storage import open_folder, read_summary
+
+CLIPS, LONGEST_S = 2, 3.0
+"""Number of test clips of each behaviour, and their length with the first second [s]."""
+DATABASE_SHARE = 0.05
+"""Share of the paper's frames in the databases whose speed is measured."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,7 @@ class PaperStudy:
     failures: Mapping[str, str] = field(default_factory=dict)
     """"run: cell", or the name of a run that was refused as a whole -> traceback or message of its failure."""
     quick: bool = False
-    """Whether this is the quick form (see `quick_form`)."""
+    """Whether this is the quick form (see `shorten_scenario`)."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
@@ -51,8 +58,7 @@ class PaperStudy:
         if not rows:
             return []
         motion, sampling = self.runs[run].motion, Sampling(unit=self.runs[run].unit)
-        shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-        planned = Counter(zip(map(sampling.unit_of, motion.test), shown, strict=True))
+        planned = Counter((sampling.unit_of(clip), behaviour) for clip, behaviour in motion.tested)
         selected = (row for row in rows if all(row[name] == value for name, value in wanted.items()))
         units = ((row, sampling.unit_of(row["clip"])) for row in selected)
         return [{**row, "unit": unit, "unit_clips": planned[unit, row["behaviour"]]} for row, unit in units]
@@ -156,8 +162,16 @@ def run_scenarios(
 
 def count_cells(runs: Mapping[str, Scenario]) -> int:
     """Number of cells of all runs."""
-    return sum(
-        len(variant.motion.test) * len(variant.methods) * len(variant.inputs)
-        for scenario in runs.values()
-        for _, variant in variants(scenario)
-    )
+    return sum(len(cell_names(scenario)) for scenario in runs.values())
+
+
+def shorten_scenario(scenario: Scenario) -> Scenario:
+    """The scenario with the first `CLIPS` test clips of each behaviour, of `LONGEST_S` at most; its database stays."""
+    motion, taken, kept = scenario.motion, Counter[str](), list[tuple[str, str]]()
+    for clip, behaviour in motion.tested:
+        taken[behaviour] += 1
+        if taken[behaviour] <= CLIPS:
+            kept.append((clip, behaviour))
+    test, behaviours = zip(*kept, strict=True)
+    longest_s = min(motion.longest_s or LONGEST_S, LONGEST_S)
+    return replace(scenario, motion=replace(motion, test=test, behaviours=behaviours, longest_s=longest_s))

@@ -9,7 +9,6 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy
-from harness.study.papers.range_of_motion import measure_ranges
 from harness.study.papers.station_sets import (
     STATION_ABBREVIATIONS,
     ErrorsBySet,
@@ -21,11 +20,12 @@ from harness.study.papers.station_sets import (
     claim_suitable,
     errors_by_set,
     format_station_set,
+    measure_ranges,
     ranked_bars,
     set_table,
     station_count_lines,
 )
-from harness.study.papers.tables import HINGE_GROUPS, RMS, errors_by_joint_group, errors_by_unit, mean_table
+from harness.study.papers.tables import errors_by_joint_group, errors_by_unit, mean_table
 
 ALL_STATIONS, RIGHT_HAND = format_station_set(STATION_ABBREVIATIONS), "RH"
 PUBLISHED_SETS = {"walking": "RA+LA+PEL", "boxing": "RH+LH+PEL"}
@@ -48,7 +48,7 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
     sides = {
         reading: {
             metric: {b: errors_by_set(study.rows(f"sensors_{b}", method=method), metric) for b in PUBLISHED_SETS}
-            for metric in (METRIC, RMS, "mpjpe_mm")
+            for metric in (METRIC, "mpjpe_mm")
         }
         for reading, method in METHODS.items()
     }
@@ -94,7 +94,6 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
                 set_table(
                     f"{b}, {METHODS[reading]}: all sets, mean ± sd, RMS over units (units)",
                     errors[METRIC][b],
-                    errors[RMS][b],
                     errors["mpjpe_mm"][b],
                     ALL_STATIONS,
                 )
@@ -195,14 +194,11 @@ def one_station(study: PaperStudy) -> PaperExperiment:
 def _body_part_table(behaviour: str, study: PaperStudy, run: str, sets: Sequence[str]) -> FindingsTable:
     """Errors of every group of hinges and of the root, for some sets of stations, with our method."""
     groups: dict[str, dict[str, Errors]] = {}
-    roots: dict[str, dict[str, Errors]] = {}
     stations = {format_station_set(row["stations"]): row["stations"] for row in study.rows(run)}
     for name in sets:
         where = {"stations": stations.get(name, []), "method": KERNEL_CCA}
-        cells = list(study.cells(run, **where))
-        for side, metric in ((groups, METRIC), (roots, RMS)):
-            for group, errors in errors_by_joint_group(cells, HINGE_GROUPS, metric).items():
-                side.setdefault(f"{group} [deg]", {})[name] = errors
+        for group, errors in errors_by_joint_group(study.cells(run, **where)).items():
+            groups.setdefault(f"{group} [deg]", {})[name] = errors
         for metric, title in (("root_heading_deg", "root's heading [deg]"), ("root_position_mm", "root [mm]")):
             groups.setdefault(title, {})[name] = errors_by_unit(study.rows(run, **where), metric)
-    return mean_table(f"{behaviour}, {KERNEL_CCA}: error by body part", "body part", groups, roots)
+    return mean_table(f"{behaviour}, {KERNEL_CCA}: error by body part", "body part", groups)

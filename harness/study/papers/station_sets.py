@@ -1,4 +1,4 @@
-"""Comparison of sets of stations: the best of each size, and the gain of one more (Kim et al. 2012, Fig. 3)."""
+"""Kim et al. 2012, Fig. 3: the best set of stations of each size, the gain of one more, and the most movable limbs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -13,10 +13,13 @@ from harness.compare.paired_statistics import (
     PairedDifference,
     mean_interval,
 )
+from harness.core.split import ClipPart, allowed_frames
+from harness.experiment.cells import open_scenario_motion
 from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
-from harness.study.papers.tables import CellRow, errors_by_unit, format_mean, mean_sd, number_of_units
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.tables import SummaryRow, errors_by_unit, format_mean, mean_sd, number_of_units
 
 STATION_ABBREVIATIONS = {
     "right_hand": "RH",
@@ -30,6 +33,15 @@ _WITH_MORE = (4, 5)
 """Sizes of the sets that a suitable set of three is compared with."""
 ErrorsBySet = Mapping[str, Errors]
 """Set of stations, such as "RH+LH+PEL" -> error by unit."""
+LIMBS: Mapping[str, tuple[str, ...]] = {
+    "right_hand": ("rhumerus", "rradius", "rwrist", "rhand"),
+    "left_hand": ("lhumerus", "lradius", "lwrist", "lhand"),
+    "right_ankle": ("rfemur", "rtibia"),
+    "left_ankle": ("lfemur", "ltibia"),
+    "pelvis": (),
+}
+"""Station -> bones from shoulder or hip to the one that carries it; the pelvis is the root and has no hinge."""
+_QUANTILES = (0.025, 0.975)
 
 
 def format_station_set(stations: Iterable[str]) -> str:
@@ -43,9 +55,9 @@ def count_stations(name: str) -> int:
     return name.count("+") + 1
 
 
-def errors_by_set(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
+def errors_by_set(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
     """Set -> unit -> error, of rows that differ only in clip and stations."""
-    by_set: dict[str, list[CellRow]] = {}
+    by_set: dict[str, list[SummaryRow]] = {}
     for row in rows:
         by_set.setdefault(format_station_set(row["stations"]), []).append(row)
     return {name: errors_by_unit(each, metric) for name, each in by_set.items()}
@@ -201,9 +213,7 @@ def station_count_lines(title: str, behaviours: Mapping[str, ErrorsBySet], capti
     return LineChart(title, "stations", "mean joint-angle error [deg]", tuple(map(float, sizes)), series, shown)
 
 
-def set_table(
-    title: str, angles: ErrorsBySet, roots: ErrorsBySet, positions: ErrorsBySet, reference: str
-) -> FindingsTable:
+def set_table(title: str, angles: ErrorsBySet, positions: ErrorsBySet, reference: str) -> FindingsTable:
     """Table of all sets: mean and RMS of joint angles, joint centres, and the ratio of the angle error to that of the
     `reference` set.
     """
@@ -211,7 +221,7 @@ def set_table(
     rows = [
         (
             name,
-            format_mean(errors, rms=roots.get(name)),
+            format_mean(errors),
             format_mean(positions.get(name, {}), 0),
             _ratio_text(_mean_error(errors) / base),
         )
@@ -227,3 +237,28 @@ def _ratio_text(ratio: float) -> str:
 def _mean_error(errors: Errors) -> float:
     """Mean over units; NaN without units."""
     return float(np.mean(list(errors.values()))) if errors else float("nan")
+
+
+def measure_ranges(study: PaperStudy, run: str) -> dict[str, float]:
+    """Station -> range of motion of its limb in the run's examples [deg].
+
+    The range of a limb is that of its most movable hinge: the width of the central 95 % of its angles over all frames
+    that may be learnt from, so those of tested blocks do not count. A station without hinges has 0.
+    """
+    motion = study.runs[run].motion
+    source = open_scenario_motion(motion, study.library, study.seed)
+    withheld = [ClipPart.parse(text) for text in (*motion.withheld, *motion.test)]
+    angles: dict[str, list[np.ndarray]] = {}
+    for name in motion.examples:
+        clip = source.load(name)
+        runs = allowed_frames(withheld, name, len(clip), clip.rate_hz)
+        for column, hinge in enumerate(clip.skeleton.dof_names):
+            angles.setdefault(hinge, []).extend(clip.angles_rad[run.start : run.stop, column] for run in runs)
+    widths_deg = {
+        hinge: float(np.rad2deg(np.ptp(np.quantile(np.concatenate(values), _QUANTILES))))
+        for hinge, values in angles.items()
+    }
+    return {
+        station: max((width for hinge, width in widths_deg.items() if hinge.partition(".")[0] in bones), default=0.0)
+        for station, bones in LIMBS.items()
+    }

@@ -1,6 +1,7 @@
 """Conversion of rows and cells of runs to errors by unit, tables and figures."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.results.summary import GROUP_KEYS
 
-CellRow = Mapping[str, Any]
+SummaryRow = Mapping[str, Any]
 RMS = "joint_angle_rms_deg"
 """The root mean square of the hinge errors, which stands beside their mean."""
 HINGE_GROUPS = {
@@ -27,13 +28,20 @@ HINGE_GROUPS = {
 """Group -> bones; together they have the 48 hinges."""
 
 
-def errors_by_unit(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
-    """Unit of statistics -> mean error of its clips, of rows that differ only in the clip (see `PaperStudy.rows`).
+class UnitErrors(dict[str, float]):
+    """Unit of statistics -> mean error of its clips."""
+
+    rms: dict[str, float] | None = None
+    """Unit -> root mean square beside it, of joint angles; None for other errors."""
+
+
+def errors_by_unit(rows: Iterable[SummaryRow], metric: str = METRIC) -> UnitErrors:
+    """Errors of rows that differ only in the clip (see `PaperStudy.rows`).
 
     A unit of which a clip was not measured is left out, so that means of one unit can be paired. BadInput for two rows
     of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
     """
-    errors: dict[str, tuple[CellRow, float | None]] = {}
+    of_clip: dict[str, SummaryRow] = {}
     kinds: dict[str, Any] = {}
     for row in rows:
         for name in (*GROUP_KEYS, "behaviour"):
@@ -41,13 +49,16 @@ def errors_by_unit(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, f
                 raise BadInput(
                     f"Errors of {name} {kinds[name]!r} and {row[name]!r} cannot be pooled.", "Select one of them."
                 )
-        if row["clip"] in errors:
+        if row["clip"] in of_clip:
             raise BadInput(f"Two errors on {row['clip']} cannot be pooled.", "Select one value of what varies.")
-        errors[row["clip"]] = row, row[metric]
-    return _average(errors.values())
+        of_clip[row["clip"]] = row
+    errors = UnitErrors(_average((row, row[metric]) for row in of_clip.values()))
+    if metric == METRIC:
+        errors.rms = _average((row, row.get(RMS)) for row in of_clip.values())
+    return errors
 
 
-def _average(values: Iterable[tuple[CellRow, float | None]]) -> dict[str, float]:
+def _average(values: Iterable[tuple[SummaryRow, float | None]]) -> dict[str, float]:
     """Unit -> mean of the values of its clips, of units all of whose clips have one."""
     of_unit: dict[tuple[str, int], list[float]] = {}
     for row, value in values:
@@ -62,12 +73,13 @@ def mean_sd(errors: Mapping[str, float]) -> tuple[float | None, float | None]:
     return float(values.mean()) if len(values) else None, float(values.std(ddof=1)) if len(values) > 1 else None
 
 
-def format_mean(errors: Mapping[str, float], decimals: int = 2, rms: Mapping[str, float] | None = None) -> str:
+def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
     """Format mean, standard deviation over units and number of units, such as "1.23 ± 0.45 (8)".
 
-    With `rms` (unit -> root mean square error) its mean over units follows: "1.23 ± 0.45, RMS 1.98 (8)".
+    Where the errors have root mean squares, their mean over units follows: "1.23 ± 0.45, RMS 1.98 (8)".
     """
     mean, sd = mean_sd(errors)
+    rms = errors.rms if isinstance(errors, UnitErrors) else None
     if mean is None:
         return "not measured"
     spread = "" if sd is None else f" ± {sd:.{decimals}f}"
@@ -79,18 +91,13 @@ ErrorGroups = Mapping[str, Mapping[str, Mapping[str, float]]]
 """Group -> column -> error by unit."""
 
 
-def mean_table(title: str, first_column: str, groups: ErrorGroups, rms: ErrorGroups | None = None) -> FindingsTable:
-    """Table of groups by columns, with a row for each group; `rms` has the root mean square errors."""
+def mean_table(title: str, first_column: str, groups: ErrorGroups) -> FindingsTable:
+    """Table of groups by columns, with a row for each group."""
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
-    roots: ErrorGroups = rms or {}
-    rows = [
-        (
-            group,
-            *(format_mean(each.get(column, {}), rms=roots.get(group, {}).get(column)) for column in columns),
-        )
-        for group, each in groups.items()
-    ]
-    shown = "mean ± sd, RMS" if rms else "mean ± sd"
+    rows = [(group, *(format_mean(each.get(column, {})) for column in columns)) for group, each in groups.items()]
+    cells = (errors for each in groups.values() for errors in each.values())
+    has_rms = any(isinstance(errors, UnitErrors) and errors.rms is not None for errors in cells)
+    shown = "mean ± sd, RMS" if has_rms else "mean ± sd"
     return FindingsTable(f"{title}: {shown} over units (units)", (first_column, *columns), tuple(rows))
 
 
@@ -145,20 +152,22 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
 
 
 def errors_by_joint_group(
-    cells: Iterable[tuple[CellRow, Cell]],
+    cells: Iterable[tuple[SummaryRow, Cell]],
     groups: Mapping[str, Sequence[str]] = HINGE_GROUPS,
-    metric: str = METRIC,
-) -> dict[str, dict[str, float]]:
-    """Group of hinges -> unit -> error [deg], of cells that differ only in the clip (see `errors_by_unit`).
+) -> dict[str, UnitErrors]:
+    """Group of hinges -> errors [deg], of cells that differ only in the clip (see `errors_by_unit`).
 
-    It is the mean over the hinges of the group; for the metric `RMS`, the root of the mean square.
+    They are means over the hinges of the group, and roots of the mean squares.
     """
-    by_group: dict[str, list[tuple[CellRow, float]]] = {name: [] for name in groups}
+    by_group: dict[tuple[str, str], list[tuple[SummaryRow, float]]] = {}
     for row, cell in cells:
-        errors = cell.scores.per_joint.get(metric, {})
-        for group, bones in groups.items():
+        for metric, (group, bones) in product((METRIC, RMS), groups.items()):
+            errors = cell.scores.per_joint.get(metric, {})
             values = np.array([error for hinge, error in errors.items() if hinge.partition(".")[0] in bones])
             if len(values):
                 mean = np.sqrt(np.mean(values**2)) if metric == RMS else np.mean(values)
-                by_group[group].append((row, float(mean)))
-    return {group: _average(values) for group, values in by_group.items()}
+                by_group.setdefault((group, metric), []).append((row, float(mean)))
+    found = {group: UnitErrors(_average(by_group.get((group, METRIC), []))) for group in groups}
+    for group, errors in found.items():
+        errors.rms = _average(by_group.get((group, RMS), []))
+    return found

@@ -24,16 +24,15 @@ from typing import Annotated, Literal
 
 from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.names import Name
-from harness.core.ranges import Range
+from harness.core.ranges import Name, Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 
 Pair = Literal["", "each", "together"]
-CandidateGroup = tuple[StationPlacement, ...]
+CandidateGroup = tuple[CandidatePlace, ...]
 """Places that are used together."""
-StationSet = tuple[StationPlacement, ...]
+StationSet = tuple[CandidatePlace, ...]
 """A set of places, in the order of the candidates."""
 _OPPOSITE_SIDE: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
 MOST_PLACES = 10_000
@@ -59,7 +58,7 @@ class Candidate:
     def groups(self) -> tuple[CandidateGroup, ...]:
         """The groups of places; BadInput for a pair in the middle of the body, or a name that contradicts the side."""
         side = body_side(self.bone, self.along)
-        place = StationPlacement(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
+        place = CandidatePlace(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
         if not self.pair:
             return ((place,),)
         if not place.side:
@@ -115,7 +114,7 @@ def opposite_bone(bone: str) -> str:
     return swapped if swapped in standard_skeleton().names else bone
 
 
-def mirror_place(place: StationPlacement) -> StationPlacement:
+def mirror_place(place: CandidatePlace) -> CandidatePlace:
     """The mirror image of a place on the other side of the body.
 
     Angles around a bone follow the right-hand rule about its direction. Mirroring reverses their sign.
@@ -143,7 +142,7 @@ def make_candidate_groups(
     return units
 
 
-def placement_fault(place: StationPlacement, skeleton: Skeleton | None = None) -> str:
+def placement_fault(place: CandidatePlace, skeleton: Skeleton | None = None) -> str:
     """Explain why a station cannot be placed there, by default on the standard body; "" where it can."""
     if not 0.0 <= place.along <= 1.0:
         return f"along = {place.along:g}, not in 0 to 1"
@@ -156,12 +155,12 @@ def placement_fault(place: StationPlacement, skeleton: Skeleton | None = None) -
     return ""
 
 
-def to_mount(place: StationPlacement) -> Mount:
+def to_mount(place: CandidatePlace) -> Mount:
     """The mount of a place."""
     return Mount(station_name(place), place.bone, place.along, math.radians(place.around_deg), place.stand_off_m)
 
 
-def station_name(place: StationPlacement) -> str:
+def station_name(place: CandidatePlace) -> str:
     """Name of the station in the stream. A moved station keeps its name, and with it its random draws of noise."""
     return place.moved_from or place.name
 
@@ -186,7 +185,7 @@ def select_groups(names: Sequence[str], units: Sequence[CandidateGroup], where: 
     return tuple(unit for unit in units if unit in selected)
 
 
-def candidate_names(place: StationPlacement) -> Iterator[str]:
+def candidate_names(place: CandidatePlace) -> Iterator[str]:
     """Yield the name of a place, and the name of its pair."""
     yield place.name
     if place.side:

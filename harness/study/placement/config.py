@@ -7,14 +7,13 @@ from typing import Annotated, Any, Literal
 
 from harness.compare.margins import MARGINS
 from harness.core.fields import build
-from harness.core.files import MAX_TOML_BYTES, read_toml
-from harness.core.input_file import check_input_file, names_input_file
-from harness.core.names import FileName, MethodName, Name, Text, check_words
+from harness.core.files import read_toml
+from harness.core.input_file import names_input_file
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range
+from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import SCHEMA, Scenario, change_scenario, check_scenario, load_scenario
+from harness.experiment.scenario import SCHEMA, Scenario, change_scenario, check_scenario, find_config
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -155,21 +154,12 @@ class PlacementStudy:
 
 def find_placement_study(path: Path | str) -> Path:
     """Find a study by path, or a shipped one by name; BadFile, UnknownName."""
-    given = Path(path)
-    check_words(given)
-    if names_input_file(given):
-        return given
-    shipped = {file.stem: file for file in shipped_placements()}
-    folders = (Path(), Path("scenarios/placement"))
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in folders:
-        return shipped[given.stem]
-    if given.stem.removeprefix(_OLD_PREFIX) in shipped:
-        new = given.stem.removeprefix(_OLD_PREFIX)
-        raise BadInput(f"The placement study {given.stem} is now called {new}.", f"Type: harness placement {new}")
-    if given.parent == Path() and not given.suffix:
-        raise UnknownName("placement study", str(path), shipped)
-    check_input_file(given, "a placement study in TOML", MAX_TOML_BYTES, "Shipped ones are in scenarios/placement/.")
-    return given
+    shipped, old = shipped_placements(), Path(path).stem
+    new = old.removeprefix(_OLD_PREFIX)
+    if old != new and new in {file.stem for file in shipped} and not names_input_file(Path(path)):
+        raise BadInput(f"The placement study {old} is now called {new}.", f"Type: harness placement {new}")
+    folder, advice = Path("scenarios/placement"), "Shipped ones are in scenarios/placement/."
+    return find_config(path, "placement study", folder, shipped, advice)
 
 
 def shipped_placements() -> list[Path]:
@@ -290,12 +280,3 @@ def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -
         return change_scenario(scenario, content, where)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error
-
-
-def load_scenario_beside(name: str, beside: Path) -> Scenario:
-    """The scenario in the folder `beside` of the study, or the shipped one of that name."""
-    for folder in (beside, data_folder("scenarios")):
-        file = folder / (name if name.endswith(".toml") else f"{name}.toml")
-        if names_input_file(file):
-            return load_scenario(file)
-    return load_scenario(name)

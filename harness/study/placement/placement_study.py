@@ -34,24 +34,36 @@ from harness.results.placement_findings import (
 )
 from harness.score.metrics import DEFINITIONS
 from harness.study.papers.paper_study import open_study
-from harness.study.placement import published_claims, search
+from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
-from harness.study.placement.cell_cache import CellCache
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
 from harness.study.placement.power import choose_pilot, estimate_power
 from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
-from harness.study.placement.ranking import Costs, best_by_size, complete_sets, summarise_set
+from harness.study.placement.ranking import (
+    ConditionCosts,
+    Costs,
+    best_alternative,
+    best_by_size,
+    complete_sets,
+    evaluate_claim,
+    rank_agreements,
+    rank_by_condition,
+    sets_of_claim,
+    summarise_set,
+)
 from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
-from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition
+from harness.study.placement.set_results import SetResults
 
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""
+Shorten = Callable[[float], tuple[PlacementPlan, str]]
+"""Gives another plan, and a note, for the duration of a cell on one worker [s]."""
 
 
 def run_placement(
-    path: Path | str,
+    asked: Path | str | PlacementQuestion,
     out: Path,
     *,
     folder: LibraryFolders | None = None,
@@ -61,9 +73,10 @@ def run_placement(
     progress: ProgressCallback = lambda last, done, planned: None,
     announce: Announce = lambda power, notes: None,
 ) -> tuple[PlacementFindings, Outcome]:
-    """Run the study in a TOML file, and write findings.json into `out`.
+    """Run the study in a TOML file, or the one that answers a question, and write findings.json into `out`.
 
-    The first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
+    A question's study keeps within its budget of time. Without `folder` its motion is built in, else the library's. The
+    first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
     `jobs` workers, before the other cells run.
 
     `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
@@ -72,44 +85,30 @@ def run_placement(
     PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
-    plan = plan_placement(path, folder)
-    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce)
+    shorten: Shorten | None = None
+    if isinstance(asked, PlacementQuestion):
+        study, scenario = question_study(asked, folder)
+        plan = plan_study(study, lambda name: scenario, folder)
 
+        def keep_budget(cell_s: float) -> tuple[PlacementPlan, str]:
+            within, shortened, note = plan_within_budget(study, scenario, asked, cell_s, jobs)
+            return plan_study(within, lambda name: shortened, folder), note
 
-def answer_question(
-    question: PlacementQuestion,
-    out: Path,
-    *,
-    folder: LibraryFolders | None = None,
-    executor: TaskExecutor = run_in_process,
-    jobs: int = 1,
-    command: str = "",
-    progress: ProgressCallback = lambda last, done, planned: None,
-    announce: Announce = lambda power, notes: None,
-) -> tuple[PlacementFindings, Outcome]:
-    """Run the study that answers a question within its budget of time; otherwise as `run_placement`.
-
-    Without `folder` the motion is built in; else it is that of the library.
-    """
-    clear_caches()
-    study, scenario = question_study(question, folder)
-
-    def shorten(cell_s: float) -> tuple[PlacementPlan, str]:
-        within, shortened, note = plan_within_budget(study, scenario, question, cell_s, jobs)
-        return plan_study(within, lambda name: shortened, folder), note
-
-    plan = plan_study(study, lambda name: scenario, folder)
-    return _run_plan(plan, CellCache(out, folder, executor, command, progress), jobs, announce, shorten)
+        shorten = keep_budget
+    else:
+        plan = plan_placement(asked, folder)
+    results = SetResults(out, folder, executor, command, progress, plan.study.link)
+    return _run_plan(plan, results, jobs, announce, shorten)
 
 
 def _run_plan(
     plan: PlacementPlan,
-    cache: CellCache,
+    cache: SetResults,
     jobs: int,
     announce: Announce,
-    shorten: Callable[[float], tuple[PlacementPlan, str]] | None = None,
+    shorten: Shorten | None,
 ) -> tuple[PlacementFindings, Outcome]:
-    """Run a plan; `shorten` gives another one, and a note, for the duration of a cell on one worker [s]."""
+    """Run a plan, or the one that `shorten` gives."""
     identity = {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed}
     with open_study(cache.out, identity):
         (cache.out / "cells").mkdir(exist_ok=True)
@@ -140,7 +139,7 @@ def _run_plan(
 class _PlacementRun:
     """One placement study while it runs."""
 
-    def __init__(self, plan: PlacementPlan, cache: CellCache) -> None:
+    def __init__(self, plan: PlacementPlan, cache: SetResults) -> None:
         self.plan, self.study, self.cache = plan, plan.study, cache
         self.costs: dict[StationSet, dict[str, float | None]] = {}
         """Set -> costs on the test clips, for every set that was measured."""
@@ -190,9 +189,9 @@ class _PlacementRun:
             ),
             best=best,
             circumstances=manifest.current_circumstances(),
-            rankings=tuple(ranking for mode in modes for ranking in mode.rankings),
+            rankings=tuple(ranking for rankings, _ in modes for ranking in rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
-            worth=tuple(worth for mode in modes for worth in mode.worth),
+            contributions=tuple(contribution for _, contributions in modes for contribution in contributions),
             compared=tuple(map(names_of_places, compared)),
             conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
@@ -229,8 +228,8 @@ class _PlacementRun:
 
     def _best_alternative(self, claim: PublishedClaim) -> StationSet:
         """The best set of a claim's size, other than the claimed one, on the test clips."""
-        _, others, _ = published_claims.sets_of_claim(claim, self.plan.groups)
-        best = published_claims.best_alternative(
+        _, others, _ = sets_of_claim(claim, self.plan.groups)
+        best = best_alternative(
             [names_of_places(stations) for stations in others],
             {names_of_places(stations): self.costs[stations] for stations in others},
         )
@@ -241,7 +240,7 @@ class _PlacementRun:
         by_name = {names_of_places(stations): stations for stations in self.costs}
         tested = [by_name[names] for names in best] + [stations for stations in others if stations]
         for claim in self.study.claim:
-            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
+            claimed, _, full = sets_of_claim(claim, self.plan.groups)
             tested += [claimed, full]
         return list(dict.fromkeys(tested))
 
@@ -277,8 +276,8 @@ class _PlacementRun:
             costs = {names_of_places(stations): costs for stations, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
         for claim, alternative in zip(self.study.claim, alternatives, strict=True):
-            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
-            yield from published_claims.evaluate_claim(
+            claimed, _, full = sets_of_claim(claim, self.plan.groups)
+            yield from evaluate_claim(
                 claim,
                 names_of_places(claimed),
                 names_of_places(alternative),
@@ -302,7 +301,7 @@ class _PlacementRun:
             )
         if slow := self.cache.line_loss:
             yield slow
-        for ranking in (ranking for mode in modes for ranking in mode.rankings):
+        for ranking in (ranking for rankings, _ in modes for ranking in rankings):
             if len(units) < (least := count_needed(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (
                     f"{ranking.title}: {counted} cannot show a significant difference between {len(ranking.rows)} "

@@ -6,30 +6,28 @@ Unknown names, impossible placements and too many cells are refused here, before
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from harness.compare.margins import margin_of
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.scenario import Scenario, expand_clips
+from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
-from harness.results.placement_findings import StationPlacement
-from harness.study.placement import published_claims, search
+from harness.results.placement_findings import CandidatePlace
+from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
-from harness.study.placement.cell_cache import SetRequest, clips_of_units, link_rate_hz
 from harness.study.placement.config import (
     PlacementStudy,
     base_scenario,
     find_placement_study,
     load_placement_study,
-    load_scenario_beside,
 )
-from harness.study.placement.ranking import Costs
+from harness.study.placement.ranking import Costs, sets_of_claim
 from harness.study.placement.refinement import check_unit_count
 from harness.study.placement.search import names_of_places
+from harness.study.placement.set_results import SetRequest, clips_of_units, link_rate_hz
 
 
 @dataclass(frozen=True)
@@ -59,13 +57,13 @@ class PlacementPlan:
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
 
     @property
-    def places(self) -> tuple[StationPlacement, ...]:
+    def places(self) -> tuple[CandidatePlace, ...]:
         """All candidate places."""
         return tuple(dict.fromkeys(place for unit in self.groups for place in unit))
 
     def request(self, scenario: Scenario, sets: Iterable[StationSet]) -> SetRequest:
         """A request to measure sets in a scenario."""
-        return SetRequest(scenario, tuple(dict.fromkeys(sets)), self.study.link)
+        return scenario, tuple(dict.fromkeys(sets))
 
     def rate_hz(self, size: int) -> float:
         """Rate of a number of stations [Hz]."""
@@ -83,7 +81,7 @@ class PlacementPlan:
         if study.exhaustive:
             sets += search.exhaustive_sets(study.exhaustive, self.groups)
         for claim in study.claim:
-            claimed, others, full = published_claims.sets_of_claim(claim, self.groups)
+            claimed, others, full = sets_of_claim(claim, self.groups)
             sets += [claimed, *others, full]
         return list(dict.fromkeys(sets))
 
@@ -149,7 +147,7 @@ def is_refined(stations: StationSet) -> bool:
 def plan_placement(path: Path | str, folder: LibraryFolders | None) -> PlacementPlan:
     """Plan the study of a TOML file; BadFile, BadInput, UnknownName."""
     file = find_placement_study(path)
-    return plan_study(load_placement_study(file), partial(load_scenario_beside, beside=file.parent), folder)
+    return plan_study(load_placement_study(file), lambda name: load_scenario(find_scenario(name, file.parent)), folder)
 
 
 def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: LibraryFolders | None) -> PlacementPlan:

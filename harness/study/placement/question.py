@@ -14,7 +14,7 @@ from typing import Literal
 
 from harness.body.places import select_places
 from harness.compare.significance import count_needed
-from harness.core.names import Name
+from harness.core.ranges import Name
 from harness.errors import BadInput, UnknownName
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.library import LibraryFolders
@@ -69,10 +69,10 @@ class PlacementQuestion:
         """The question in words."""
         sizes = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest} to {self.most}"
         noun = "station" if self.most == 1 else "stations"
-        return f"Where are {sizes} {noun} worn for {' and '.join(map(spoken, self.behaviours))}?"
+        return f"Where are {sizes} {noun} worn for {' and '.join(map(plain_name, self.behaviours))}?"
 
 
-def spoken(name: str) -> str:
+def plain_name(name: str) -> str:
     """A name with blanks instead of underscores."""
     return name.replace("_", " ")
 

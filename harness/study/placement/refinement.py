@@ -14,7 +14,7 @@ from harness.compare.paired_statistics import compare_paired
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.results.placement_findings import PlacementSearch, SearchStep, StationPlacement
+from harness.results.placement_findings import CandidatePlace, PlacementSearch, SearchStep
 from harness.study.placement.candidates import StationSet, mirror_place, placement_fault, station_name
 from harness.study.placement.config import RefineOptions
 from harness.study.placement.ranking import complete_sets, join_names, sort_by_cost
@@ -73,7 +73,7 @@ def find_move_groups(start: StationSet) -> tuple[MoveGroup, ...]:
     return tuple(groups)
 
 
-def _same_place(a: StationPlacement, b: StationPlacement) -> bool:
+def _same_place(a: CandidatePlace, b: CandidatePlace) -> bool:
     turn = (a.around_deg - b.around_deg) % 360.0
     return (a.bone, a.along, a.stand_off_m) == (b.bone, b.along, b.stand_off_m) and min(turn, 360.0 - turn) < 1e-6
 
@@ -83,7 +83,7 @@ def _candidate_moves(
     groups: Sequence[MoveGroup],
     along: float,
     around_deg: float,
-    origin: dict[str, StationPlacement],
+    origin: dict[str, CandidatePlace],
 ) -> Iterator[tuple[StationSet, str]]:
     """Yield every possible set one step from the current one, and a description of the move."""
     for group in groups:
@@ -105,8 +105,8 @@ def _candidate_moves(
 
 
 def _move_place(
-    place: StationPlacement, along: float, around_deg: float, origin: dict[str, StationPlacement]
-) -> StationPlacement:
+    place: CandidatePlace, along: float, around_deg: float, origin: dict[str, CandidatePlace]
+) -> CandidatePlace:
     """Move a station; at its original place it is the candidate itself again."""
     first = origin[station_name(place)]
     along, around_deg = round(along, 6), round(180.0 - (180.0 - around_deg) % 360.0, 6)

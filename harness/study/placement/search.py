@@ -6,7 +6,6 @@ function caches them. Costs are errors, with the opposite sign where high values
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -28,22 +27,18 @@ Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
 """Measures sets: set -> unit of statistics -> cost."""
 
 
-@dataclass(frozen=True)
-class ModeResult:
-    """Result of a mode."""
-
-    rankings: tuple[Ranking, ...] = ()
-    worth: tuple[MarginalContribution, ...] = ()
+ModeResult = tuple[tuple[Ranking, ...], tuple[MarginalContribution, ...]]
+"""Rankings and contributions that a mode found."""
 
 
 def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """Rank the full set without each unit; the worth of a unit is the increase of the cost without it."""
+    """Rank the full set without each unit; the contribution of a unit is the increase of the cost without it."""
     full, reduced = ablation_sets(table, units)
     costs = measure([full, *reduced.values()])
     sets = {names_of_places(stations): costs[stations] for stations in reduced.values()}
     ranking = rank_sets("ablate", f"{join_names(names_of_places(full))}: each left out", sets, names_of_places(full))
-    worth = [
-        _make_worth(
+    contributions = [
+        _contribution(
             place.name,
             "ablate",
             names_of_places(full),
@@ -52,7 +47,7 @@ def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measu
         for unit, rest in reduced.items()
         for place in unit
     ]
-    return ModeResult((ranking,), tuple(worth))
+    return (ranking,), tuple(contributions)
 
 
 def ablation_sets(
@@ -67,13 +62,13 @@ def ablation_sets(
 
 
 def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """Rank a base set with each unit added, or the units alone; the worth of a unit is the decrease of the cost."""
+    """Rank a base set with each unit added, or the units alone; a unit contributes the decrease of the cost."""
     base, extended = addition_sets(table, units)
     costs = measure([*([base] if base else []), *extended.values()])
     sets = {names_of_places(stations): costs[stations] for stations in extended.values()}
     title = f"{join_names(names_of_places(base))}: each added" if base else "each alone"
-    worth = [
-        _make_worth(
+    contributions = [
+        _contribution(
             place.name,
             "add",
             names_of_places(base),
@@ -83,7 +78,7 @@ def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) ->
         for place in unit
         if base
     ]
-    return ModeResult((rank_sets("add", title, sets, names_of_places(base)),), tuple(worth))
+    return (rank_sets("add", title, sets, names_of_places(base)),), tuple(contributions)
 
 
 def addition_sets(
@@ -98,7 +93,7 @@ def addition_sets(
 
 
 def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """Rank all sets of each size; the worth of a unit is its Shapley value over them."""
+    """Rank all sets of each size; the contribution of a unit is its Shapley value over them."""
     sets = exhaustive_sets(table, units)
     costs = measure(sets)
     sizes = {
@@ -115,7 +110,7 @@ def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup],
         )
         for size, same_size in sizes.items()
     ]
-    return ModeResult(tuple(rankings), tuple(_shapley_worth(of, units, costs)))
+    return tuple(rankings), tuple(_shapley_contributions(of, units, costs))
 
 
 def exhaustive_sets(table: ExhaustiveOptions, units: Sequence[CandidateGroup]) -> list[StationSet]:
@@ -213,13 +208,13 @@ def _measured_costs(costs: Costs) -> Costs:
     return {unit: value for unit, value in costs.items() if value is not None}
 
 
-def _make_worth(
+def _contribution(
     name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, gain: PairedDifference
 ) -> MarginalContribution:
     return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.units))
 
 
-def _shapley_worth(
+def _shapley_contributions(
     units: Sequence[CandidateGroup], order: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
 ) -> Iterator[MarginalContribution]:
     """Shapley value of each unit, over the sets that were measured.
@@ -229,7 +224,7 @@ def _shapley_worth(
     without the unit minus that of the sets with it.
     """
     if len({len(stations) for stations in costs}) == 1:
-        yield from _worth_at_one_size(units, costs)
+        yield from _contributions_at_one_size(units, costs)
         return
     for unit in units:
         sizes: dict[int, list[tuple[StationSet, StationSet]]] = {}
@@ -241,10 +236,10 @@ def _shapley_worth(
             [_mean_by_unit([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
         )
         gain = compare_paired(without, with_unit)
-        yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
+        yield from (_contribution(place.name, "exhaustive", (), gain) for place in unit)
 
 
-def _worth_at_one_size(
+def _contributions_at_one_size(
     units: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
 ) -> Iterator[MarginalContribution]:
     """For each unit, the mean cost of the sets without it minus the mean cost of those with it."""
@@ -252,7 +247,7 @@ def _worth_at_one_size(
         having = [costs[stations] for stations in costs if set(unit) <= set(stations)]
         lacking = [costs[stations] for stations in costs if not set(unit) & set(stations)]
         gain = compare_paired(_mean_by_unit(lacking), _mean_by_unit(having))
-        yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
+        yield from (_contribution(place.name, "exhaustive", (), gain) for place in unit)
 
 
 def _mean_by_unit(each: Sequence[Costs]) -> dict[str, float | None]:

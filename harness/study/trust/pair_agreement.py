@@ -1,4 +1,4 @@
-"""Agreement of the two sides on the order of pairs of arms, and correlations of the arms' mean errors.
+"""Agreement of the two sides: equivalence in a metric, the order of pairs of arms, and rank correlations.
 
 Both sides perform the same motions. What a motion does to the difference of two arms is therefore no error of the
 comparison, and the order is judged on these motions alone. The noise of a simulated difference is read off its seeds.
@@ -8,6 +8,10 @@ performer where the plan declares performers.
 
 Two arms agree or contradict only where both sides show a difference (see `compare.rank_correlation`), so that at most
 the share `level` of the plans has a false contradiction.
+
+Simulation and device are equivalent in a metric at the level a if the interval of the level 1 - 2a of their mean
+difference lies within the margin: two one-sided tests (Schuirmann 1987) over units. Equivalence of several arms is
+claimed only if each is shown, so that no correction is needed (intersection-union, Berger 1982).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,13 +19,19 @@ from itertools import combinations
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.rank_correlation import decide_pairs, side_difference, tau_b, tau_interval
 from harness.compare.ranking import shared_clips
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.trust_findings import PairAgreement, RankCorrelation, SideDifference
+from harness.results.trust_findings import (
+    Equivalence,
+    EquivalenceVerdict,
+    PairAgreement,
+    RankCorrelation,
+    SideDifference,
+)
 
 ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
 """Arm -> unit (a clip or a performer) -> errors: one for each capture of the device or each seed of the simulation.
@@ -150,3 +160,30 @@ def _pearson(x: Floats, y: Floats) -> float:
     first, second = x - x.mean(), y - y.mean()
     scale = float(np.sqrt((first @ first) * (second @ second)))
     return float(first @ second) / scale if scale else float("nan")
+
+
+def judge_equivalence(
+    arm: str, metric: str, device: Mapping[str, float], simulated: Mapping[str, float], margin: float, level: float
+) -> Equivalence:
+    """Judge one metric of one arm; `device` and `simulated` map units to errors, and units of both sides count.
+
+    *Equivalent*: the whole interval lies within the margin. *Beyond the margin*: it lies outside as a whole. Anything
+    else, and fewer than `MIN_UNITS` units, is undecided.
+    """
+    units = shared_clips((device, simulated))
+    if not units:
+        return Equivalence(arm, metric, margin, 0, None, None, None, None, None, "cannot tell", "no unit on both sides")
+    sides = [np.array([side[unit] for unit in units]) for side in (device, simulated)]
+    difference = sides[1] - sides[0]
+    means = float(sides[0].mean()), float(sides[1].mean()), float(difference.mean())
+    if len(units) < MIN_UNITS:
+        why = f"too few units: {len(units)}, of at least {MIN_UNITS}"
+        return Equivalence(arm, metric, margin, len(units), *means, None, None, "cannot tell", why)
+    low, high = mean_interval(difference, 1.0 - 2.0 * level)
+    verdict: EquivalenceVerdict = "cannot tell"
+    why = "the interval contains an end of the margin"
+    if -margin <= low and high <= margin:
+        verdict, why = "equivalent", "the whole interval lies within the margin"
+    elif low > margin or high < -margin:
+        verdict, why = "beyond the margin", "the whole interval lies beyond the margin"
+    return Equivalence(arm, metric, margin, len(units), *means, low, high, verdict, why)

@@ -15,9 +15,8 @@ from typing import Annotated, Any, Literal
 from harness.compare.margins import MARGINS, TIME_METRICS
 from harness.core.fields import build
 from harness.core.files import read_toml
-from harness.core.names import MethodName, Name, Text
 from harness.core.options import expand_alternatives
-from harness.core.ranges import Range, check_fields
+from harness.core.ranges import MethodName, Name, Range, Text, check_fields
 from harness.errors import BadFile, BadInput, UnknownName, name_file
 from harness.experiment.scenario import Scenario, dotted_keys, find_scenario, load_scenario, variants
 

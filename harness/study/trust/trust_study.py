@@ -1,6 +1,6 @@
 """The trust study: does the fitted simulation rank methods as the device does, on the same motion?
 
-The device's captures and simulations of the same takes are evaluated arm by arm (`capture_cells`). Then both sides are
+The device's captures and simulations of the same takes are evaluated arm by arm (`arm_results`). Then both sides are
 compared: health of the streams, errors of the readings, equivalence of each metric, and the order of pairs of arms.
 """
 
@@ -36,23 +36,24 @@ from harness.results.trust_findings import (
 )
 from harness.stream.recording.recording import PLAN, read_recording
 from harness.study.papers.paper_study import open_study
-from harness.study.trust.capture_cells import Arm, CaptureResult, CaptureTask, find_stations, run_capture
-from harness.study.trust.energy_distance import (
-    CORRELATION_TIMES,
-    compare_errors,
-    correlation_samples,
-)
-from harness.study.trust.equivalence import judge_equivalence
+from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
     ArmErrors,
     average_performers,
     clip_means,
     correlate_ranks,
+    judge_equivalence,
     judge_pairs,
     unit_of,
 )
 from harness.study.trust.plan import Plan, load_plan, parameter_variants, plan_digest, scenario_file, unit_file
-from harness.study.trust.reading_errors import FEATURES, HealthCounts
+from harness.study.trust.reading_errors import (
+    CORRELATION_TIMES,
+    FEATURES,
+    HealthCounts,
+    compare_errors,
+    correlation_samples,
+)
 
 
 class OtherPlan(HarnessError):
@@ -115,7 +116,7 @@ def run_trust_study(
     scenario = load_scenario(scenario_file(plan, path))
     unit = unit_file(plan, path)
     fitted = None if unit is None else read_fitted_unit(unit)
-    task = CaptureTask(
+    task = TrustTask(
         capture=Path(),
         clip="",
         scenario_file=scenario_file(plan, path),
@@ -170,8 +171,8 @@ def plan_arms(plan: Plan, scenario: Scenario) -> tuple[Arm, ...]:
     )
 
 
-def _run_tasks(tasks: Sequence[CaptureTask], executor: TaskExecutor, progress: ProgressCallback) -> list[CaptureResult]:
-    results: dict[int, CaptureResult] = {}
+def _run_tasks(tasks: Sequence[TrustTask], executor: TaskExecutor, progress: ProgressCallback) -> list[ArmResults]:
+    results: dict[int, ArmResults] = {}
     progress("", 0, len(tasks))
     for which, future in executor(run_capture, [(task,) for task in tasks]):
         results[which] = future.result()
@@ -179,9 +180,7 @@ def _run_tasks(tasks: Sequence[CaptureTask], executor: TaskExecutor, progress: P
     return [results[which] for which in range(len(tasks))]
 
 
-def judge_study(
-    head: TrustFindings, plan: Plan, arms: Sequence[Arm], results: Sequence[CaptureResult]
-) -> TrustFindings:
+def judge_study(head: TrustFindings, plan: Plan, arms: Sequence[Arm], results: Sequence[ArmResults]) -> TrustFindings:
     """The findings with both sides compared, and the outcome."""
     device, simulated = collect_errors(results, plan.ranked_metric, plan.performers)
     equivalences = []
@@ -216,7 +215,7 @@ def judge_study(
     )
 
 
-def _describe_units(plan: Plan, results: Sequence[CaptureResult]) -> str:
+def _describe_units(plan: Plan, results: Sequence[ArmResults]) -> str:
     """The units of the statistics, in a sentence or two."""
     captured = dict.fromkeys(result.clip for result in results)
     counted = f"Units of the statistics: {count_units(unit_of(clip, plan.performers) for clip in captured)}."
@@ -227,7 +226,7 @@ def _describe_units(plan: Plan, results: Sequence[CaptureResult]) -> str:
 
 
 def collect_errors(
-    results: Sequence[CaptureResult], metric: str, performers: Mapping[str, str] | None = None
+    results: Sequence[ArmResults], metric: str, performers: Mapping[str, str] | None = None
 ) -> tuple[ArmErrors, ArmErrors]:
     """Errors of both sides; captures of one clip are values of that clip, and its simulations count once.
 
@@ -282,7 +281,7 @@ def judge_outcome(
     return Outcome.PASS, f"every metric is equivalent, {agreeing} of {len(pairs)} pairs agree, none contradicts."
 
 
-def _compare_health(results: Sequence[CaptureResult]) -> tuple[StationHealth, ...]:
+def _compare_health(results: Sequence[ArmResults]) -> tuple[StationHealth, ...]:
     rows = []
     for k, station in enumerate(results[0].stations):
         sides = []
@@ -295,7 +294,7 @@ def _compare_health(results: Sequence[CaptureResult]) -> tuple[StationHealth, ..
     return tuple(rows)
 
 
-def _compare_readings(results: Sequence[CaptureResult]) -> tuple[ErrorDistance, ...]:
+def _compare_readings(results: Sequence[ArmResults]) -> tuple[ErrorDistance, ...]:
     """Energy distance of each station and each kind of error, with Holm's correction over all rows."""
     rows = [
         _compare_station(results, k, station, feature, unit)
@@ -307,7 +306,7 @@ def _compare_readings(results: Sequence[CaptureResult]) -> tuple[ErrorDistance, 
     return tuple(replace(row, p_holm=corrected.get(at)) for at, row in enumerate(rows))
 
 
-def _compare_station(results: Sequence[CaptureResult], k: int, station: str, feature: str, unit: str) -> ErrorDistance:
+def _compare_station(results: Sequence[ArmResults], k: int, station: str, feature: str, unit: str) -> ErrorDistance:
     rate_hz = results[0].rate_hz
     sides: list[list[Floats]] = [
         [series[:, k] for result in results for series in result.readings[side][feature]] for side in (0, 1)

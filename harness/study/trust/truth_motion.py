@@ -12,9 +12,8 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES
-from harness.core.motion import BodyMotion, Clip
+from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.skeleton import Skeleton
-from harness.core.time_grid import count_steps
 from harness.errors import BadFile, BadInput
 from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.experiment.playback import Playback

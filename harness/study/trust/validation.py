@@ -7,36 +7,38 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import find_playback, registered_take
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.measure.accuracy import StationAccuracy, error_quantiles
+from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
     Registration,
     StationResiduals,
-    coarse_offset,
-    record_period_s,
     register,
     require_stamps,
 )
-from harness.measure.station_identity import identify_stations
 from harness.measure.unit_file import UnitFile
 from harness.measure.unit_report import CaptureSummary
-from harness.measure.validation_report import ValidationReport, estimated_poses, residual_series
+from harness.measure.validation_report import (
+    StationAccuracy,
+    ValidationReport,
+    error_quantiles,
+    estimated_poses,
+    residual_series,
+)
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
-from harness.study.trust.expected_values import preset_components, preset_values
-from harness.study.trust.named_departures import correct_departures
+from harness.study.trust.characterization import correct_departures, preset_components, preset_values
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import (
     TruthMotion,
@@ -69,49 +71,13 @@ class Validation:
     registration: Registration
     exchanged: Mapping[str, str]
     """Station -> body that carries it, where that is not the stated one."""
-    numbers: Mapping[str, Interval]
-    """Time offsets, clock, scale, heading, latency, by key."""
-    stations: Mapping[str, StationAccuracy]
-    checks: tuple[Departure, ...]
-    expected_from: str
-    duration_s: float
-    records: int
-    notes: tuple[str, ...] = ()
-    """What of the capture was left out, a sentence each."""
+    report: ValidationReport
+    """All that the page of the capture shows."""
 
     @property
     def named(self) -> tuple[Departure, ...]:
         """The departures that are significant after the correction."""
-        return tuple(check for check in self.checks if check.is_named)
-
-    def report(self, capture: Path) -> ValidationReport:
-        """All that the page of the capture at this path shows."""
-        wire = self.reader.wire
-        expected = round(self.registration.overlap_s * wire.rate_hz)
-        return ValidationReport(
-            name=capture.stem,
-            capture=CaptureSummary(
-                capture.name, self.duration_s, wire.stations, wire.rate_hz, damage=tuple(self.reader.damage)
-            ),
-            truth=self.truth.title,
-            matched_frames=round(self.registration.matched * expected),
-            expected_frames=expected,
-            expected_from=self.expected_from,
-            numbers=self.numbers,
-            poses=estimated_poses(self.registration),
-            accuracy=self.stations,
-            checks=self.checks,
-            residuals=residual_series(self.registration),
-            exchanged=tuple(
-                f"{station} is on {body}, not on {self.truth.body_of[station]}: stations are exchanged."
-                for station, body in self.exchanged.items()
-            ),
-            notes=(
-                *self.notes,
-                *self.truth.notes,
-                "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
-            ),
-        )
+        return tuple(check for check in self.report.checks if check.is_named)
 
 
 def load_truth(
@@ -210,31 +176,44 @@ def validate_capture(
         "latency_s": _latency_s(readings, registration, truth),
     }
     period_s = record_period_s(poses)
-    stations = {}
+    accuracy = {}
     for station, errors in registration.errors.items():
-        stations[station] = StationAccuracy(
+        accuracy[station] = StationAccuracy(
             error_quantiles(errors.position_m, errors.valid, period_s),
             error_quantiles(errors.rotation_rad, errors.valid, period_s),
             int(errors.valid.sum()),
             float(np.mean(readings[station].quality == 0.0)),
         )
-    notes = (*notes, *describe_left_out(registration.errors))
     checks = _checks(numbers, registration, truth, pairs, expected, reader)
     host_s = np.concatenate([one.received_s for one in readings.values()])
+    duration_s = float(host_s.max() - host_s.min()) if len(host_s) else 0.0
+    wire = reader.wire
+    due = round(registration.overlap_s * wire.rate_hz)
     progress("", 3, 3)
-    return Validation(
-        reader,
-        truth,
-        registration,
-        exchanged,
-        numbers,
-        stations,
-        tuple(correct_departures(checks)),
-        expected.name if expected else "the preset default",
-        float(host_s.max() - host_s.min()) if len(host_s) else 0.0,
-        sum(map(len, readings.values())),
-        notes,
+    report = ValidationReport(
+        name=capture.stem,
+        capture=CaptureSummary(capture.name, duration_s, wire.stations, wire.rate_hz, damage=tuple(reader.damage)),
+        truth=truth.title,
+        matched_frames=round(registration.matched * due),
+        expected_frames=due,
+        expected_from=expected.name if expected else "the preset default",
+        numbers=numbers,
+        poses=estimated_poses(registration),
+        accuracy=accuracy,
+        checks=tuple(correct_departures(checks)),
+        residuals=residual_series(registration),
+        exchanged=tuple(
+            f"{station} is on {body}, not on {truth.body_of[station]}: stations are exchanged."
+            for station, body in exchanged.items()
+        ),
+        notes=(
+            *notes,
+            *describe_left_out(registration.errors),
+            *truth.notes,
+            "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
+        ),
     )
+    return Validation(reader, truth, registration, exchanged, report)
 
 
 def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]:
@@ -272,13 +251,13 @@ def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFil
     components = {key: dict(table) for key, table in start.components.items()}
     measured, not_measured = dict(start.measured), dict(start.not_measured)
     for key in ("components.speed.ahead_s", "components.clock.drift_ppm"):
-        number = found.numbers[key]
+        number = found.report.numbers[key]
         if number.is_measured and not (key in measured and "clock" in key):  # a longer capture knows the clock better
             _, component, field = key.split(".")
             components[component][field] = number.value
             measured[key] = number
             not_measured.pop(key, None)
-    session = {key: found.numbers[key] for key in SESSION_KEYS}
+    session = {key: found.report.numbers[key] for key in SESSION_KEYS}
     return replace(
         start,
         components=components,

@@ -1,14 +1,14 @@
 """The rules of the contract suite, which every reconstructor must satisfy.
 
 They test behaviour, not accuracy: a method that always returns the T-pose satisfies all of them. Each rule is a
-function. It returns a description of what it measured, or raises `assertions.RuleViolation` with a description of
+function. It returns a description of what it measured, or raises `contract_case.RuleViolation` with a description of
 the fault.
 """
 
 from collections.abc import Callable
 
 from harness.testing.contract_case import ContractCase
-from harness.testing.rules import degraded_input, reproducibility, semantics, side_effects
+from harness.testing.rules import degraded_input, reproducibility, semantics
 
 Rule = Callable[[ContractCase], str]
 RULES: dict[str, Rule] = {
@@ -25,8 +25,8 @@ RULES: dict[str, Rule] = {
     "sessions are thread-safe": reproducibility.is_thread_safe,
     "a fitted method works in another process": reproducibility.works_in_another_process,
     "estimates are causal": reproducibility.is_causal,
-    "examples are not modified": side_effects.preserves_examples,
-    "global random generators are not used": side_effects.preserves_global_random_state,
+    "examples are not modified": reproducibility.preserves_examples,
+    "global random generators are not used": reproducibility.preserves_global_random_state,
     "the status reports lost stations": semantics.reports_tracking_loss,
     "the method's own model answers undisturbed frames": semantics.answers_by_its_model,
     "the error recovers after a disturbance": semantics.recovers_from_disturbances,

@@ -4,9 +4,18 @@ from dataclasses import replace
 
 from harness.core.estimate import Status
 from harness.core.seeds import generator
-from harness.testing.contract_case import FRAMES, RATE_HZ, ContractCase, keep_orientations, keep_positions, run_session
+from harness.testing.contract_case import (
+    FRAMES,
+    RATE_HZ,
+    ContractCase,
+    RuleViolation,
+    keep_orientations,
+    keep_positions,
+    require_pose,
+    require_poses,
+    run_session,
+)
 from harness.testing.frames import drop_stations, exact_calibration, exact_frames
-from harness.testing.rules.assertions import RuleViolation, require_pose, require_poses
 
 
 def gives_valid_poses(case: ContractCase) -> str:

@@ -1,5 +1,6 @@
-"""Rules about estimates that must be identical to the bit: repeated, in parallel, in another process, causal."""
+"""Rules about estimates that are identical to the bit (repeated, parallel, causal), and about side effects."""
 
+import random
 import threading
 from dataclasses import replace
 
@@ -8,18 +9,21 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
+from harness.core.seeds import generator
 from harness.core.workers import run_in_workers
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.testing.contract_case import (
     FRAMES,
     ContractCase,
     Frames,
+    RuleViolation,
+    hash_motions,
     offset_positions,
+    require_identical,
     rotate_orientations,
     run_session,
     stack_qpos,
 )
-from harness.testing.rules.assertions import require_identical
 
 
 def is_deterministic(case: ContractCase) -> str:
@@ -107,3 +111,31 @@ def is_causal(case: ContractCase) -> str:
 def estimate_qpos(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
     """(F, 55) estimates of a new session."""
     return stack_qpos(run_session(fitted.begin(calibration), frames))
+
+
+def preserves_examples(case: ContractCase) -> str:
+    """Fitting and stepping do not modify the examples."""
+    examples = case.examples()
+    before = hash_motions(examples)
+    reconstructor = case.method.fit(case.body, examples, generator(1, "fit"))
+    run_session(reconstructor.begin(case.calibration), case.frames[:5])
+    if hash_motions(examples) != before:
+        raise RuleViolation("the examples were modified")
+    return f"{len(examples)} takes are unchanged"
+
+
+def preserves_global_random_state(case: ContractCase) -> str:
+    """Random numbers come from the generator that `fit` receives, not from those of numpy and Python."""
+    global_generator = np.random.mtrand._rand
+    saved = global_generator.get_state(), random.getstate()
+    try:
+        global_generator.seed(20_110_218)
+        random.seed(20_110_218)
+        before = repr(global_generator.get_state(legacy=False)), random.getstate()
+        run_session(case.begin_sessions(1)[0], case.frames[:5])
+        if (repr(global_generator.get_state(legacy=False)), random.getstate()) != before:
+            raise RuleViolation("a global random generator of numpy or Python was seeded or drawn from")
+    finally:
+        global_generator.set_state(saved[0])
+        random.setstate(saved[1])
+    return "those of numpy and Python are unchanged"

@@ -5,7 +5,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import LOST_AFTER_S, Origin, Status, session_lag
-from harness.core.training_data import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
+from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
 from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
@@ -18,12 +18,12 @@ from harness.testing.contract_case import (
     RATE_HZ,
     ContractCase,
     Frames,
+    RuleViolation,
     disturb_frames,
     stack_qpos,
     transform_motion,
 )
 from harness.testing.frames import drop_stations, exact_frames
-from harness.testing.rules.assertions import RuleViolation
 
 MAX_RECOVERED_RATIO = 1.5
 """An error has recovered when it is at most this many times that of an undisturbed session, plus `_TOLERANCE_MM`."""

@@ -15,7 +15,7 @@ from harness.bench.accuracy.conditions import (
 )
 from harness.bench.accuracy.measurement import condition_of
 from harness.errors import BadInput
-from harness.experiment.planning import cell_names, plan_tasks
+from harness.experiment.cells import cell_names, plan_tasks
 from harness.experiment.scenario import load_scenario
 
 PLANNED = plan_scenarios(CONDITIONS, "ours", SEEDS)

@@ -16,7 +16,6 @@ from harness.bench.accuracy.measurement import AccuracyReport, collect_errors, m
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import evaluate_targets
 from harness.bench.accuracy.text import format_report, report_content
-from harness.cli import main
 from harness.errors import BadInput, Outcome
 from harness.experiment.executors import run_in_process
 from harness.results.benchmark_statement import outcome_of
@@ -25,6 +24,7 @@ from harness.results.storage import Cell
 from harness.simulate.disturbance import Disturbance
 from tests.bench.accuracy.planted import COMMIT, errors, stored
 from tests.bench.accuracy.test_clip_errors import ROOT
+from tests.command import Command
 
 MakeCell = Callable[..., Cell]
 BASELINE = ROOT / "results" / "baselines" / "accuracy" / "dynamic_map_40f3d61.json"
@@ -146,12 +146,11 @@ def test_a_method_with_a_lag_is_refused(tmp_path: Path) -> None:
 
 
 def test_without_real_motion_it_is_refused_and_nothing_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
     monkeypatch.chdir(tmp_path)
-    assert main(["bench", "accuracy", "--baseline", str(BASELINE)]) == Outcome.REFUSED.exit_code
-    captured = capsys.readouterr()
+    captured = command("bench", "accuracy", "--baseline", BASELINE, code=Outcome.REFUSED.exit_code)
     assert "--mocap" in captured.err
     assert captured.out.splitlines()[-1] == "refused"
     assert not list(tmp_path.iterdir())
@@ -160,18 +159,17 @@ def test_without_real_motion_it_is_refused_and_nothing_is_written(
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["startup", "--quick"], "--quick is for accuracy"),
-        (["--jobs", "2"], "--jobs is for accuracy"),
+        (["startup", "--quick"], "--quick with speed. It applies to accuracy or ranking"),
+        (["--jobs", "2"], "--jobs with speed"),
         (["accuracy", "startup"], "runs alone"),
-        (["accuracy", "--seed", "2"], "--seeds N"),
+        (["accuracy", "--seed", "2"], "--seed with accuracy"),
         (["accuracy", "--seeds", "6"], "there are 5 seeds"),
         (["accuracy", "--quick", "--save", "x.json"], "--quick has one seed"),
         (["accuracy", "--baseline", "none.json"], "none.json"),
     ],
 )
-def test_flags_that_do_not_fit_are_refused(words: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", *words]) == Outcome.REFUSED.exit_code
-    assert named in capsys.readouterr().err
+def test_flags_that_do_not_fit_are_refused(words: list[str], named: str, command: Command) -> None:
+    assert named in command("bench", *words, code=Outcome.REFUSED.exit_code).err
 
 
 @pytest.mark.parametrize(
@@ -179,47 +177,38 @@ def test_flags_that_do_not_fit_are_refused(words: list[str], named: str, capsys:
     [({"commit": None, "dirty": None}, "no checkout"), ({"commit": "ab", "dirty": True}, "differs from its commit")],
 )
 def test_errors_of_code_without_a_commit_are_not_saved(
-    code: dict[str, object],
-    named: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    code: dict[str, object], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measurement, "current_circumstances", lambda: code)
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
     words = ["bench", "accuracy", "--baseline", str(BASELINE), "--save", "never.json"]
-    assert main(words) == Outcome.REFUSED.exit_code
-    assert named in capsys.readouterr().err
+    assert named in command(*words, code=Outcome.REFUSED.exit_code).err
 
 
 def test_saved_errors_are_those_of_the_method_and_its_commit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     measured = report(errors(0.5), errors(1.0), errors(1.0))
     monkeypatch.setattr(measurement, "current_circumstances", lambda: {"commit": COMMIT, "dirty": False})
     monkeypatch.setattr(measurement, "measure_accuracy", lambda *_, **__: measured)
     monkeypatch.chdir(tmp_path)
     words = ["bench", "accuracy", "--baseline", str(BASELINE), "--method", "ours", "--save", "mine.json"]
-    assert main(words) == Outcome.PASS.exit_code
+    command(*words)
     found = read_errors(tmp_path / "mine.json")
     assert (found.method, found.commit, found.seeds) == ("ours", COMMIT, SEEDS)
     assert found.conditions["boxing, clean"]["boxing_new_2"].mean(ANGLE) == pytest.approx(0.52)
 
     monkeypatch.setattr(measurement, "measure_accuracy", lambda *_, **__: replace(measured, failures={"a": "b"}))
-    assert main([*words[:-1], "failed.json"]) == Outcome.INCOMPLETE.exit_code
+    command(*words[:-1], "failed.json", code=Outcome.INCOMPLETE.exit_code)
     assert not (tmp_path / "failed.json").exists()
-    capsys.readouterr()
 
 
 @pytest.mark.slow
-def test_a_quick_run_compares_the_same_clips_and_resumes(
-    mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_quick_run_compares_the_same_clips_and_resumes(mocap: Path, tmp_path: Path, command: Command) -> None:
     words = ["bench", "accuracy", "--quick", "--method", "mean_pose", "--json", "--mocap", str(mocap)]
     words += ["--baseline", str(BASELINE), "--out", str(tmp_path / "out")]
-    assert main(words) == Outcome.NOT_COMPARABLE.exit_code
-    content = json.loads(capsys.readouterr().out)
+    content = command(*words, code=Outcome.NOT_COMPARABLE.exit_code).content
     earlier = read_errors(BASELINE).first_seeds((1,))
     targets = [row for row in content["rows"] if "at_least" in row]
     clips = {clip for target in targets for clip in target["clip_names"]}
@@ -230,6 +219,5 @@ def test_a_quick_run_compares_the_same_clips_and_resumes(
         assert target["verdict"] == "no verdict"
         assert target["value"] > 1.5  # the mean pose follows nothing
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cells").iterdir()}
-    assert main(words) == Outcome.NOT_COMPARABLE.exit_code
-    assert json.loads(capsys.readouterr().out) == content
+    assert command(*words, code=Outcome.NOT_COMPARABLE.exit_code).content == content
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cells").iterdir()} == times

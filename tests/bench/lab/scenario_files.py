@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.bench.lab.captures import BOXING, NO_FAULT, PLANTED_FAULTS, planted_scenario
-from harness.core.toml_text import format_toml
+from harness.core.toml_file import format_toml
 
 
 def write_scenario(folder: Path, kind: str, seed: int) -> Path:

@@ -10,7 +10,7 @@ from harness.bench.lab import captures
 from harness.bench.lab.captures import PLANTED_FAULTS, planted_capture, planted_numbers, planted_scenario
 from harness.cli import main
 from harness.errors import UnknownName
-from harness.stream.codec.blocks import CONFIGURED, RECEIVED
+from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import Recording, read_recording
 from harness.stream.recording.station_readings import CaptureReader
 from tests.bench.lab.scenario_files import write_scenario

@@ -16,8 +16,8 @@ import pytest
 from harness.bench.lab.captures import EARLIER, NO_FAULTS, PLANTED_FAULTS, planted_numbers
 from harness.bench.lab.outcomes import CaptureOutcome, stored_checks
 from harness.bench.lab.truth import is_sized
-from harness.core.python_process import python_command, python_environment
-from harness.mocap.synthetic.rig import RIG_TAKES
+from harness.core.working_folder import python_command, python_environment
+from harness.mocap.synthetic.takes import RIG_TAKES
 from harness.study.trust.characterization import characterize_capture
 from harness.study.trust.validation import load_truth, session_unit, validate_capture
 from tests.bench.lab.scenario_files import write_scenario
@@ -67,7 +67,7 @@ def _outcome(folder: Path, kind: str, seed: int, capture: Path, earlier: Path | 
         expected = session_unit(validate_capture(earlier, load_truth(earlier, clip, scenario=scenario)), None, EARLIER)
     found = validate_capture(capture, load_truth(capture, clip, scenario=scenario), expected=expected)
     exchanged = tuple(f"{station}: {body}" for station, body in sorted(found.exchanged.items()))
-    return CaptureOutcome(kind, seed, "", stored_checks(found.checks), exchanged=exchanged)
+    return CaptureOutcome(kind, seed, "", stored_checks(found.report.checks), exchanged=exchanged)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -98,10 +98,9 @@ def test_a_capture_that_is_refused_is_an_outcome(tmp_path: Path, monkeypatch: py
 @pytest.mark.long
 def test_one_process_and_two_store_the_same_bytes(tmp_path: Path) -> None:
     tasks = [("clock", 1001), ("latency", 1001)]
-    for jobs in (1, 2):
+    for jobs, found in ((1, tasks[:1]), (2, tasks)):
         with process_executor(jobs) as executor:
-            collect_outcomes(tasks, tmp_path / str(jobs), executor, _no_progress)
-    for task in tasks:
-        one, two = (outcome_path(tmp_path / str(jobs), *task).read_bytes() for jobs in (1, 2))
-        assert one == two
-        assert b'"failure": ""' in one
+            collect_outcomes(found, tmp_path / str(jobs), executor, _no_progress)
+    one, two = (outcome_path(tmp_path / str(jobs), *tasks[0]).read_bytes() for jobs in (1, 2))
+    assert one == two
+    assert b'"failure": ""' in one

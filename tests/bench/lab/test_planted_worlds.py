@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from harness.bench.lab.planted_errors import load_planted_errors
 from harness.bench.lab.planted_worlds import (
     CHANGED,
     CLIPS,
@@ -18,6 +17,7 @@ from harness.bench.lab.planted_worlds import (
     trust_rows,
     typical_scatter,
 )
+from harness.bench.stored_errors import load_planted_errors
 
 
 def test_stored_errors_are_of_real_size() -> None:

@@ -29,8 +29,14 @@ def test_a_long_capture_goes_on_from_part_to_part(tmp_path: Path, monkeypatch: p
 @pytest.mark.long
 def test_the_cost_of_a_verb_is_that_of_its_own_process(tmp_path: Path) -> None:
     capture = planted_capture("clock", 1001, tmp_path, seconds=30.0)
-    cost = measure_verb("characterize", capture)
-    assert 0.5 < cost.processor_s < 60.0
-    assert 80e6 < cost.peak_bytes < 500e6
+    cpu_s, peak_bytes = measure_verb("characterize", capture)
+    assert 0.5 < cpu_s < 60.0
+    assert 80e6 < peak_bytes < 500e6
     with pytest.raises(RuntimeError, match=r"missing\.rec"):
         measure_verb("characterize", tmp_path / "missing.rec")
+
+
+def test_a_study_has_no_verdict_on_an_overbooked_machine() -> None:
+    assert [speed.trust_row(seconds, 10.0, "").verdict for seconds in (12.0, 14.0)] == ["met", "missed"]
+    busy = speed.trust_row(14.0, 10.0, "the machine is overbooked")
+    assert (busy.verdict, busy.why) == ("no verdict", "the machine is overbooked")

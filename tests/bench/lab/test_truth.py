@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from harness.bench.lab import truth
-from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STATION, planted_numbers
-from harness.bench.lab.coverage import coverage_rows
+from harness.bench.lab.captures import NO_FAULT, NO_FAULTS, PLANTED_FAULTS, STATION, needed_captures, planted_numbers
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber
-from harness.bench.lab.registration_errors import PROMISES, registration_rows
-from harness.bench.lab.truth import KINDS, fault_row, fault_rows, needed_captures
-from harness.study.trust.expected_values import preset_values
+from harness.bench.lab.truth import KINDS, coverage_rows, fault_row, fault_rows
+from harness.bench.lab.validated_captures import PROMISES, registration_rows
+from harness.study.trust.characterization import preset_values
 
 
 def _check(key: str, value: float, station: str = "", *, half: float = 0.0, named: bool = True) -> StoredCheck:
@@ -129,8 +128,7 @@ def test_constants_are_not_chosen_on_the_seeds_of_the_table() -> None:
 
 @pytest.mark.long
 def test_registration_of_a_capture_is_as_promised(tmp_path: Path) -> None:
-    from harness.bench.lab.registration_errors import registration_errors
-    from harness.bench.lab.validated_captures import validate_planted
+    from harness.bench.lab.validated_captures import registration_errors, validate_planted
 
     errors = registration_errors(validate_planted("none_validated", 1001, tmp_path), 1001)
     assert all(row.verdict == "met" for row in registration_rows([errors], 1))

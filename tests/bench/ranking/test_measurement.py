@@ -18,12 +18,12 @@ from harness.bench.ranking.measurement import (
     station_sets,
 )
 from harness.bench.ranking.text import format_rankings, rankings_content
-from harness.cli import main
 from harness.core.split import performer_of
 from harness.errors import Outcome
 from harness.experiment.executors import run_in_process
 from harness.experiment.scenario import Scenario
 from harness.results.expected_orders import METRIC
+from tests.command import Command
 
 
 def test_the_sides_differ_in_the_motion_alone() -> None:
@@ -149,17 +149,14 @@ def test_the_text_names_units_pairs_and_what_would_be_enough() -> None:
 
 
 @pytest.mark.parametrize("words", [["ik"], ["--large"], ["--seed", "2"], ["--method", "ik"], ["--seeds", "2"]])
-def test_other_words_are_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "ranking", *words]) == 2
-    assert "ranking takes --quick, --jobs, --out and --mocap alone" in capsys.readouterr().err
+def test_other_words_are_refused(words: list[str], command: Command) -> None:
+    said = command("bench", "ranking", *words, code=2).err
+    assert ("ranking runs alone" if words == ["ik"] else f"{words[0]} with ranking") in said
 
 
-def test_without_real_motion_it_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_real_motion_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command) -> None:
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
-    assert main(["bench", "ranking", "--quick", "--out", str(tmp_path / "out")]) == 2
-    assert "--mocap" in capsys.readouterr().err
+    assert "--mocap" in command("bench", "ranking", "--quick", "--out", tmp_path / "out", code=2).err
     assert not (tmp_path / "out").exists()
 
 

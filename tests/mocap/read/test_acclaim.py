@@ -14,7 +14,8 @@ from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read import file_checks
-from harness.mocap.read.acclaim import read_amc, read_amc_clip, read_asf, read_asf_file
+from harness.mocap.read.amc import read_amc, read_amc_clip
+from harness.mocap.read.asf import read_asf, read_asf_file
 from tests.mocap.sample_files import UNIT_M, amc_text, asf_text, clip
 
 ASF, AMC = asf_text(standard_skeleton()), amc_text(clip(4))
@@ -128,9 +129,9 @@ def test_a_cut_or_foreign_skeleton_is_refused(tmp_path: Path, spoil: bytes, foun
 
 def test_a_given_unit_overrules_the_file(tmp_path: Path) -> None:
     (tmp_path / "x.asf").write_text(ASF.replace("length 0.45", "length 1000"))
-    found = read_asf_file(tmp_path / "x.asf", unit_m=UNIT_M)
-    assert found.unit_m == UNIT_M
-    assert found.skeleton.length_m.max() == pytest.approx(standard_skeleton().length_m.max())
+    skeleton, unit_m = read_asf_file(tmp_path / "x.asf", unit_m=UNIT_M)
+    assert unit_m == UNIT_M
+    assert skeleton.length_m.max() == pytest.approx(standard_skeleton().length_m.max())
 
 
 FRAME_2 = AMC.index("\n2\n") + 1

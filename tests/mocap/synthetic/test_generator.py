@@ -15,7 +15,7 @@ from harness.errors import BadInput, UnknownName
 from harness.mocap import synthetic
 from harness.mocap.file_inspection import inspect_clip
 from harness.mocap.synthetic.curves import GRAVITY_M_S2
-from harness.mocap.synthetic.foot_trajectory import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
+from harness.mocap.synthetic.footwork import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
 from harness.mocap.synthetic.performers import performer_habits
 from harness.mocap.synthetic.style import Style
 

@@ -6,8 +6,8 @@ import pytest
 from harness.core.arrays import Floats
 from harness.mocap import synthetic
 from harness.mocap.synthetic import curves, limb_ik
-from harness.mocap.synthetic.foot_trajectory import BALL_M, FootContact, flat_pitch_rad, plan_foot
-from harness.mocap.synthetic.gestures import Gesture, keyframes_at, sum_gestures
+from harness.mocap.synthetic.curves import Gesture, keyframes_at, sum_gestures
+from harness.mocap.synthetic.footwork import BALL_M, FootContact, flat_pitch_rad, plan_foot
 
 STEP = 1e-3
 

@@ -20,8 +20,8 @@ from harness.mocap.clip_file import read_clip
 from harness.mocap.read.bvh import read_bvh
 from harness.mocap.write.bvh import euler_zyx_deg
 from harness.mocap.write.export import FORMATS, export
-from harness.mocap.write.mot import ROOT_COLUMNS, euler_zxy_rad
-from harness.mocap.write.tum import POINTS
+from harness.mocap.write.opensim import ROOT_COLUMNS, euler_zxy_rad
+from harness.mocap.write.tables import POINTS
 from harness.score.pair import Pair, compute_poses
 from harness.score.positions import root_position_mm
 from harness.testing.doctor import find_evo, run_evo_ape_m

@@ -13,14 +13,14 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import unpack
 from harness.core.skeleton import Pose, Skeleton, forward_kinematics
-from harness.mocap.write.body_model import BodyModel, StationPlace
+from harness.mocap.write.body_model import BodyModel, MountedStation
 from harness.mocap.write.export import export
 from harness.mocap.write.gltf_builder import MAX_VERTICES, GltfBuilder
 from harness.mocap.write.posed_motion import ExportableCell, PosedMotion
 from tests.mocap.write.glb_file import GlbFile, read_glb
 from tests.mocap.write.test_export import BELIEVED, FRAMES, RATE_HZ, SKELETON, Written, arbitrary_motion
 
-STATION = StationPlace("wrist", "rwrist", np.array([0.0, -0.05, 0.03]), rotations.exp(np.array([0.1, 0.2, 0.3])))
+STATION = MountedStation("wrist", "rwrist", np.array([0.0, -0.05, 0.03]), rotations.exp(np.array([0.1, 0.2, 0.3])))
 
 
 def dressed(cell: ExportableCell, motion: PosedMotion) -> BodyModel:

@@ -13,7 +13,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.mocap import synthetic
 from harness.mocap.write.export import export
-from harness.mocap.write.mot import ROOT_COLUMNS
+from harness.mocap.write.opensim import ROOT_COLUMNS
 from harness.score.pair import compute_poses
 from tests.mocap.write.test_export import BELIEVED, NAMES, SKELETON, Written, in_opensim, joints_m
 

@@ -9,18 +9,18 @@ import pytest
 
 from harness.body import humanoid
 from harness.core.arrays import Floats
-from harness.core.hinges import equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF, pack
 from harness.core.motion import BodyMotion
+from harness.core.skeleton import equivalent_euler_angles
 from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase, TakeSegment
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.solver.ground_frame import (
     ground_from_qpos,
     posture_from_qpos,
     qpos_from_postures,
     relative_ground,
+    step_ground,
 )
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from tests.reconstruct.conftest import moved as elsewhere

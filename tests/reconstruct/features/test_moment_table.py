@@ -9,7 +9,7 @@ from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.features import moment_table
 from harness.reconstruct.features.moment_table import LocalGaussian, condition, local_gaussian, tabulate_moments
-from harness.reconstruct.index.clustering import cluster_vectors
+from harness.reconstruct.index.decomposition import cluster_vectors
 
 F, Y = 4, 3
 SLOPE: Floats = np.array([[1.0, -0.5, 0.2], [0.3, 0.8, 0.0], [0.0, 0.4, -1.0], [0.6, 0.0, 0.5]])

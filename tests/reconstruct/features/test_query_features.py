@@ -12,7 +12,7 @@ from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import drop_stations
-from tests.reconstruct.methods.test_dynamic_map_literal import unseen
+from tests.reconstruct.methods.test_dynamic_map import unseen
 
 COUNT = 8
 

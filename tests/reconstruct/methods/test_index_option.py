@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.reconstruct.index import INDEXES
-from tests.reconstruct.methods.test_dynamic_map_literal import hinges, mean_deg
+from tests.reconstruct.methods.test_dynamic_map import hinges, mean_deg
 
 METHODS = ("local_pca", "dynamic_map", "dynamic_map:window", "dynamic_map:literal", "kernel_cca", "weighted_blend")
 

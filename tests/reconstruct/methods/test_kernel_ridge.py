@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from harness.core.humanoid24 import unpack
-from harness.errors import BadInput
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
@@ -16,11 +15,6 @@ def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
     """(T,) mean absolute hinge error [deg]."""
     off = unpack(qpos)[2] - unpack(scene.take.qpos)[2]
     return np.asarray(np.rad2deg(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)).mean(axis=1))
-
-
-def test_examples_are_needed(walk: Scene) -> None:
-    with pytest.raises(BadInput, match="examples"):
-        KernelRidge().fit(walk.body, [], np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 135.0])

@@ -8,16 +8,13 @@ import pytest
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.humanoid24 import BONES, unpack
-from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
-from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca
-from harness.reconstruct.methods.local_regression import LocalRegression
-from harness.reconstruct.methods.weighted_blend import WeightedBlend
+from harness.reconstruct.methods.local_regression import LocalRegression, WeightedBlend
 from harness.reconstruct.solver import ground_frame
-from harness.reconstruct.solver.anchor_frame import anchor_of
+from harness.reconstruct.solver.ground_frame import anchor_of, step_ground
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
@@ -46,12 +43,6 @@ def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("method", METHODS, ids=IDS)
-def test_examples_are_needed(walk: Scene, method: LocalRegression) -> None:
-    with pytest.raises(BadInput, match="examples"):
-        method.fit(walk.body, [], np.random.default_rng(0))
-
-
-@pytest.mark.parametrize("method", METHODS, ids=IDS)
 @pytest.mark.parametrize("yaw_deg", [0.0, 135.0])
 def test_a_take_that_was_learnt_comes_back_wherever_it_is_performed(
     walk: Scene, method: LocalRegression, yaw_deg: float
@@ -61,15 +52,6 @@ def test_a_take_that_was_learnt_comes_back_wherever_it_is_performed(
     estimates = walk.run(exact, exact_frames(walk.body, walk.calibration, qpos), [walk.take])
     assert angle_error_deg(walk, np.array([e.qpos for e in estimates])).mean() < 0.2
     assert walk.off_m(estimates, qpos).mean() < 0.002
-
-
-@pytest.mark.parametrize("method", METHODS, ids=IDS)
-def test_the_room_makes_no_difference(walk: Scene, method: LocalRegression) -> None:
-    here = walk.run(method)
-    qpos = moved(walk.take.qpos, 2.0, (3.0, -2.0, 0.0))
-    there = walk.run(method, exact_frames(walk.body, walk.calibration, qpos))
-    expected = moved(np.array([e.qpos for e in here]), 2.0, (3.0, -2.0, 0.0))
-    assert walk.off_m(there, expected).max() < 1e-3
 
 
 @pytest.mark.parametrize("method", METHODS, ids=IDS)

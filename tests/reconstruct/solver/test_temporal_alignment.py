@@ -11,12 +11,7 @@ from harness.core.arrays import Bools, Floats
 from harness.reconstruct import registry
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.temporal_alignment import (
-    MAX_BEND_M,
-    MAX_STEP_S,
-    MAX_TURN_RAD,
-    TemporalAlignment,
-)
+from harness.reconstruct.solver.temporal_alignment import MAX_BEND_M, MAX_STEP_S, MAX_TURN_RAD, TemporalAlignment
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
@@ -76,20 +71,20 @@ class ChosenOutliers(OutlierGate):
 
 
 def align(
-    walk: Scene, frames: list[TrackerFrame], lookahead: bool = False, left_out: dict[int, list[int]] | None = None
+    walk: Scene, frames: list[TrackerFrame], left_out: dict[int, list[int]] | None = None
 ) -> list[tuple[Floats, Floats]]:
-    """Aligned targets of each frame; with `lookahead` without the last frame. `left_out`: stations by frame."""
+    """Aligned targets of each frame. `left_out`: stations by frame."""
     residuals, alignment = Residuals(walk.body, walk.calibration, Loss()), TemporalAlignment(6)
     out, gate = [], ChosenOutliers(left_out or {})
-    for index, frame in enumerate(frames[: len(frames) - lookahead]):
-        alignment.read(frame, residuals, gate, frames[index + 1] if lookahead else None)
+    for frame in frames:
+        alignment.read(frame, residuals, gate)
         out.append((residuals.target_m.copy(), residuals.world_from_target.copy()))
     return out
 
 
-def moved(walk: Scene, frames: list[TrackerFrame], **options: dict[int, list[int]]) -> Bools:
+def moved(walk: Scene, frames: list[TrackerFrame], left_out: dict[int, list[int]] | None = None) -> Bools:
     """(F, S) which positions of the frames the stage moved."""
-    pairs = zip(align(walk, frames, **options), frames, strict=True)  # type: ignore[arg-type]  # left_out alone
+    pairs = zip(align(walk, frames, left_out), frames, strict=True)
     return np.array([(found[0] != read(walk, frame)[0]).any(axis=1) for found, frame in pairs])
 
 
@@ -118,38 +113,6 @@ def test_a_parabola_is_interpolated_and_a_mean_velocity_extrapolated(walk: Scene
     left_m = -SLOT_S * (2.0 * PERIOD_S - SLOT_S) * np.linalg.norm(motion.coefficients[2], axis=1)
     missing_m = np.linalg.norm(found[0] - wanted[0], axis=1)
     np.testing.assert_allclose(missing_m[BEFORE], left_m[BEFORE], atol=1e-9)
-
-
-def test_with_the_following_frame_every_parabola_is_interpolated(walk: Scene, rng: np.random.Generator) -> None:
-    motion = Motion(rng, degree=2)
-    for index, found in list(enumerate(align(walk, motion.frames(6), lookahead=True)))[1:]:
-        assert_same_pose(found, read(walk, motion.at_one_instant(index)), EVERY)
-
-
-def test_with_the_following_frame_orientations_are_interpolated(walk: Scene, rng: np.random.Generator) -> None:
-    """Towards the neighbour on the side of the instant, by the share of the step between the two."""
-    frames = Motion(rng, degree=0).frames(4)
-    turns = [rotations.exp(rng.normal(0.0, 0.1, (6, 3))) for _ in frames]
-    frames = [
-        replace(f, tracker_from_station=rotations.multiply(turn, f.tracker_from_station))
-        for f, turn in zip(frames, turns, strict=True)
-    ]
-    measured = [read(walk, frame)[1] for frame in frames]
-    neighbour = np.where(BEFORE[:, None], measured[3], measured[1])
-    step = rotations.log(rotations.multiply(neighbour, rotations.inverse(measured[2])))
-    wanted = rotations.multiply(rotations.exp(np.abs(SLOT_S)[:, None] / PERIOD_S * step), measured[2])
-    found = align(walk, frames, lookahead=True)[2][1]
-    assert rotations.angle_between_rad(found, wanted).max() < 1e-9
-
-
-def test_a_station_that_the_following_frame_lacks_is_extrapolated(walk: Scene, rng: np.random.Generator) -> None:
-    frames = Motion(rng, degree=2).frames(4)
-    causal, ahead = align(walk, frames)[2], align(walk, frames, lookahead=True)[2]
-    frames[3] = drop_stations(frames[3], [1])
-    found, without = align(walk, frames, lookahead=True)[2], np.arange(6) == 1
-    for array, at_once, later in zip(found, causal, ahead, strict=True):
-        np.testing.assert_array_equal(array, np.where(without[:, None], at_once, later))
-    assert not (causal[0] == ahead[0])[BEFORE].any()
 
 
 def test_stations_that_never_report_together_are_aligned_among_themselves(
@@ -196,11 +159,9 @@ def test_uneven_periods_are_as_exact(walk: Scene, rng: np.random.Generator) -> N
 
 
 def test_readings_of_one_time_stay_the_same_to_the_bit(walk: Scene) -> None:
-    for lookahead in (False, True):
-        found = align(walk, walk.frames, lookahead)
-        for frame, (target_m, world_from_target) in zip(walk.frames, found, strict=False):
-            np.testing.assert_array_equal(target_m, read(walk, frame)[0])
-            np.testing.assert_array_equal(world_from_target, read(walk, frame)[1])
+    for frame, (target_m, world_from_target) in zip(walk.frames, align(walk, walk.frames), strict=True):
+        np.testing.assert_array_equal(target_m, read(walk, frame)[0])
+        np.testing.assert_array_equal(world_from_target, read(walk, frame)[1])
 
 
 def test_after_a_loss_three_positions_and_two_orientations_are_needed(walk: Scene, rng: np.random.Generator) -> None:
@@ -223,7 +184,7 @@ def test_an_orientation_that_is_left_out_moves_nothing(walk: Scene, rng: np.rand
     frames = Motion(rng, degree=1).frames(6)
     found = align(walk, frames, left_out={3: [6]})
     assert [bool((t[1] != read(walk, f)[1])[0].any()) for f, t in zip(frames, found, strict=True)] == [
-        *(False, True, True, False, False, True),
+        *(False, True, True, False, False, True)
     ]
 
 
@@ -240,15 +201,6 @@ def test_an_echo_below_the_gate_is_not_extrapolated(
     assert moved(walk, frames)[3, 0] != kept
     assert not moved(walk, frames)[4, 0], "its bend is twice as large"
     assert moved(walk, frames)[3:, 1:].all()
-
-
-def test_an_echo_in_the_following_frame_is_not_interpolated(walk: Scene, rng: np.random.Generator) -> None:
-    frames = Motion(rng, degree=1).frames(5)
-    position_m = frames[4].position_m.copy()
-    position_m[:, 2] += 1.05 * MAX_BEND_M
-    frames[4] = replace(frames[4], position_m=position_m)
-    found = align(walk, frames, lookahead=True)[3]
-    np.testing.assert_array_equal(found[0], read(walk, frames[3])[0])
 
 
 @pytest.mark.parametrize(("share", "moves"), [(0.95, True), (1.05, False)])
@@ -315,11 +267,9 @@ def test_a_station_that_joins_late_takes_part_in_the_mean(walk: Scene, rng: np.r
 
 def test_later_frames_change_nothing(walk: Scene, rng: np.random.Generator) -> None:
     frames = Motion(rng, degree=2).frames(8)
-    for lookahead in (False, True):
-        whole, part = align(walk, frames, lookahead), align(walk, frames[:5], lookahead)
-        for longer, shorter in zip(whole, part, strict=False):
-            np.testing.assert_array_equal(longer[0], shorter[0])
-            np.testing.assert_array_equal(longer[1], shorter[1])
+    for longer, shorter in zip(align(walk, frames), align(walk, frames[:5]), strict=False):
+        np.testing.assert_array_equal(longer[0], shorter[0])
+        np.testing.assert_array_equal(longer[1], shorter[1])
 
 
 def test_noise_of_resting_stations_grows_little(walk: Scene, rng: np.random.Generator) -> None:

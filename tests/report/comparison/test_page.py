@@ -11,30 +11,23 @@ from matplotlib.figure import Figure
 from harness.compare.comparison import Comparison
 from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
-from harness.report.comparison.interval_chart import _draw as draw_intervals
-from harness.report.comparison.interval_chart import interval_charts
+from harness.report.comparison.charts import BETTER_COLOUR, WORSE_COLOUR, interval_charts, slope_chart
+from harness.report.comparison.charts import _draw_intervals as draw_intervals
+from harness.report.comparison.charts import _draw_line as draw_slopes
 from harness.report.comparison.page import comparison_page, comparison_text, write_comparison_page
-from harness.report.comparison.slope_chart import BETTER_COLOUR, WORSE_COLOUR, slope_chart
-from harness.report.comparison.slope_chart import _draw as draw_slopes
 from harness.report.comparison.wording import (
     MARKS,
     MEANINGS,
     OUTCOME_TITLES,
+    comparison_sentence,
     count_directions,
     count_verdicts,
     line_interval,
-    sentence,
 )
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html
 from harness.report.kit.style import Chart
-from tests.report.comparison.compared import (
-    CIRCUMSTANCES,
-    compared,
-    every_verdict,
-    nothing_compared,
-    one_line,
-)
+from tests.report.comparison.compared import CIRCUMSTANCES, compared, every_verdict, nothing_compared, one_line
 from tests.report.drawing import texts_apart
 from tests.report.reading import read, text_of
 
@@ -71,9 +64,9 @@ def test_one_sentence_says_what_came_of_it(tmp_path: Path) -> None:
         (incomplete, "missing: A: ik."),
         (nothing_compared(why="no cell of A has a partner in B"), "no cell of A has a partner in B."),
     ):
-        assert said in sentence(shown)
+        assert said in comparison_sentence(shown)
         found = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-        assert f"{OUTCOME_TITLES[shown.outcome]} {sentence(shown)}" in found
+        assert f"{OUTCOME_TITLES[shown.outcome]} {comparison_sentence(shown)}" in found
         assert "nan" not in found.lower().split()
     assert {Outcome.PASS, Outcome.REGRESSED, Outcome.NOT_COMPARABLE, Outcome.INCOMPLETE} == set(OUTCOME_TITLES)
 

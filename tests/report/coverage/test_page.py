@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from harness.core.number_format import format_fixed
-from harness.report.coverage.charts import dilution_chart
 from harness.report.coverage.content import CoverageContent
-from harness.report.coverage.page import coverage_page, heading
+from harness.report.coverage.page import coverage_page, coverage_sentence, dilution_chart
 from harness.report.kit.page_html import page_html, write_page
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
 from tests.report.reading import count_pictures, read, section_ids, text_of
@@ -30,13 +29,13 @@ def figures(coverages: Coverages) -> dict[str, Figure]:
 def test_the_heading_names_the_coverage_and_the_station_that_hears_least(coverages: Coverages) -> None:
     plain, boxing = coverages
     cube = plain.rows[0]
-    assert heading(plain) == (
+    assert coverage_sentence(plain) == (
         f"9 emitters: three or more are heard in {100.0 * cube.share:.0f} % of the cube below them, at a median DOP of "
         f"{cube.dilution:.2f}"
     )
     least = min(boxing.stations, key=lambda row: row.shares[3])
     hears = f"; {least.station} hears three for {100.0 * least.shares[3]:.0f} % of boxing_p1_01"
-    assert heading(boxing) == heading(plain) + hears
+    assert coverage_sentence(boxing) == coverage_sentence(plain) + hears
 
 
 def test_the_page_has_every_number_and_escapes_names(tmp_path: Path, coverages: Coverages) -> None:

@@ -8,7 +8,7 @@ import matplotlib
 from matplotlib.collections import Collection, LineCollection
 from matplotlib.figure import Figure
 
-from harness.report.kit.print_figure import MM_PER_IN, PrintFigure
+from harness.report.figures.print_figure import MM_PER_IN, PrintFigure
 from harness.report.kit.style import PRINT_SETTINGS
 from harness.results.reader import ResultSet
 from tests.compare.sides import cell, manifest, side, write_run

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput
-from harness.report.figures.conditions import read_conditions
-from harness.report.figures.distribution import distribution_figure
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import read_series
+from harness.report.figures.conditions import read_conditions, read_series
+from harness.report.figures.frame_figures import distribution_figure
+from harness.report.figures.print_figure import FigureSelection
 from tests.report.drawing import texts_apart
 from tests.report.figures.made_up import drawn
 

@@ -9,10 +9,9 @@ from matplotlib.patches import Rectangle
 
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
-from harness.report.figures.conditions import read_conditions
-from harness.report.figures.joints import joints_figure
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import read_series
+from harness.report.figures.conditions import read_conditions, read_series
+from harness.report.figures.mean_figures import joints_figure
+from harness.report.figures.print_figure import FigureSelection
 from harness.report.run.joint_errors import BONE_ROWS
 from harness.score.pair import hinged_bones
 from tests.planted import Plan, planted_run

@@ -7,10 +7,9 @@ import pytest
 from matplotlib.colors import to_hex
 
 from harness.errors import BadInput
-from harness.report.figures.conditions import read_conditions
-from harness.report.figures.over_time import over_time_figure
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import read_series
+from harness.report.figures.conditions import read_conditions, read_series
+from harness.report.figures.frame_figures import over_time_figure
+from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.style import COLOURS, MUTED
 from tests.report.drawing import texts_apart
 from tests.report.figures.made_up import drawn

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, NothingMeasured, Outcome
-from harness.report.figures.placement import placement_figure
+from harness.report.placement.pareto import placement_figure
 from harness.report.placement.wording import set_name
 from harness.results.placement_findings import PlacementFindings, write_placement
 from tests.report.drawing import texts_apart

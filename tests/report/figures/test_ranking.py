@@ -11,9 +11,9 @@ from harness.compare.paired_statistics import mean_interval
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput
 from harness.report.figures.conditions import read_conditions
-from harness.report.figures.ranking import ranking_figure
-from harness.report.figures.selection import FigureSelection
-from harness.report.kit.ranking_chart import RankingPanel, explain_marks, wrap_name
+from harness.report.figures.mean_figures import ranking_figure
+from harness.report.figures.print_figure import FigureSelection
+from harness.report.kit.ranking import RankingPanel, explain_marks, wrap_name
 from harness.report.kit.style import COLOURS, FAINT
 from tests.compare.sides import cell, side, write_run
 from tests.report.drawing import texts_apart

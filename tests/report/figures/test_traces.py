@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput, UnknownName
-from harness.report.figures.conditions import read_conditions
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.traces import choose_condition, rank_highlights, read_series
+from harness.report.figures.conditions import choose_condition, rank_highlights, read_conditions, read_series
+from harness.report.figures.print_figure import FigureSelection
 from harness.results.reader import ResultSet
 from tests.compare.sides import cell, manifest, side, write_run
 

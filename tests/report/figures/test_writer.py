@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, UnknownName
-from harness.report.figures.kinds import KINDS
-from harness.report.figures.selection import FigureSelection
-from harness.report.figures.writer import write_figure, write_results_table
+from harness.report.figures.print_figure import FigureSelection
+from harness.report.figures.writer import KINDS, write_figure, write_results_table
 from harness.results.index import CellIndex
 from tests.report.figures.made_up import ranked_run
 
@@ -22,7 +21,7 @@ def test_a_figure_lies_below_its_run_in_pdf_unless_told_otherwise(ranked: Path, 
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["a.svg", "b.PNG", "c", "d.pdf"]
 
 
-@pytest.mark.parametrize("kind", [name for name, each in KINDS.items() if each.source == "run"])
+@pytest.mark.parametrize("kind", [name for name, each in KINDS.items() if each.of_run])
 def test_every_kind_of_a_run_is_drawn_the_same_twice(kind: str, framed: Path, tmp_path: Path) -> None:
     first, second = (write_figure(framed, kind, out=tmp_path / f"{n}.pdf") for n in (1, 2))
     assert first.path.read_bytes() == second.path.read_bytes()

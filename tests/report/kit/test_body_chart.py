@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from harness.body.anatomy import BodyGeom
+from harness.core.skeleton import BodyGeom
 from harness.report.kit.body_chart import BodyGroup, draw_bodies, joint_titles, project_outline
 
 VALUES = {"lfemur": 4.0, "rfemur": 1.0, "lhand": 2.0}

@@ -2,9 +2,9 @@
 
 import pytest
 
-from harness.core.text_table import Table
 from harness.report.kit.markup import Markup, join, tag
-from harness.report.kit.table import html_table
+from harness.report.kit.page import DataTable
+from harness.report.kit.page_html import page_table
 
 
 def test_children_and_attributes_are_escaped() -> None:
@@ -22,7 +22,7 @@ def test_absent_things_leave_no_trace() -> None:
 
 
 def test_a_table_names_its_rows_and_columns() -> None:
-    text = html_table(Table(["method", "n"], [["<ik>", 3]]), "about <it>", label="errors")
+    text = page_table(DataTable(["method", "n"], [["<ik>", 3]], caption="about <it>", label="errors"))
     assert '<th scope="col">method</th>' in text
     assert '<th scope="row">&lt;ik&gt;</th><td>3</td>' in text
     assert 'tabindex="0"' in text

@@ -1,6 +1,6 @@
 """Labels of metrics name the quantity and the unit."""
 
-from harness.report.kit.metric_labels import metric_label, quantity
+from harness.report.kit.text import metric_label, metric_name
 from harness.score.metrics import DEFINITIONS
 
 
@@ -10,4 +10,4 @@ def test_every_label_ends_with_the_unit_and_no_two_metrics_share_one() -> None:
     assert len(set(labels.values())) == len(labels)
     assert not any("_" in label for label in labels.values())
     assert metric_label("joint_angle_mean_deg") == "joint angle error [deg]"
-    assert quantity("frames_held") == "frames held"
+    assert metric_name("frames_held") == "frames held"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import Outcome
 from harness.report.kit.markup import Markup
 from harness.report.kit.page import (
@@ -22,7 +22,6 @@ from harness.report.kit.page import (
     Stack,
     Tally,
     TerminalOnly,
-    Verdict,
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
@@ -35,7 +34,7 @@ LENGTH = Interval(1.2, 1.19, 1.21, unit="mm")
 
 def page_of(*blocks: Block, lead: Sequence[Block] = ()) -> Page:
     facts = {"Motion": "3 clips", "Nothing": ""}
-    verdict = Verdict("Contradicted", Outcome.REGRESSED)
+    verdict = ("Contradicted", Outcome.REGRESSED)
     return Page(
         "trust", "a study", "It differs.", facts, [Section("Part", "part", blocks)], verdict, lead, command="harness x"
     )

@@ -14,8 +14,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 from harness.errors import BadInput, UnknownName
+from harness.report.figures.print_figure import FORMATS, WIDTHS_MM, PrintFigure, draw_figure
 from harness.report.kit.chart import add_legend
-from harness.report.kit.print_figure import FORMATS, WIDTHS_MM, PrintFigure, draw_figure
 from harness.report.kit.style import COLOURS, MARKERS, MUTED, muted_line_style, print_line_style
 from tests.report.figures.made_up import drawn
 
@@ -33,7 +33,7 @@ PROGRAM = """
 import hashlib
 from tests.report.kit.test_print_figure import FIGURE, FORMATS, draw_figure
 for fmt in FORMATS:
-    print(hashlib.sha256(draw_figure(FIGURE, fmt, 85).data).hexdigest())
+    print(hashlib.sha256(draw_figure(FIGURE, fmt, 85)[0]).hexdigest())
 """
 
 
@@ -46,34 +46,33 @@ def page_mm(data: bytes) -> tuple[float, ...]:
 @pytest.mark.parametrize("width_mm", WIDTHS_MM)
 def test_every_format_has_the_size_that_is_asked_for(width_mm: int) -> None:
     figures = {fmt: draw_figure(FIGURE, fmt, width_mm) for fmt in FORMATS}
-    for figure in figures.values():
-        assert figure.width_mm == width_mm
-        assert figure.height_mm == pytest.approx(50.0, abs=6.0)
-    size = (width_mm, figures["pdf"].height_mm)
-    assert page_mm(figures["pdf"].data) == pytest.approx(size, abs=0.01)
-    (points,) = re.findall(r'<svg [^>]*width="([\d.]+)pt" height="([\d.]+)pt"', figures["svg"].data.decode())
+    for _, height_mm in figures.values():
+        assert height_mm == pytest.approx(50.0, abs=6.0)
+    size = (width_mm, figures["pdf"][1])
+    assert page_mm(figures["pdf"][0]) == pytest.approx(size, abs=0.01)
+    (points,) = re.findall(r'<svg [^>]*width="([\d.]+)pt" height="([\d.]+)pt"', figures["svg"][0].decode())
     assert [float(each) / 72.0 * 25.4 for each in points] == pytest.approx(size, abs=0.01)
-    with Image.open(io.BytesIO(figures["png"].data)) as image:
+    with Image.open(io.BytesIO(figures["png"][0])) as image:
         assert image.info["dpi"] == pytest.approx((300.0, 300.0), abs=0.1)
         assert [pixels / 300.0 * 25.4 for pixels in image.size] == pytest.approx(size, abs=0.1)
 
 
 def test_a_pdf_holds_truetype_fonts() -> None:
-    data = draw_figure(FIGURE, "pdf", 85).data
+    data = draw_figure(FIGURE, "pdf", 85)[0]
     assert b"/Subtype /Type3" not in data
     fonts = re.findall(rb"/Subtype /CIDFontType2", data)
     assert 0 < len(fonts) == len(re.findall(rb"/FontFile2", data))
 
 
 def test_an_svg_needs_no_font() -> None:
-    text = draw_figure(FIGURE, "svg", 85).data.decode()
+    text = draw_figure(FIGURE, "svg", 85)[0].decode()
     assert "<text" not in text
     assert "font-family" not in text
     assert "<!-- method_0 $x -->" in text  # what the paths are, for readers of the file
 
 
 def test_a_png_is_on_white() -> None:
-    pixels = imread(io.BytesIO(draw_figure(FIGURE, "png", 85).data))
+    pixels = imread(io.BytesIO(draw_figure(FIGURE, "png", 85)[0]))
     np.testing.assert_array_equal(pixels[0, 0], 1.0)
 
 
@@ -97,7 +96,7 @@ def test_the_same_data_give_the_same_bytes_in_every_process() -> None:
         outputs.add(done.stdout)
     (output,) = outputs
     assert len(set(output.split())) == len(FORMATS)
-    assert b"Date" not in draw_figure(FIGURE, "pdf", 85).data
+    assert b"Date" not in draw_figure(FIGURE, "pdf", 85)[0]
 
 
 def test_what_does_not_fit_is_refused() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.departures import Departure, compare_with_expected
 from harness.report.lab.departures import condense_departures, departure_texts, departures_sentence
 

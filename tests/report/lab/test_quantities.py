@@ -4,24 +4,24 @@ import math
 
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.timing import TIMING_KEYS
 from harness.measure.unit_report import STATION_FIGURES
-from harness.report.lab.quantities import Quantity, is_known, quantity
-from harness.study.trust.expected_values import preset_values
+from harness.report.lab.quantities import Quantity, find_quantity
+from harness.study.trust.characterization import preset_values
 
 
 def test_every_number_that_is_measured_has_a_name() -> None:
-    assert [key for key in (*preset_values(), *NOISE_KEYS, *TIMING_KEYS) if not is_known(key)] == []
-    assert all(is_known(f"station.{name}") for name in STATION_FIGURES)
+    keys = (*preset_values(), *NOISE_KEYS, *TIMING_KEYS, *(f"station.{name}" for name in STATION_FIGURES))
+    assert [key for key in keys if find_quantity(key).label == key] == []
 
 
 def test_numbers_are_shown_in_the_unit_of_their_key() -> None:
-    assert quantity("components.white.position_m").exact(0.00075) == "0.75 mm"
-    assert quantity("components.drift.pitch_roll_rad").exact(math.radians(0.25)) == "0.25 deg"
-    assert quantity("components.echo.share").exact(0.03) == "3 %"
-    assert quantity("components.speed.ahead_s").exact(0.002) == "2 ms"
+    assert find_quantity("components.white.position_m").exact(0.00075) == "0.75 mm"
+    assert find_quantity("components.drift.pitch_roll_rad").exact(math.radians(0.25)) == "0.25 deg"
+    assert find_quantity("components.echo.share").exact(0.03) == "3 %"
+    assert find_quantity("components.speed.ahead_s").exact(0.002) == "2 ms"
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_numbers_are_shown_in_the_unit_of_their_key() -> None:
     ],
 )
 def test_an_unknown_key_is_its_own_name_with_the_unit_of_its_end(key: str, unit: str) -> None:
-    found = quantity(key)
+    found = find_quantity(key)
     assert (found.label, found.unit) == (key, unit)
     assert found.title == (f"{key} [{unit}]" if unit else key)
 

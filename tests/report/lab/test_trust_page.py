@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_p_value
+from harness.core.number_format import Interval, format_p_value
 from harness.errors import Outcome
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text

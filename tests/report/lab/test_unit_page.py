@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadInput, ShapeError
 from harness.measure.unit_report import (
     DeviationCurve,
@@ -19,7 +19,7 @@ from harness.measure.unit_report import (
 )
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
-from harness.report.lab.quantities import quantity
+from harness.report.lab.quantities import find_quantity
 from harness.report.lab.unit_page import advice_text, description, unit_page
 from tests.report.reading import count_pictures, numbers_in_order, section_ids, text_of
 
@@ -50,7 +50,7 @@ def test_the_answer_is_the_heading_and_each_departure_follows_with_its_size(
     text = text_of(page)
     named = {(check.key, check.station): check for check in unit_with_faults.checks if check.is_named}
     assert f"rig departs from the preset default in {len(named)} of {len(unit_with_faults.checks)} checks" in text
-    places = [text.index(f"{quantity(key).of(named[key, ''].measured)}, expected ") for key in (WHITE, RATE)]
+    places = [text.index(f"{find_quantity(key).of(named[key, ''].measured)}, expected ") for key in (WHITE, RATE)]
     assert places == sorted(places)
     (damage,) = unit_with_faults.capture.damage
     assert text.count(damage) == 2
@@ -73,14 +73,14 @@ def test_each_number_has_its_interval_its_default_and_its_origin(page: Path, uni
     rows = (*unit_with_faults.parameters, *unit_with_faults.timing)
     assert {row.status for row in rows} == {"measured", "default"}
     for row in rows:
-        shown = quantity(row.key)
+        shown = find_quantity(row.key)
         default = "–" if row.default is None else shown.exact(row.default)
         count = f"{row.measured.count:,}" if row.measured.count else "–"
         assert numbers_in_order(text, shown.label, shown.of(row.measured), count, default, row.status), row.key
         assert row.measured.reason.partition("`")[0] in text
     for station in unit_with_faults.stations:
         for name, number in station.figures.items():
-            assert not number.is_measured or quantity(f"station.{name}").bare(number).number in text
+            assert not number.is_measured or find_quantity(f"station.{name}").bare(number).number in text
 
 
 def test_numbers_of_the_charts(page: Path, unit_with_faults: UnitReport) -> None:
@@ -90,7 +90,7 @@ def test_numbers_of_the_charts(page: Path, unit_with_faults: UnitReport) -> None
     (pair,) = unit_with_faults.rigid_pairs
     for one in pair.speeds:
         assert numbers_in_order(
-            text, f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s", quantity("rms_m").of(one.rms_m)
+            text, f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s", find_quantity("rms_m").of(one.rms_m)
         )
     lost, *_, best = unit_with_faults.quality
     assert f"lost (0) {100.0 * lost.share:.2f} %" in text
@@ -101,7 +101,7 @@ def test_checks_are_sorted_by_likelihood(page: Path, unit_with_faults: UnitRepor
     text = text_of(page)
     table = text[text.index("All ") :]
     ordered = sorted(unit_with_faults.checks, key=lambda check: (check.p_holm, check.p))
-    assert numbers_in_order(table, *(f"{quantity(one.key).label} {one.station or 'all'} " for one in ordered))
+    assert numbers_in_order(table, *(f"{find_quantity(one.key).label} {one.station or 'all'} " for one in ordered))
 
 
 def test_a_report_without_content_makes_a_page(tmp_path: Path, bare: UnitReport) -> None:
@@ -126,7 +126,7 @@ def test_the_terminal_has_the_answer_first_and_every_number(unit_with_faults: Un
                          "how long to record", "capture"]  # fmt: skip
     text = "\n".join(lines)
     for row in unit_with_faults.parameters:
-        assert f"{quantity(row.key).of(row.measured)}" in text
+        assert f"{find_quantity(row.key).of(row.measured)}" in text
     printed = max(8, sum(check.is_named for check in unit_with_faults.checks))
     assert f"and {len(unit_with_faults.checks) - printed} more" in lines
 
@@ -150,7 +150,7 @@ def test_contents_that_do_not_fit_are_refused() -> None:
 
 def test_the_description_has_numbers_that_were_measured_only(unit_with_faults: UnitReport, bare: UnitReport) -> None:
     spread, noise, excursions, shares, timing = description(unit_with_faults)
-    values = {row.key: quantity(row.key).of(row.measured).number for row in unit_with_faults.parameters}
+    values = {row.key: find_quantity(row.key).of(row.measured).number for row in unit_with_faults.parameters}
     figures = [row.figures["spread_m"].value for row in unit_with_faults.stations]
     assert f"{1e3 * min(figures):.2f} to {1e3 * max(figures):.2f} mm" in spread
     drift = "components.drift"

@@ -7,16 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.core.interval import Interval
-from harness.core.number_format import format_fixed
+from harness.core.number_format import Interval, format_fixed
 from harness.errors import ShapeError
-from harness.measure.accuracy import ErrorQuantiles
-from harness.measure.validation_report import ResidualSeries, ValidationReport
+from harness.measure.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
-from harness.report.lab.quantities import quantity
-from harness.report.lab.validation_charts import largest_of_stretches
-from harness.report.lab.validation_page import validation_answer, validation_page
+from harness.report.lab.quantities import find_quantity
+from harness.report.lab.validation_page import (
+    largest_of_stretches,
+    validation_answer,
+    validation_page,
+)
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
 from tests.report.reading import count_pictures, emptied, numbers_in_order, section_ids, text_of
 
@@ -46,7 +47,7 @@ def test_the_answer_is_the_heading_and_the_departure_follows(page: Path, late_ca
     medians = [1e3 * row.position.median.value for row in late_capture.accuracy.values()]
     assert f"lies {min(medians):.1f} to {max(medians):.1f} mm and " in answer
     assert f"in 1 of {len(late_capture.checks)} checks: latency (" in answer
-    late = f"Latency: {quantity('latency_s').of(late_capture.numbers['latency_s'])}, expected "
+    late = f"Latency: {find_quantity('latency_s').of(late_capture.numbers['latency_s'])}, expected "
     matched = f"{late_capture.matched_frames:,} of {late_capture.expected_frames:,} frames were matched"
     assert text.index(answer) < text.index(late) < text.index(matched)
     assert f"Reference {late_capture.truth}" in text
@@ -68,7 +69,7 @@ def test_every_section_has_its_numbers_and_their_intervals(page: Path, late_capt
     assert count_pictures(page) == 2
     text = text_of(page)
     for key, number in late_capture.numbers.items():
-        assert numbers_in_order(text, quantity(key).label, quantity(key).of(number)), key
+        assert numbers_in_order(text, find_quantity(key).label, find_quantity(key).of(number)), key
     for pose in late_capture.poses:
         name = f"{pose.name} on {pose.body}" if pose.body else pose.name
         numbers = [

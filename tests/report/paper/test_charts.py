@@ -12,12 +12,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
+from harness.core.number_format import Interval
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS
-from harness.report.paper.bar_chart import draw_bars, height_in, is_horizontal
-from harness.report.paper.charts import figure_charts
-from harness.report.paper.figure_table import figure_table
-from harness.report.paper.line_chart import draw_lines
+from harness.report.paper.charts import figure_charts, figure_table
+from harness.report.paper.figures import draw_bars, draw_lines, height_in, is_horizontal
 from harness.results.findings import BarChart, LineChart, PaperExperiment
 from tests.report.paper.findings import METHODS, curves, liu, sets
 
@@ -138,4 +137,4 @@ def test_the_table_of_a_figure_has_every_number() -> None:
     assert len(rows) == 31
     columns = (shown.groups, shown.series["kernel_cca"], shown.low["kernel_cca"], shown.high["kernel_cca"])
     for row, group, value, low, high in zip(rows, *columns, strict=True):
-        assert row == (group, f"{value:.2f} ({low:.2f} to {high:.2f})")
+        assert row == (group, str(Interval.of(value, low, high)))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import MARKS
-from harness.report.paper.page import KINDS, count_verdicts, run_link, sentence, write_paper_page
+from harness.report.paper.page import KINDS, claims_sentence, count_verdicts, run_link, write_paper_page
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings
 from tests.report.paper.findings import curves, liu, sets, write_study
@@ -233,7 +233,7 @@ def test_the_sentence_counts_every_claim() -> None:
     claims = [BenchmarkStatement("", "", "", verdict) for verdict in KINDS for _ in range(3)]
     for count in range(len(claims) + 1):
         some = claims[:count]
-        numbers = [int(number) for number in re.findall(r"\d+", sentence(some))]
+        numbers = [int(number) for number in re.findall(r"\d+", claims_sentence(some))]
         assert sum(count_verdicts(some).values()) == count
         assert numbers == [] if not count else numbers[1] == count == sum(numbers) - numbers[1]
 

@@ -9,11 +9,17 @@ import pytest
 
 import harness
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import WIDTH
-from harness.report.paper.page import claims_table, paper_text, sentence, statements_table, statements_text
-from harness.report.paper.readme import update_readme
+from harness.report.paper.page import (
+    claims_sentence,
+    claims_table,
+    paper_text,
+    statements_table,
+    statements_text,
+    update_readme,
+)
 from harness.results.benchmark_statement import BenchmarkStatement, Verdict
 from harness.results.findings import PaperExperiment
 from tests.report.paper.findings import kim, liu, write_study
@@ -32,7 +38,7 @@ def test_every_claim_is_told_whole() -> None:
         for text in (claim.target, claim.measured, *claim.why.split(), claim.verdict, number.ends):
             assert letters(text) in told
     for text in (
-        sentence([c for e in liu().experiments for c in e.claims]),
+        claims_sentence([c for e in liu().experiments for c in e.claims]),
         "Golf has 2 clips only.",
         "One sequence left out",
     ):

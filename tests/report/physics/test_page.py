@@ -9,8 +9,7 @@ import pytest
 from harness.core.number_format import format_share
 from harness.errors import BadInput, ShapeError
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.report.physics.page import write_physics_page
-from harness.report.physics.truth_table import result_sentence
+from harness.report.physics.page import result_sentence, write_physics_page
 from tests.report.reading import count_pictures, emptied, numbers_in_order, text_of
 
 pytestmark = pytest.mark.long

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.core.interval import Interval
+from harness.core.number_format import Interval
 from harness.report.kit.render_process import start_renderer
 from harness.report.placement import body_map as body
 from harness.report.placement import page as placement_page
-from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
+from harness.report.placement.body_map import draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
-from harness.report.placement.wording import sentence, set_name, smallest_sufficient_set
+from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
 from harness.results.placement_findings import (
     BestSet,
     PlacementFindings,
@@ -51,7 +51,7 @@ def study_of(
         for stations, values in errors.items()
     ]
     whole = replace(like, tried=tuple(tried), best=tuple(BestSet(t.stations) for t in tried), better=better)
-    parts = ("rankings", "searches", "worth", "compared", "conditions", "agreements")
+    parts = ("rankings", "searches", "contributions", "compared", "conditions", "agreements")
     return replace(whole, unit="deg", **emptied(parts))
 
 
@@ -76,9 +76,9 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough(placement: Placeme
     chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
-    assert sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
+    assert placement_sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2 deg")
     apart = study_of(placement, {two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
-    assert sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
+    assert placement_sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
     fps = study_of(
         placement, {two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher"
     )
@@ -89,20 +89,20 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough(placement: Placeme
 
 def test_too_few_clips_are_said_to_be_too_few(placement: PlacementFindings) -> None:
     few = study_of(placement, {("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in sentence(few)
+    assert "but at least 6 units are needed to compare sets, instead of 3: head + pelvis" in placement_sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended(placement: PlacementFindings) -> None:
     nothing = study_of(placement, {("pelvis",): [None] * 8})
-    assert sentence(nothing) == "No set of stations was measured."
+    assert placement_sentence(nothing) == "No set of stations was measured."
     assert "not measured" in placement_text(nothing)
     assert pareto_chart(nothing) is None
 
 
 def test_the_text_opens_on_the_answer_and_has_every_table(placement: PlacementFindings) -> None:
     text = placement_text(replace(placement, failures={"ik on walk (worn=head)": "Traceback\nValueError: <b>no</b>"}))
-    assert " ".join(text.split()).startswith(sentence(placement))
-    assert sentence(placement).startswith("1 station is as good as up to 3: pelvis, ")
+    assert " ".join(text.split()).startswith(placement_sentence(placement))
+    assert placement_sentence(placement).startswith("1 station is as good as up to 3: pelvis, ")
     assert max(map(len, text.splitlines())) <= 160
     for best in placement.best:
         tried = placement.of(best.stations)
@@ -118,7 +118,7 @@ def test_the_text_opens_on_the_answer_and_has_every_table(placement: PlacementFi
         assert str(Interval.of(pair.tau, pair.low, pair.high)) in text
     for claim in placement.claims:
         assert claim.verdict in text
-    for worth in placement.worth:
+    for worth in placement.contributions:
         assert str(Interval.of(worth.difference, worth.low, worth.high, signed=True)) in text
     assert "FAILED ik on walk (worn=head): ValueError: <b>no</b>" in text
     assert "left out of all 3" in text
@@ -136,14 +136,14 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, p
     write_placement(tmp_path / "findings.json", replace(placement, notes=(hostile,)))
     page = write_placement_page(tmp_path)
     content, said = page.read_text(encoding="utf-8"), text_of(page)
-    assert f"<h1>{sentence(placement)}</h1>" in content
+    assert f"<h1>{placement_sentence(placement)}</h1>" in content
     assert content.index("<h1>") < content.index('aria-label="best sets"') < content.index("<nav")
     assert f"The body map: {NO_PICTURE}" in said
     assert hostile not in content
     assert hostile in said
     for place in placement.candidates:
         assert place.name.replace("_", " ") in said
-    for worth in placement.worth:
+    for worth in placement.contributions:
         assert Interval.of(worth.difference, worth.low, worth.high, signed=True).number in said
     assert all(claim.target in said for claim in placement.claims)
     charts = len(re.findall("<img", content))
@@ -168,14 +168,16 @@ def test_the_report_verb_writes_the_same_page_again(
 
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(placement: PlacementFindings) -> None:
-    maps = select_body_maps(placement.worth)
-    assert (set(maps[0].values), maps[0].base) == (set(ALL), ())
-    assert maps[0].description == "mean error of sets without it minus mean error of sets with it"
-    (among,) = select_body_maps([worth for worth in placement.worth if worth.mode == "ablate"])
-    assert among.description == "error without it minus error with all 3 stations"
+    maps = select_body_maps(placement.contributions)
+    assert (set(maps[0][0]), *maps[0][1:]) == (
+        set(ALL),
+        "mean error of sets without it minus mean error of sets with it",
+        (),
+    )
+    (among,) = select_body_maps([worth for worth in placement.contributions if worth.mode == "ablate"])
+    assert among[1] == "error without it minus error with all 3 stations"
     hands = ("right_hand", "left_hand")
-    (more,) = (shown for shown in maps if shown.base)
-    assert (more.base, set(more.values)) == (hands, {"pelvis"})
+    assert [(set(values), base) for values, _, base in maps if base] == [({"pelvis"}, hands)]
     assert select_body_maps(()) == []
 
 
@@ -201,7 +203,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
     }
     monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", (PLACES[-1].name,)), unit="deg")
+    chart, missing = draw_body_map(PLACES, values, "worth", (PLACES[-1].name,), unit="deg")
     assert chart is not None
     assert missing == ""
     assert f"{PLACES[-1].name.replace('_', ' ')} (worn)" in chart.svg
@@ -217,18 +219,18 @@ def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
     )
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_body_map(PLACES, BodyMapValues({"head": None}, "worth"), unit="deg") == (
+    assert draw_body_map(PLACES, {"head": None}, "worth", unit="deg") == (
         None,
         "no candidate has a value",
     )
     monkeypatch.setattr(body, "find_spec", lambda name: None)
-    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -239,13 +241,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, values: object, description: str, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
     values = {"head": 0.0, "left_ankle": 0.5}
     worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert draw_body_map(PLACES, BodyMapValues(values, "worth", worn), unit="deg")[1] == ""
+    assert draw_body_map(PLACES, values, "worth", worn, unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 
@@ -272,7 +274,7 @@ def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(pl
     text = placement_text(placement)
     head = next(line for line in text.splitlines() if line.startswith("stations  best set"))
     assert "cross-validated" in head
-    assert str(Interval.of(placement.best[0].crossed, None, None, "deg")) in text
+    assert str(Interval.of(placement.best[0].cross_validated_error, None, None, "deg")) in text
     best = tuple(replace(each, held_out=3.21, held_out_low=3.0, held_out_high=3.5) for each in placement.best)
     held_out = placement_text(replace(placement, best=best))
     assert "cross-validated" not in held_out.split("\n\n")[1]

@@ -9,17 +9,11 @@ from harness.report.placement.page import placement_page, placement_text
 from harness.report.placement.wording import (
     changes_sentence,
     format_duration,
+    placement_sentence,
     power_sentences,
     ranks_by_condition,
-    sentence,
 )
-from harness.results.placement_findings import (
-    BestSet,
-    ChangedOrder,
-    PlacementFindings,
-    RankAgreement,
-    StatisticalPower,
-)
+from harness.results.placement_findings import BestSet, ChangedOrder, PlacementFindings, RankAgreement, StatisticalPower
 
 POWER = StatisticalPower(
     *(16, 165, "deg", 13, 590.0, 480.0, 0.4, 0.7, 1.02, 0.3, 190, 7000.0, 4),
@@ -39,17 +33,17 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     tested = replace(best, held_out=2.0, held_out_low=1.8, held_out_high=2.2, held_out_clips=16)
     tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
-    assert sentence(asked) == (
+    assert placement_sentence(asked) == (
         "Best two stations for walking: left hand + pelvis, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of "
         f"the 54 other pairs that were tried: head + pelvis; sternum + pelvis.{CHOSEN}"
     )
     assert placement_text(asked).startswith("Best two stations for walking: left hand + pelvis")
-    assert placement_page(asked).headline == sentence(asked)
+    assert placement_page(asked).headline == placement_sentence(asked)
 
 
 def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindings) -> None:
     asked = replace(findings, sizes=(1, 3, 4), behaviours=("walking", "table_tennis"))
-    said = sentence(asked)
+    said = placement_sentence(asked)
     assert said.startswith("Best station for walking and table tennis: ")
     assert "Best three stations for walking and table tennis: both hands + pelvis, " in said
     assert said.endswith(f"No set of 4 stations was measured.{CHOSEN}")
@@ -57,20 +51,20 @@ def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindi
 
 def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
     alone = BestSet(findings.best[0].stations, of=3)
-    said = sentence(replace(findings, sizes=(1,), best=(alone,)))
+    said = placement_sentence(replace(findings, sizes=(1,), best=(alone,)))
     assert "on the clips on which it was chosen; no other place is tied with it." in said
-    assert "no other place was tried" in sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
+    assert "no other place was tried" in placement_sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
 
 
 def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFindings) -> None:
     best = findings.best[0]
     others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
     asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=3),))
-    assert sentence(asked).endswith(f" cannot tell it from the other 2 places (13 might).{CHOSEN}")
+    assert placement_sentence(asked).endswith(f" cannot tell it from the other 2 places (13 might).{CHOSEN}")
     enough = replace(asked, power=replace(POWER, least_clips=1))
-    assert "tied with 2 of the 2 other places that were tried: " in sentence(enough)
+    assert "tied with 2 of the 2 other places that were tried: " in placement_sentence(enough)
     two = replace(enough, best=(replace(best, ties=others[:1], of=2),))
-    assert "tied with the only other place that was tried: " in sentence(two)
+    assert "tied with the only other place that was tried: " in placement_sentence(two)
 
 
 def test_what_the_clips_can_show_comes_with_the_time_that_more_would_take() -> None:
@@ -159,4 +153,4 @@ def test_the_answer_states_how_many_performers_the_clips_are_of(
     clips: list[str], said: str, sizes: tuple[int, ...], findings: PlacementFindings
 ) -> None:
     tried = tuple(replace(one, errors=dict(zip(clips, one.errors.values(), strict=False))) for one in findings.tried)
-    assert sentence(replace(findings, tried=tried, sizes=sizes)).endswith(said)
+    assert placement_sentence(replace(findings, tried=tried, sizes=sizes)).endswith(said)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.run.writer import write_run_page
+from harness.report.run.page import write_run_page
 from tests.planted import Plan, planted_run
 
 

@@ -3,8 +3,9 @@
 from typing import Any
 
 from harness.compare.units import BY_NAME, Sampling
-from harness.report.run import calibration_cost
-from harness.report.run.calibration_errors import calibration_table, section, text
+from harness.report.kit.page_html import page_table
+from harness.report.kit.page_text import table_lines
+from harness.report.run.calibration import calibration_cost, calibration_errors, calibration_tables
 
 FOUND = {"mount_mm": 20.0, "mount_deg": 5.0, "length_mm": 0.0, "room_heading_deg": 3.0, "room_origin_mm": 30.0}
 
@@ -23,7 +24,7 @@ CELLS = [
 
 
 def test_each_session_counts_once_whatever_methods_were_shown_it() -> None:
-    head, exact, tpose, poses = text({"cells": CELLS})[3:7]
+    head, exact, tpose, poses = table_lines(calibration_errors(CELLS))[-4:]
     assert head.split("  ")[0] == "calibration"
     assert exact.split() == ["exact", "2", *["known"] * 5]
     assert "25.0 (30.0)" in tpose  # not the mean over cells
@@ -34,21 +35,20 @@ def test_each_session_counts_once_whatever_methods_were_shown_it() -> None:
 
 def test_what_else_is_varied_stands_beside_it() -> None:
     cells = [{**one, "varied": {**one["varied"], "noise": noise}} for noise in ("clean", "default") for one in CELLS]
-    lines = text({"cells": cells})
-    assert len(lines) == len(text({"cells": CELLS})) + 3
+    lines = table_lines(calibration_errors(cells), 200)
+    assert len(lines) == len(table_lines(calibration_errors(CELLS), 200)) + 3
     assert "calibration=poses noise=default" in "\n".join(lines)
 
 
 def test_the_page_has_the_same_table() -> None:
-    page = section(CELLS)
+    page = page_table(calibration_errors(CELLS))
     assert "<td>25.0 (30.0)</td>" in page
     assert '<th scope="row">poses</th>' in page
 
 
 def test_a_run_whose_calibration_is_exact_says_nothing() -> None:
-    assert text({"cells": CELLS[:2]}) == []
-    assert text({}) == []
-    assert section(CELLS[:2]) == ""
+    assert list(calibration_errors(CELLS[:2]).rows) == []
+    assert [list(table.rows) for table in calibration_tables({})] == [[], []]
 
 
 def judged(kind: str, clip: str, error: float | None) -> dict[str, Any]:
@@ -61,29 +61,24 @@ def test_what_calibrating_costs_is_paired_by_unit() -> None:
     exact = [judged("exact", clip, float(n)) for n, clip in enumerate(clips)]
     cost = [judged("poses", clip, n + 0.5) for n, clip in enumerate(clips)]
     few = [judged("tpose", clip, n + 1.0 if n else None) for n, clip in enumerate(clips)]
-    table = calibration_cost.cost_table([*exact, *cost, *few], BY_NAME)
-    assert table is not None
+    table = calibration_cost([*exact, *cost, *few], BY_NAME)
     angle, place = table.rows
     assert table.head == ["behaviour", "method", "error", "exact", "poses", "tpose"]
     assert angle[2:] == ["joint angle [deg]", "2.50", "+0.5", "+1 (too few units: 5, of at least 6)"]
     assert place[2:4] == ["mpjpe_pa [mm]", "2.5"]
-    assert "+0.5" in "\n".join(calibration_cost.text({"cells": [*exact, *cost]}))
     of_two = Sampling({clip: "Anna" if clip < "d" else "Bert" for clip in clips})
-    few_performers = calibration_cost.cost_table([*exact, *cost], of_two)
-    assert few_performers is not None
+    few_performers = calibration_cost([*exact, *cost], of_two)
     assert few_performers.rows[0][-1] == "+0.5 (too few units: 2, of at least 6)"
-    assert "<td>+0.5</td>" in calibration_cost.section([*exact, *cost], BY_NAME)
+    assert "<td>+0.5</td>" in page_table(calibration_cost([*exact, *cost], BY_NAME))
 
 
 def test_no_cost_is_told_without_something_to_hold_it_against() -> None:
-    assert calibration_cost.cost_table([judged("poses", "a", 1.0)], BY_NAME) is None
-    assert calibration_cost.text({"cells": [judged("exact", "a", 1.0)]}) == []
-    assert calibration_cost.section([], BY_NAME) == ""
+    for cells in ([judged("poses", "a", 1.0)], [judged("exact", "a", 1.0)], []):
+        assert list(calibration_cost(cells, BY_NAME).rows) == []
 
 
 def test_what_an_equation_does_not_give_is_none() -> None:
     """Kim's maps have no mounts and no common origin; the bones are the truth."""
-    table = calibration_table([*CELLS, cell("kim2012", "a", {"room_heading_deg": 2.0})])
-    assert table is not None
+    table = calibration_errors([*CELLS, cell("kim2012", "a", {"room_heading_deg": 2.0})])
     (row,) = [row for row in table.rows if row[0] == "kim2012"]
-    assert row == ["kim2012", "1", "none", "none", "known", "2.00 (2.00)", "none"]
+    assert row == ["kim2012", "", "1", "none", "none", "known", "2.00 (2.00)", "none"]

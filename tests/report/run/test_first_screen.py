@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.report.run.data import read_run
-from harness.report.run.writer import write_run_page
+from harness.report.run.page import write_run_page
 from tests.planted import Plan, planted_run
 
 pytestmark = pytest.mark.long

@@ -16,12 +16,13 @@ from PIL import Image
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile
 from harness.report.kit import render_process
-from harness.report.run import writer
+from harness.report.kit.page import DataTable, Strong
+from harness.report.run import page as run_page
 from harness.report.run.data import WORST_METRICS, read_run
-from harness.report.run.headline import build_headline
+from harness.report.run.headline import run_verdict
+from harness.report.run.page import write_run_page
 from harness.report.run.tables import results_tables
 from harness.report.run.text import run_table
-from harness.report.run.writer import write_run_page
 from harness.results.storage import read_summary
 from tests.planted import METHODS, Plan, planted_run
 
@@ -64,7 +65,7 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
 def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None:
     rows = json.loads((run_folder / "summary.json").read_text())["cells"]
     means = {name: np.mean([row["joint_angle_mean_deg"] for row in rows if row["method"] == name]) for name in METHODS}
-    assert f"error, {min(means.values()):.2f}° on" in build_headline(read_run(run_folder)).sentence
+    assert f"error, {min(means.values()):.2f}° on" in run_verdict(read_run(run_folder))[0]
 
 
 @pytest.fixture(scope="module")
@@ -102,10 +103,11 @@ def test_methods_that_cannot_be_told_apart_are_not_ranked(ten_clips: Path) -> No
         summary[name] = [row for row in summary[name] if row["method"] != "good"]
     run = replace(read_run(ten_clips), summary=summary, full_summary=summary)
     lowest, _ = run.ranked
-    sentence = build_headline(run).sentence
+    sentence, _ = run_verdict(run)
     assert sentence.startswith(f"{lowest} has the lowest mean joint-angle error, ")
     assert f"cannot be called better than the other method ({line.why})." in sentence
-    assert "<strong>" not in results_tables(run)
+    tables = [block for block in results_tables(run) if isinstance(block, DataTable)]
+    assert not any(isinstance(cell, Strong) for table in tables for row in table.rows for cell in row)
 
 
 def test_identical_methods_are_the_same(tmp_path: Path) -> None:
@@ -114,25 +116,25 @@ def test_identical_methods_are_the_same(tmp_path: Path) -> None:
     summary = read_summary(out)
     for name in ("methods", "behaviours", "cells"):
         summary[name] = [{**row, "method": method} for method in ("ik", "copy") for row in summary[name]]
-    sentence = build_headline(replace(read_run(out), summary=summary, full_summary=summary)).sentence
+    sentence, _ = run_verdict(replace(read_run(out), summary=summary, full_summary=summary))
     assert "The same within the margin: copy." in sentence
     assert "best" not in sentence
 
 
 def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) -> None:
     run = read_run(run_folder)
-    assert build_headline(run).sentence.endswith(" mm, also the lowest.")
+    assert run_verdict(run)[0].endswith(" mm, also the lowest.")
     cells = [{**row, "mpjpe_mm": 1.0 if row["method"] == "ik" else 60.0} for row in run.cells]
-    told = build_headline(replace(run, summary={**run.summary, "cells": cells})).sentence
+    told, _ = run_verdict(replace(run, summary={**run.summary, "cells": cells}))
     assert told.endswith("ik has the lowest joint position error: 1 mm (best_match+ik: 60 mm).")
 
 
 def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> None:
     run = read_run(run_folder)
     cells = [row for row in run.cells if (row["method"] == "ik") == (row["behaviour"] == "walking")]
-    found = build_headline(replace(run, full_summary={**run.summary, "cells": cells}))
-    assert found.lowest is None
-    assert found.sentence.endswith("share no measured sequence, so they are not ranked.")
+    verdict, lowest = run_verdict(replace(run, full_summary={**run.summary, "cells": cells}))
+    assert lowest is None
+    assert verdict.endswith("share no measured sequence, so they are not ranked.")
 
 
 def test_every_number_of_the_table_is_in_the_summary(run_folder: Path) -> None:
@@ -192,7 +194,7 @@ def test_hostile_names_stay_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     rows = {name: [rename(row) for row in run.summary[name]] for name in ("behaviours", "cells", "methods")}
     traces = tuple(replace(trace, clip=HOSTILE, behaviour=HOSTILE) for trace in run.traces)
     monkeypatch.setattr(
-        writer,
+        run_page,
         "read_run",
         lambda *_: replace(run, summary={**run.summary, **rows}, full_summary={**run.summary, **rows}, traces=traces),
     )
@@ -361,7 +363,7 @@ def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tupl
 def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state(tmp_path: Path) -> None:
     planted_run(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0))
     code = (
-        "import sys; from pathlib import Path; from harness.report.run.writer import write_run_page;"
+        "import sys; from pathlib import Path; from harness.report.run.page import write_run_page;"
         "assert not {'pyvista', 'vtk', 'matplotlib'} & set(sys.modules);"
         "import matplotlib; before = matplotlib.rcParams.copy(); write_run_page(Path(sys.argv[1]), rendered=False);"
         "assert matplotlib.rcParams.copy() == before; assert 'matplotlib.pyplot' not in sys.modules;"

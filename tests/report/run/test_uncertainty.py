@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.report.kit.page import DataTable
+from harness.report.kit.page_html import page_table
 from harness.report.kit.ranking import LAG_NOTE
 from harness.report.run.data import read_run
-from harness.report.run.headline import build_headline
-from harness.report.run.tables import results_tables
-from harness.report.run.uncertainty import error_against_sigma, sigma_table
-from harness.report.run.writer import write_run_page
+from harness.report.run.headline import run_verdict
+from harness.report.run.joint_errors import error_against_sigma
+from harness.report.run.page import write_run_page
+from harness.report.run.tables import results_tables, sigma_table
 from harness.results.storage import read_summary
 from tests.planted import Plan, planted_run
 
@@ -37,18 +39,19 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_late_methods_are_named_and_ranked_apart(run_folder: Path) -> None:
     run = read_run(run_folder)
     assert set(run.series) == {"ik", "gauss", LATE, "late (lag 2)"}
-    headline = build_headline(run)
-    assert headline.lowest == "gauss"
-    assert headline.sentence.startswith("gauss is best: ")
-    assert f"{LATE} is best: " in headline.sentence
-    assert LAG_NOTE in headline.sentence
-    assert headline.sentence.count("error is") == headline.sentence.count("also the lowest") == 2
-    assert "has the lowest joint position error" not in headline.sentence
+    verdict, lowest = run_verdict(run)
+    assert lowest == "gauss"
+    assert verdict.startswith("gauss is best: ")
+    assert f"{LATE} is best: " in verdict
+    assert LAG_NOTE in verdict
+    assert verdict.count("error is") == verdict.count("also the lowest") == 2
+    assert "has the lowest joint position error" not in verdict
 
 
 def test_each_group_has_its_bold_cell(run_folder: Path) -> None:
-    tables = str(results_tables(read_run(run_folder)))
-    first = tables.split("</table>")[0]
+    table = results_tables(read_run(run_folder))[0]
+    assert isinstance(table, DataTable)
+    first = page_table(table)
     bold = re.findall(r'<th scope="row">([^<]*)</th><td><strong>', first)
     assert sorted(bold) == ["gauss", LATE]
     assert LAG_NOTE in first
@@ -62,7 +65,7 @@ def test_a_run_of_causal_methods_has_none_of_this(tmp_path: Path) -> None:
     assert "leaves the last frames" not in page
     assert "data:band" not in (out / "plots" / "error_walking.svg").read_text()
     assert not list((out / "plots").glob("sigma*"))
-    assert sigma_table(read_run(out)) == ""
+    assert list(sigma_table(read_run(out)).rows) == []
 
 
 def test_the_coverage_says_why_the_last_frames_have_no_estimate(run_folder: Path) -> None:
@@ -71,7 +74,7 @@ def test_the_coverage_says_why_the_last_frames_have_no_estimate(run_folder: Path
 
 
 def test_the_table_has_the_scores_of_the_summary(run_folder: Path) -> None:
-    table = re.sub(r"<[^>]*>", "|", str(sigma_table(read_run(run_folder))))
+    table = re.sub(r"<[^>]*>", "|", page_table(sigma_table(read_run(run_folder))))
     texts = [text.strip() for text in table.split("|") if text.strip()]
     pooled = {row["method"]: row["sigma_scores"] for row in read_summary(run_folder)["behaviours"]}
     for method in ("gauss", "late"):

@@ -19,7 +19,6 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_html, page_table
 from harness.report.sweep.charts import (
     MAX_SERIES,
-    Curve,
     _dot_chart_height_in,
     _draw,
     curves,
@@ -27,10 +26,9 @@ from harness.report.sweep.charts import (
     select_curves,
     sweep_chart,
 )
-from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey
+from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
-from harness.report.sweep.reader import collect_cells, read_sweep
-from harness.report.sweep.wording import describe_effect, group_failures, sentence
+from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
 from harness.results.index import CellIndex
 from harness.results.integrity import compute_digests
 from harness.results.reported_metrics import PRIMARY_METRIC
@@ -69,7 +67,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
-    said = sentence(sweep)
+    said = sweep_sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
     assert re.search(
         r"on 14 clips of 7 performers\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 7",
@@ -130,15 +128,15 @@ def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None
 
 
 def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folder: Path) -> None:
-    (fault,) = group_failures(read_sweep(folder))
-    assert (len(fault.cells), fault.message) == (84, "ValueError: <b>no</b> pose & no plan")
+    ((message, failed),) = group_failures(read_sweep(folder)).items()
+    assert (len(failed), message) == (84, "ValueError: <b>no</b> pose & no plan")
     said = text_of(folder / "report.html")
     assert "84 cells: ValueError: <b>no</b> pose & no plan" in said
     assert "and 64 more" in said
     assert said.count("Traceback (most recent call last)") == 1
     command = sweep_command(folder)
     assert said.count(command) == 3
-    assert f"{command} --cell {shlex.quote(fault.cells[0])}" in said
+    assert f"{command} --cell {shlex.quote(failed[0])}" in said
     assert "FAILED 84, such as walking seed 1: local_pca on walking_p1_01" in sweep_text(read_sweep(folder))
 
 
@@ -174,7 +172,7 @@ def test_nothing_is_too_little_to_be_told(plan: SweepPlan, said: str, tmp_path: 
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(known=4)))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
-    assert sentence(sweep).count("has the lowest mean joint-angle error") == 2
+    assert sweep_sentence(sweep).count("has the lowest mean joint-angle error") == 2
 
 
 def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
@@ -208,10 +206,10 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = planted_sweep(tmp_path / "few", SweepPlan(scenarios=("walking",), clips=5))
     alike = planted_sweep(tmp_path / "alike", SweepPlan(methods={"ik": 1.5, "local_pca": 1.5}))
-    assert sentence(read_sweep(few)).endswith(
+    assert sweep_sentence(read_sweep(few)).endswith(
         "but cannot be called better than any of the other 2 (too few units: 5, of at least 6)."
     )
-    assert sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
+    assert sweep_sentence(read_sweep(alike)).endswith("(the interval contains zero and exceeds the margin).")
     for out in (few, alike):
         assert "<td><strong>" not in write_sweep_page(out).read_text(encoding="utf-8")
 
@@ -233,7 +231,7 @@ def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Pat
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
     sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=5, vary={NOISE: ("clean", "default")})))
-    points = [point for curve in curves(sweep, sweep.keys[0], 0) for point in curve.points]
+    points = [point for curve in curves(sweep, sweep.keys[0], 0).values() for point in curve]
     assert len(points) == 6
     assert all(point.mean is not None and point.low is None for point in points)
 
@@ -252,7 +250,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     methods = {"ik": 6.0, "good": 2.0, "late": 0.1}
     sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=10, methods=methods, lags={"late": 2})))
     assert sweep.series == ("ik", "good", "late (lag 2)")
-    causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sentence(sweep))
+    causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sweep_sentence(sweep))
     assert "good is best: " in causal
     assert "late" not in causal
     assert late.endswith("of 10 performers, with a lag of 2 frames. No other method was measured.")
@@ -260,8 +258,8 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     table = str(page_table(scenario_table(sweep, PRIMARY_METRIC)))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
     plain = read_sweep(planted_sweep(tmp_path / "plain", SweepPlan(clips=10, methods=methods)))
-    assert "late is best: " in sentence(plain)
-    assert "lag" not in sentence(plain)
+    assert "late is best: " in sweep_sentence(plain)
+    assert "lag" not in sweep_sentence(plain)
 
 
 def test_hostile_names_stay_text() -> None:
@@ -281,10 +279,10 @@ def test_hostile_names_stay_text() -> None:
 
 def test_names_and_values_on_a_chart_do_not_meet() -> None:
     names = [f"method_{n}[neighbours={n}]" for n in range(12)]
-    found = [
-        Curve(name, n, (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7)))
-        for n, name in enumerate(names)
-    ]
+    found = {
+        n: (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7))
+        for n in range(len(names))
+    }
     shown = select_curves(found)
     assert len(shown) == MAX_SERIES
     words = VariedKey("worn", ("head+torso+left_hand+right_hand+left_ankle+right_ankle+sternum", "a", "b"))
@@ -292,7 +290,7 @@ def test_names_and_values_on_a_chart_do_not_meet() -> None:
         made: list[Figure] = []
 
         def draw(figure: Figure, key: VariedKey = key, made: list[Figure] = made) -> None:
-            _draw(figure, key, shown)
+            _draw(figure, key, shown, names)
             made.append(figure)
 
         draw_chart(

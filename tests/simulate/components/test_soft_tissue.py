@@ -16,9 +16,8 @@ from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
 from harness.experiment.clip_evaluation import noise_of
 from harness.experiment.scenario import load_scenario
-from harness.simulate.components.mount import MountSlip
+from harness.simulate.components.mount import MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact, simulate_oscillators, soft_limit
-from harness.simulate.components.strap_slip import StrapSlip
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings

@@ -10,10 +10,9 @@ from harness.core.seeds import generator
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import Fusion, FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
-from harness.simulate.physics.level import level_db, noise_factor
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
-from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
-from harness.simulate.physics.status import TRACKING
+from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
+from harness.simulate.physics.tracking_state import TRACKING
 from harness.simulate.readings import GRAVITY_M_S2
 
 TICK_HZ = 400.0

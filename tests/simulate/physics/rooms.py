@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -50,13 +49,12 @@ def placed(room: Room | None = None, centre_m: Floats = ORIGIN_M[:2]) -> PlacedR
 def block_of(motion: TrackerMotion, first: int, slots: int) -> TrackerMotion:
     """Some slots of a motion."""
     ticks = slice(first * TICKS_PER_SLOT, (first + slots) * TICKS_PER_SLOT + 1)
-    return TrackerMotion(*(part[ticks] for part in vars(motion).values()))
+    return TrackerMotion(*(part[ticks] for part in motion))
 
 
 def some_stations(motion: TrackerMotion, *rows: int) -> TrackerMotion:
     """Some stations of a motion."""
-    return replace(
-        motion,
+    return motion._replace(
         position_m=motion.position_m[:, list(rows)],
         tracker_from_station=motion.tracker_from_station[:, list(rows)],
         velocity_m_s=motion.velocity_m_s[:, list(rows)],

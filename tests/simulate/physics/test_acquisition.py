@@ -5,7 +5,8 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.physics.acquisition import Search, add_force, begin_search, fix, invert, level_attitude
+from harness.simulate.physics.acquisition import add_force, begin_search, fix, invert, level_attitude
+from harness.simulate.physics.filter_state import Search
 from harness.simulate.physics.fusion import Fusion, FusionFilter
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.readings import GRAVITY_M_S2
@@ -33,7 +34,11 @@ def searching(station: FreeStation, slots: int = SLOTS) -> FusionFilter:
 def try_fix(fusion_filter: FusionFilter, window_s: float = 1.0) -> tuple[bool, Floats, Floats]:
     """Whether a fix was found, the motion, and P."""
     motion, covariance = fusion_filter.state.motion[0, -1].copy(), np.zeros((15, 15))
-    return fix(fusion_filter.ranging, fusion_filter.search, 0, window_s, motion, covariance), motion, covariance
+    return (
+        fix(fusion_filter.model.ranging, fusion_filter.state.search, 0, window_s, motion, covariance),
+        motion,
+        covariance,
+    )
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.0, 3.0])

@@ -16,7 +16,7 @@ from harness.simulate.physics.constellation import (
     load_constellation,
     middle_of_path_m,
 )
-from harness.simulate.physics.mcf_file import read_mcf, write_mcf
+from harness.simulate.physics.emitters import read_mcf, write_mcf
 from harness.stream.codec.replies import Emitter
 from harness.stream.emulator.settings import DEFAULT_EMITTERS
 

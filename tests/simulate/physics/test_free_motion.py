@@ -7,7 +7,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
-from tests.simulate.physics.test_body_motion import central_differences, in_blocks, ticks_s
+from tests.simulate.physics.test_worn import central_differences, ticks_s
 
 
 def tumbling(rate_hz: float = 50.0) -> tuple[Floats, FreeMotionSource]:
@@ -50,13 +50,6 @@ def test_it_rests_before_and_after() -> None:
     assert not before.turn_rad_s.any()
     after = source.advance(ticks_s(4.31, 5.0))
     assert not after.velocity_m_s.any()
-
-
-def test_blocks_of_any_size_give_the_same_bytes() -> None:
-    whole = in_blocks(tumbling()[1], ticks_s(-1.0, 4.0), 10000)
-    parts = in_blocks(tumbling()[1], ticks_s(-1.0, 4.0), 5)
-    for one, other in zip(whole, parts, strict=True):
-        assert one.tobytes() == other.tobytes()
 
 
 @pytest.mark.parametrize("speed_m_s", [0.0, 0.1, 0.5, 2.0])

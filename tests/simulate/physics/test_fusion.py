@@ -164,22 +164,6 @@ def test_exchanged_emitters_give_no_confident_error(seed: int) -> None:
     assert longest_run(wrong) * 10 < TICK_HZ
 
 
-def test_results_do_not_depend_on_the_blocks() -> None:
-    measured, _ = noisy(silent(free_station(6.0, 6), 3.0, 5.0), 6, Inertial())
-    runs = [run(new_filter(fusion=Fusion()), measured, block=block, ticks=7) for block in (1, 7, 64, 10**6)]
-    for other in runs[:-1]:
-        for mine, theirs in zip(runs[-1], other, strict=True):
-            assert mine.tobytes() == theirs.tobytes()
-
-
-def test_a_station_more_changes_no_other() -> None:
-    several = [noisy(free_station(4.0, seed), seed, Inertial())[0] for seed in range(3)]
-    alone = run(new_filter(fusion=Fusion()), several[1])
-    together = run(new_filter(3, fusion=Fusion()), *several)
-    for mine, theirs in zip(alone, together, strict=True):
-        assert mine[:, 0].tobytes() == np.ascontiguousarray(theirs[:, 1]).tobytes()
-
-
 def test_the_spread_at_rest_is_the_published_one() -> None:
     """The default noise of ranges gives 1 to 2 mm of spread of the 3-D position (docs/is900.md 13.1)."""
     spreads = []

@@ -12,19 +12,13 @@ from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.core.package_data import data_folder
 from harness.simulate.noise import Noise
-from harness.simulate.physics.inertial import (
-    Accelerometer,
-    Gyroscope,
-    Inertial,
-    InertialUnit,
-    true_increments,
-)
+from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial, InertialUnit, true_increments
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
-from tests.simulate.physics.test_body_motion import TICK_HZ, TISSUE, source_of, ticks_s
+from tests.simulate.physics.test_worn import TICK_HZ, TISSUE, source_of, ticks_s
 
 LEVER_M = np.array([0.01, 0.015, -0.005])
 GRAVITY_M_S2 = np.array([0.0, 0.0, 9.81])

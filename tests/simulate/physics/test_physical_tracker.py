@@ -5,18 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
 from harness.simulate.physics import physical_tracker
-from harness.simulate.physics.body_motion import BodyMotionSource
 from harness.simulate.physics.fusion import Fusion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
 from harness.simulate.physics.ranging import Ranges
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.worn import Worn
+from harness.simulate.physics.worn import BodyMotionSource, Worn
 from harness.simulate.simulation import exact_calibration
-from harness.simulate.skin import skin_below
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
 from tests.simulate.physical_takes import TRACKER, observed, performed, physical
@@ -76,13 +75,12 @@ def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> N
         received = sum(int(np.sum(~np.isnan(seen[slot][0].range_m[seen[slot][1], station]))) for slot in slots)
         echoes = sum(int(np.sum(seen[slot][0].echo[seen[slot][1], station])) for slot in slots)
         assert found.echo_share[station] == pytest.approx(echoes / received)
-    assert found.motion is None
 
 
 def test_a_part_of_the_records_has_their_values() -> None:
     """Values are those of the record's time, however many others are asked for."""
     time_s = np.repeat(np.arange(0.0, 2.5, 0.025)[:, None], 2, axis=1)
-    whole, some = make_tracker().measure(time_s, with_motion=True), make_tracker().measure(time_s[7::13])
+    whole, some = make_tracker().measure(time_s), make_tracker().measure(time_s[7::13])
     np.testing.assert_array_equal(some.position_m, whole.position_m[7::13])
     np.testing.assert_array_equal(some.quality, whole.quality[7::13])
     np.testing.assert_array_equal(some.ranges_received, whole.ranges_received[7::13])

@@ -10,13 +10,12 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation
-from harness.simulate.physics.level import level_db, noise_factor
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.ranging import Ranges, Ranging
 from harness.simulate.physics.room import Box, Room
 from harness.simulate.physics.schedule import Schedule
 from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
+from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
 from tests.simulate.physics.rooms import (
     DOWN,
     TICK_HZ,
@@ -26,7 +25,6 @@ from tests.simulate.physics.rooms import (
     grid,
     moving,
     placed,
-    some_stations,
     still,
     worn,
 )
@@ -301,28 +299,6 @@ def measure_worn(
 def assert_same(a: Ranges, b: Ranges) -> None:
     for one_array, other in zip(vars(a).values(), vars(b).values(), strict=True):
         assert one_array.tobytes() == other.tobytes()
-
-
-def test_block_sizes_do_not_change_a_byte(boxer: tuple[Body, BodyMotion]) -> None:
-    names = ("left_wrist", "right_wrist", "torso", "left_foot")
-    stations, qpos = worn(*boxer, 240, *names)
-    whole = measure_worn(stations, qpos, names, boxer[0], (240,))
-    assert whole.direct.any()
-    assert whole.echo.any()
-    assert np.isnan(whole.range_m).any()
-    for blocks in ((1,) * 240, (7, 100, 133), (80, 80, 80)):
-        assert_same(measure_worn(stations, qpos, names, boxer[0], blocks), whole)
-
-
-def test_one_station_more_changes_no_other(boxer: tuple[Body, BodyMotion]) -> None:
-    names = ("left_wrist", "right_wrist", "torso", "left_foot")
-    stations, qpos = worn(*boxer, 240, *names)
-    whole = measure_worn(stations, qpos, names, boxer[0], (240,))
-    for rows in ((0,), (2,), (3, 1)):
-        some = measure_worn(some_stations(stations, *rows), qpos, tuple(names[row] for row in rows), boxer[0], (240,))
-        at = list(rows)
-        own = Ranges(whole.emitter, whole.range_m[:, at], whole.direct[:, at], whole.echo[:, at])
-        assert_same(some, own)
 
 
 def test_each_slot_sees_the_body_of_its_own_instant(boxer: tuple[Body, BodyMotion]) -> None:

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.stream.codec.decoder import (
-    LONGEST_REPLY,
     Decoder,
     DecoderEvent,
     Garbage,
@@ -79,23 +78,6 @@ def test_a_record_is_returned_with_its_last_byte() -> None:
         assert decoder.pending == 0
 
 
-def damaged_stream() -> bytes:
-    """Return records, replies between them, garbage, a damaged record and a truncated record."""
-    data = split_records(device_bytes(stamps_s(3)))
-    damaged = data[5][:20] + b"\xff" + data[5][21:-1] + b"!"
-    parts = [b"\x00noise0", data[0], STATUS, data[1], data[2], b"0", ERROR, data[3], data[4], damaged, data[6]]
-    return b"".join([*parts, data[7][:30], data[8], b"\r\n", data[9], data[10]])
-
-
-def test_every_split_of_a_stream_gives_the_same_events() -> None:
-    data = damaged_stream()
-    expected = comparable(decode_split(data))
-    assert [type(event).__name__ for event in decode_split(data)].count("Reply") == 2
-    for cut in range(1, len(data)):
-        assert comparable(decode_split(data, (cut,))) == expected, cut
-    assert comparable(decode_split(data, tuple(range(1, len(data))))) == expected
-
-
 @settings(max_examples=200, deadline=None)
 @given(st.data())
 def test_any_split_of_any_bytes_gives_the_same_events(choose: st.DataObject) -> None:
@@ -122,51 +104,14 @@ def test_replies_between_records_are_found(line: bytes) -> None:
     assert not [event for event in events if isinstance(event, Garbage)]
 
 
-@pytest.mark.parametrize("kind", ["flipped", "lost", "added"])
-def test_a_damaged_byte_costs_the_record_that_it_touches(kind: str, rng: np.random.Generator) -> None:
-    """One further record is lost rarely, in under 1 % of 3,000 trials; never two."""
-    trials, costs = 3000, []
-    for trial in range(trials):
-        data = device_bytes(stamps_s(3), seed=trial)
-        at, byte = int(rng.integers(RECORD, len(data) - RECORD)), bytes([int(rng.integers(256))])
-        touched = {at // RECORD} if kind != "added" or at % RECORD else set()
-        if kind == "flipped":
-            damaged = data[:at] + bytes([data[at] ^ (1 << int(rng.integers(8)))]) + data[at + 1 :]
-        else:
-            damaged = data[:at] + byte * (kind == "added") + data[at + (kind == "lost") :]
-        decoded = record_bytes(decode_split(damaged))
-        sound = [record for k, record in enumerate(split_records(data)) if k not in touched]
-        costs.append(sum(record not in decoded for record in sound))
-        assert len(decoded) <= len(sound) + 1, "nothing is made up"
-    assert np.mean(np.array(costs) > 0) < 0.01
-    assert max(costs) <= 1
-
-
 def test_a_burst_of_rubbish_costs_the_records_that_it_touches(rng: np.random.Generator) -> None:
     missing = 0
-    for trial in range(500):
+    for trial in range(200):
         data = split_records(device_bytes(stamps_s(5), seed=trial))
         garbage = rng.integers(0, 256, int(rng.integers(1, 200)), dtype=np.uint8).tobytes()
         decoded = record_bytes(decode_split(b"".join(data[:8]) + garbage + b"".join(data[8:])))
         missing += sum(record not in decoded for record in data)
-    assert missing <= 2
-
-
-@pytest.mark.parametrize(
-    "garbage",
-    [b"", b"\x00", b"0", b"01 ", b"2", b"21S", b"2" + b"x" * 300, b"5T\r", b"\r\n", b"0123456789ABC "],
-    ids=["random", "zeros", "heads", "half records", "twos", "half replies", "endless line", "no LF", "CR LF", "text"],
-)
-def test_rubbish_is_never_kept(garbage: bytes, rng: np.random.Generator) -> None:
-    decoder, size, garbage_bytes = make_decoder(), 1 << 18, 0
-    data = (garbage * (size // len(garbage) + 1))[:size] if garbage else rng.bytes(size)
-    for start in range(0, size, 4096):
-        for event in decoder.feed(data[start : start + 4096]):
-            garbage_bytes += event.size if isinstance(event, Garbage) else 0
-        assert decoder.pending < LONGEST_REPLY + RECORD
-    assert garbage_bytes > 0.99 * size
-    good = device_bytes(stamps_s(3))
-    assert record_bytes([*decoder.feed(good), *decoder.finish()])[-11:] == split_records(good)[-11:]
+    assert missing <= 1
 
 
 def test_stations_may_have_different_lists() -> None:

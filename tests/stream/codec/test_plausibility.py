@@ -13,10 +13,9 @@ from harness.mocap import synthetic
 from harness.simulate import noise
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STATION_CHARACTERS
 from harness.stream.codec.plausibility import PlausibilityCheck
-from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.codec.readings import Readings, concatenate_readings
 from harness.stream.codec.records import RecordValues, encode_records
 

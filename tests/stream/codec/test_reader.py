@@ -10,9 +10,16 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.codec.reader import LEAST_RATE_HZ, MOST_RATE_HZ, CaptureStream, FrameReader, WireFormat
+from harness.stream.codec.items import STANDARD_LIST
+from harness.stream.codec.reader import (
+    LEAST_RATE_HZ,
+    MOST_RATE_HZ,
+    ByteCapture,
+    CaptureStream,
+    ContinuousFrameReader,
+    FrameReader,
+    WireFormat,
+)
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame
@@ -46,6 +53,8 @@ ROUNDS = 12
         (("a", "b"), 40.0, b"21", "do not fit 2 names"),
         (("a",), 40.0, b"D", "do not fit 1 names"),
         (("a",), 40.0, b"12", "do not fit 1 names"),
+        (("a", "b"), 40.0, b"11", "ascending"),
+        (("a", "b"), 40.0, b"1 ", "ascending"),
     ],
 )
 def test_the_limits_of_a_wire_format(
@@ -99,51 +108,6 @@ def test_chunks_change_only_the_times_of_reception(chunk: int) -> None:
         assert all(np.array_equal(a, b) for a, b in zip(station_columns(first), station_columns(second), strict=True))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["flipped", "lost", "added"])
-def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
-    kind: str, rng: np.random.Generator
-) -> None:
-    """Readings that are missing, changed or no longer trusted: one, rarely two, and never three in 600 trials."""
-    costs = []
-    for trial in range(600):
-        stamp_s = stamps_s(ROUNDS)
-        data = device_bytes(stamp_s, seed=trial)
-        truth = reading_rows(decode_frames(in_chunks(data, stamp_s)))
-        at = int(rng.integers(RECORD, len(data) - RECORD))
-        bit, byte = 1 << int(rng.integers(8)), bytes([int(rng.integers(256))])
-        if kind == "flipped":
-            data = data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
-        else:
-            data = data[:at] + byte * (kind == "added") + data[at + (kind == "lost") :]
-        frames = decode_frames(in_chunks(data, stamp_s))
-        trusted = reading_rows([f for f in frames if not f.suspect.any()]) | {
-            row for f in frames for row in reading_rows([f]) if not f.suspect[int(row[-1])]
-        }
-        costs.append(len(truth - trusted))
-    assert np.mean(np.array(costs) > 1) < 0.05, np.bincount(costs)
-    assert max(costs) <= 2, np.bincount(costs)
-
-
-def test_a_wrong_station_is_never_passed_unmarked_inside_a_round(rng: np.random.Generator) -> None:
-    """A station character is changed to any other of the four, anywhere: the row that received the record is marked."""
-    for trial in range(300):
-        stamp_s = stamps_s(ROUNDS)
-        data = bytearray(device_bytes(stamp_s, seed=trial))
-        record = int(rng.integers(4, 4 * ROUNDS - 4))
-        right = data[record * RECORD + 1]
-        wrong = int(rng.choice([c for c in b"1234" if c != right]))
-        data[record * RECORD + 1] = wrong
-        frames = decode_frames(in_chunks(bytes(data), stamp_s))
-        misplaced = [
-            (f.suspect[s], record)
-            for f in frames
-            for s in np.flatnonzero(f.position_valid)
-            if abs(f.position_m[s, 0] - s) > 0.5
-        ]
-        assert all(suspect for suspect, _ in misplaced), (trial, record, chr(right), chr(wrong))
-
-
 def test_replies_and_garbage_are_counted_and_not_mistaken_for_records() -> None:
     stamp_s = stamps_s(ROUNDS)
     data = device_bytes(stamp_s)
@@ -156,15 +120,6 @@ def test_replies_and_garbage_are_counted_and_not_mistaken_for_records() -> None:
     assert (reader.records, reader.garbage_bytes, reader.clock_resets) == (4 * ROUNDS, 2, 0)
 
 
-def test_silence_closes_the_frame() -> None:
-    stamp_s = stamps_s(1)
-    reader = FrameReader(FOUR)
-    assert reader.feed(device_bytes(stamp_s)[: 2 * RECORD] + b"0", 100.0) == []
-    assert reader.expire(100.0 + 1.4 / RATE_HZ) == []
-    (frame,) = reader.expire(100.0 + 1.6 / RATE_HZ)
-    assert frame.position_valid.tolist() == [True, True, False, False]
-
-
 def test_stamps_after_an_hour_are_still_in_sequence() -> None:
     """A float32 of milliseconds has steps of 0.25 ms then (docs/is900.md 8)."""
     stamp_s = stamps_s(40, begin_s=3600.0)
@@ -172,13 +127,6 @@ def test_stamps_after_an_hour_are_still_in_sequence() -> None:
     assert len(frames) == 40
     assert not any(f.suspect.any() for f in frames)
     assert np.abs([f.measured_s for f in frames] - stamp_s.reshape(-1, 4)).max() <= 0.125e-3 + 1e-9
-
-
-def test_too_many_stations_are_refused() -> None:
-    assert WireFormat(tuple("abcdefghijkl"), 40.0).characters == STATION_CHARACTERS
-    for names in ((), tuple("abcdefghijklm")):
-        with pytest.raises(BadInput, match=r"1 to 12"):
-            WireFormat(names, 40.0)
 
 
 def test_a_capture_can_be_read_again_and_closed() -> None:
@@ -204,7 +152,7 @@ def check_sound(frames: list[TrackerFrame]) -> None:
     assert all(a < b for a, b in pairwise(received_s)), "host times strictly increase"
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_frames_are_sound_whatever_records_contain(choose: st.DataObject) -> None:
     """Well-formed records with any bytes in them: signalling NaN, infinities, erratic times, any sequence."""
@@ -235,7 +183,7 @@ def test_frames_stay_sound_with_many_damaged_bytes(share: float) -> None:
         assert sum(int(f.position_valid.sum()) for f in frames) >= 0.9 * intact
 
 
-@pytest.mark.parametrize("trials", [500, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("trials", [200, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_a_record_with_a_wrong_station_is_always_marked(trials: int) -> None:
     """Among sound records, sequence or time reveals it.
 
@@ -249,32 +197,6 @@ def test_a_record_with_a_wrong_station_is_always_marked(trials: int) -> None:
         for frame in decode_frames(in_chunks(bytes(data), stamp_s)):
             for row in np.flatnonzero(frame.position_valid & ~frame.suspect):
                 assert np.abs(frame.position_m[row] - row).max() < 0.3, (trial, record, row)
-
-
-@pytest.mark.slow
-def test_a_million_mutations() -> None:
-    """Bytes lost, added, changed, swapped and repeated in long captures: no crash, bounded memory, sound frames."""
-    rng, mutations = np.random.default_rng(1), 0
-    while mutations < 1_000_000:
-        stamp_s = stamps_s(500)
-        data = bytearray(device_bytes(stamp_s, seed=mutations))
-        for _ in range(int(rng.integers(1, 2000))):
-            at = int(rng.integers(len(data)))
-            kind = int(rng.integers(4))
-            if kind == 0:
-                del data[at]
-            elif kind == 1:
-                data.insert(at, int(rng.integers(256)))
-            elif kind == 2:
-                data[at] = int(rng.integers(256))
-            else:
-                data[at : at + 50] = data[at : at + 50] * 2
-            mutations += 1
-        reader, frames = FrameReader(FOUR), []
-        for k in range(0, len(data), 1000):
-            frames += reader.feed(bytes(data[k : k + 1000]), 100.0 + k / 1000.0 * 0.2)
-            assert reader.pending < 300
-        check_sound([*frames, *reader.finish()])
 
 
 def record_chunks(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:
@@ -333,12 +255,6 @@ def test_records_of_unknown_stations_are_garbage() -> None:
     assert all(frame.position_valid.tolist() == [False, True] for frame in frames)
 
 
-@pytest.mark.parametrize("characters", [b"12", b"1234", b"132", b"112", b"1 2", b"12D"])
-def test_impossible_station_characters_are_refused(characters: bytes) -> None:
-    with pytest.raises(BadInput, match="ascending"):
-        WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=characters)
-
-
 def tracking_reply(states: str) -> bytes:
     return TrackingStatus(f"{states:X<12}", (0,) * 12, (0,) * 12, RATE_HZ).line()
 
@@ -394,3 +310,88 @@ def test_times_of_frames_increase_after_a_stamp_that_is_a_little_wrong(row: int,
         assert (frame.suspect | ~np.isnan(frame.measured_s)).all()
     assert sum(int(np.isnan(frame.measured_s).sum()) for frame in frames) == 1
     assert sum(int(frame.suspect.sum()) for frame in frames) <= 2
+
+
+SESSION_ROUNDS, CLOCK_S = 5, 1.0
+"""The sessions begin a second before the first record, and so does the device's clock."""
+STAMPS_S = stamps_s(SESSION_ROUNDS, begin_s=CLOCK_S)
+
+
+def feed_rounds(reader: ContinuousFrameReader, begin_s: float) -> list[TrackerFrame]:
+    """Feed five rounds of a device whose clock is at 1 s, record by record, from this host time on."""
+    data, frames = device_bytes(STAMPS_S), []
+    for i, now_s in enumerate((STAMPS_S - STAMPS_S[0] + begin_s).tolist()):
+        frames += reader.feed(data[i * RECORD : (i + 1) * RECORD], now_s)
+    return frames
+
+
+def test_one_session_equals_its_frame_reader() -> None:
+    reader = ContinuousFrameReader()
+    assert reader.begin_session(FOUR, 99.0) == []
+    frames = feed_rounds(reader, 100.005) + reader.finish()
+    assert all(
+        frames_equal(a, b)
+        for a, b in zip(frames, decode_frames(in_chunks(device_bytes(STAMPS_S), STAMPS_S)), strict=True)
+    )
+    assert reader.device_zero_s == 0.0
+    expected = {"frames": 5, "sessions": 1, "records": 20, "garbage_bytes": 0, "clock_resets": 0, "out_of_range": 0}
+    assert reader.counts == expected
+
+
+def test_nothing_is_read_before_a_configuration_or_after_the_end() -> None:
+    reader = ContinuousFrameReader()
+    assert feed_rounds(reader, 1.0) == []
+    reader.begin_session(FOUR, 2.0)
+    reader.finish()
+    assert feed_rounds(reader, 3.0) == reader.finish() == reader.expire(9.0) == []
+
+
+def test_device_time_continues_by_the_hosts_clock() -> None:
+    reader = ContinuousFrameReader()
+    reader.begin_session(FOUR, 99.0)
+    before = feed_rounds(reader, 100.0)
+    reader.begin_session(FOUR, 109.0)
+    after = feed_rounds(reader, 110.0)
+    assert len(before) == len(after) == SESSION_ROUNDS
+    gap_s = after[0].measured_s[0] - before[-1].measured_s[-1]
+    assert gap_s - CLOCK_S == np.float64(110.0 - before[-1].received_s)
+    assert reader.device_zero_s == after[0].measured_s[0] - CLOCK_S
+    assert reader.counts["sessions"] == 2
+    assert reader.counts["records"] == 2 * 4 * SESSION_ROUNDS
+
+
+def test_a_configuration_returns_the_unfinished_frame() -> None:
+    reader = ContinuousFrameReader()
+    reader.begin_session(FOUR, 99.0)
+    data = device_bytes(stamps_s(1, begin_s=CLOCK_S))
+    assert reader.feed(data[: 2 * RECORD], 100.0) == []
+    (frame,) = reader.begin_session(FOUR, 100.01)
+    assert frame.position_valid.tolist() == [True, True, False, False]
+
+
+def test_host_times_increase_across_sessions() -> None:
+    """Host times increase even if all sessions are read at one moment."""
+    reader = ContinuousFrameReader()
+    frames = []
+    for _ in range(3):
+        frames += reader.begin_session(FOUR, 100.0)
+        frames += reader.feed(device_bytes(stamps_s(2, begin_s=0.1)), 100.0)
+    received_s = [frame.received_s for frame in frames]
+    assert len(received_s) == 6
+    assert (np.diff(received_s) > 0.0).all()
+    assert (np.diff([frame.measured_s[0] for frame in frames]) > 0.0).all()
+
+
+def test_only_silence_closes_an_unfinished_frame() -> None:
+    """Bytes that are read late were sent in time, so the rest of the frame is accepted."""
+    reader = ContinuousFrameReader()
+    reader.begin_session(FOUR, 99.0)
+    data = device_bytes(stamps_s(3, begin_s=CLOCK_S))
+    reader.feed(data[:RECORD], 100.0)
+    (late_frame,) = reader.feed(data[RECORD : 4 * RECORD], 100.0 + 5.0 / RATE_HZ)
+    assert late_frame.position_valid.all()
+    reader.feed(data[4 * RECORD : 5 * RECORD], 101.0)
+    assert reader.silent_from_s == 101.0 + 2.0 / RATE_HZ
+    assert reader.expire(101.0 + 1.4 / RATE_HZ) == []
+    (expired,) = reader.expire(reader.silent_from_s)
+    assert expired.position_valid.tolist() == [True, False, False, False]

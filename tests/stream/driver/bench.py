@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from itertools import takewhile
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, Is900, LineEvent
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.host import Host
+from harness.stream.driver.connection import Host
 from harness.stream.driver.transport import LineLost, Transport
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
+from harness.stream.emulator.faults import Fault
 from harness.stream.frame import TrackerFrame
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
@@ -218,3 +219,15 @@ class LineLog:
 
     def on_event(self, event: LineEvent) -> None:
         self.events.append(event)
+
+
+def bench_of(*faults: Fault, stations: int = 4, rate_hz: float = 50.0, port: str = "bench", **config: Any) -> Bench:
+    """A bench with a device of this configuration."""
+    samples = make_samples(stations, rate_hz)
+    return Bench(EmulatedDevice(samples, EmulatorConfig(faults=faults, **config), START_S), port)
+
+
+def device_of(bench: Bench) -> Any:
+    """The emulated device of a bench; Any, because tests replace its methods."""
+    assert isinstance(bench.device, EmulatedDevice)
+    return bench.device.emulator.device

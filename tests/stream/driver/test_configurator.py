@@ -12,8 +12,7 @@ from harness.errors import BadInput, UnknownName
 from harness.stream.codec.items import BAUD_RATES, SHORT_LIST, STANDARD_LIST, record_size
 from harness.stream.codec.replies import StatusRecord
 from harness.stream.driver import DriverConfig, DriverTiming, Is900
-from harness.stream.driver.rate_measurement import estimate_rate_hz
-from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.driver.configurator import estimate_rate_hz
 from tests.stream.driver.bench import (
     NAMES,
     Bench,
@@ -21,22 +20,15 @@ from tests.stream.driver.bench import (
     EmulatedDevice,
     LineLog,
     ScriptedDevice,
+    bench_of,
+    device_of,
     frames_for,
     make_samples,
 )
 
 
-def bench_of(stations: int = 4, rate_hz: float = 50.0, port: str = "bench", **device_config: Any) -> Bench:
-    return Bench(EmulatedDevice(make_samples(stations, rate_hz), EmulatorConfig(**device_config), 1000.0), port)
-
-
-def device_of(bench: Bench) -> Any:
-    assert isinstance(bench.device, EmulatedDevice)
-    return bench.device.emulator.device
-
-
 def test_the_commands_are_sent_in_the_right_sequence() -> None:
-    bench = bench_of(2)
+    bench = bench_of(stations=2)
     stream = bench.driver()
     assert bytes(bench.sent) == (
         b"\x11\rcSl*\r\n"
@@ -57,7 +49,7 @@ def test_the_commands_are_sent_in_the_right_sequence() -> None:
 
 
 def test_device_properties_are_reported() -> None:
-    bench = bench_of(3, rate_hz=60.0, status_bytes=54, firmware="4.1402", identification="IS900VWT")
+    bench = bench_of(stations=3, rate_hz=60.0, status_bytes=54, firmware="4.1402", identification="IS900VWT")
     stream = bench.driver(DriverConfig(stations=("head", "left", "right")))
     assert (stream.firmware, stream.identification, stream.baud) == ("4.1402", "IS900VWT", 115200)
     assert stream.stations == ("head", "left", "right")
@@ -120,7 +112,7 @@ def test_positions_beyond_the_range_of_the_list_are_not_valid_and_reported_once(
 
 def test_emitters_beyond_the_range_of_the_list_are_reported_at_set_up() -> None:
     for items, reported in ((SHORT_LIST, True), (STANDARD_LIST, False)):
-        bench = bench_of(2)
+        bench = bench_of(stations=2)
         device_of(bench).receive(b"MCF10,3.5,0,0,0,0,1,5010\rMCe\r", bench.now_s)
         bench.driver(DriverConfig(items=items)).close()
         texts = [event.text for event in bench.events if event.kind == "out of range"]
@@ -167,11 +159,11 @@ def test_a_device_without_command_11_is_stopped() -> None:
 
 
 def test_stations_come_from_mp_or_from_the_user_without_l() -> None:
-    bench = without_commands(bench_of(3), b"l*\r\n")
+    bench = without_commands(bench_of(stations=3), b"l*\r\n")
     with bench.driver() as stream:
         assert stream.stations == ("1", "2", "3")
         assert len(frames_for(stream, bench, 0.5)) > 20
-    bench = without_commands(bench_of(2), b"l*\r\n", b"MP\r\n")
+    bench = without_commands(bench_of(stations=2), b"l*\r\n", b"MP\r\n")
     with pytest.raises(BadInput, match=r"answers neither l\* nor MP.*Name the stations"):
         bench.driver()
     with bench.driver(DriverConfig(stations=("head", "hand"))) as stream:
@@ -195,7 +187,7 @@ def test_only_the_named_port_is_opened() -> None:
 
 @pytest.mark.parametrize("baud", BAUD_RATES)
 def test_the_baud_rate_is_detected(baud: int) -> None:
-    bench = bench_of(1, rate_hz=10.0, baud=baud)
+    bench = bench_of(stations=1, rate_hz=10.0, baud=baud)
 
     def received_at_baud(data: bytes) -> bytes:
         return data if bench.opened[-1][1] == baud else bytes(len(data))
@@ -214,7 +206,7 @@ def test_the_baud_rate_is_detected(baud: int) -> None:
 
 
 def test_tcp_has_no_baud_rate_and_no_capacity_limit() -> None:
-    bench = bench_of(6, rate_hz=180.0, port="tcp://bench:5005", paced=False)
+    bench = bench_of(stations=6, rate_hz=180.0, port="tcp://bench:5005", paced=False)
     with bench.driver() as stream:
         assert stream.baud is None
         assert len(frames_for(stream, bench, 0.5)) > 80
@@ -222,7 +214,7 @@ def test_tcp_has_no_baud_rate_and_no_capacity_limit() -> None:
 
 
 def test_the_first_active_stations_are_read_and_others_switched_off_meanwhile() -> None:
-    bench = bench_of(6)
+    bench = bench_of(stations=6)
     device = device_of(bench)
     for switched_off in (b"l2,0\r\n", b"l5,0\r\n"):
         device.receive(switched_off, bench.now_s)
@@ -237,7 +229,7 @@ def test_the_first_active_stations_are_read_and_others_switched_off_meanwhile() 
 
 
 def test_boresight_and_alignment_are_set_once() -> None:
-    bench = bench_of(2)
+    bench = bench_of(stations=2)
     frame = ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
     with bench.driver(DriverConfig(stations=NAMES[:2], alignment={"torso": frame}, boresight=True)) as stream:
         frames = frames_for(stream, bench, 0.2)
@@ -252,7 +244,7 @@ def test_boresight_and_alignment_are_set_once() -> None:
 
 
 def test_a_refused_alignment_is_reported_with_the_devices_error() -> None:
-    bench = bench_of(1)
+    bench = bench_of(stations=1)
     with pytest.raises(BadInput, match=r"refuses the alignment or boresight\. The device reported: A1,.*: error -3"):
         bench.driver(DriverConfig(alignment=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))))
     assert bench.open_lines == 0
@@ -262,7 +254,7 @@ def test_the_rate_is_reported_given_or_measured() -> None:
     assert bench_of(rate_hz=60.0).driver().wire.rate_hz == 60.0
     assert bench_of(rate_hz=59.94).driver(DriverConfig(rate_hz=59.94)).wire.rate_hz == 59.94
     for items in (STANDARD_LIST, (40, 2, 11, 1)):
-        bench = bench_of(2, rate_hz=37.5)
+        bench = bench_of(stations=2, rate_hz=37.5)
         bench.corrupt = lambda data: data.replace(b"31P", b"31@")  # a reply that no source describes
         rate_hz = bench.driver(DriverConfig(items=items)).wire.rate_hz
         assert abs(rate_hz - 37.5) < (0.01 if 21 in items else 1.0)
@@ -272,7 +264,7 @@ def test_the_measured_rate_overrides_the_reported_one() -> None:
     """`MP` reports how often the device updates. No source says that it reports as often."""
 
     def misreporting() -> Bench:
-        bench = bench_of(2, rate_hz=40.0)
+        bench = bench_of(stations=2, rate_hz=40.0)
         bench.corrupt = lambda data: data.replace(b"   40  ", b"  120  ")
         return bench
 
@@ -284,14 +276,14 @@ def test_the_measured_rate_overrides_the_reported_one() -> None:
 
 def test_a_rate_that_only_mp_reports_does_not_exceed_the_capacity() -> None:
     """Four stations of 38 bytes at 120 Hz would not fit. They arrive at 50 Hz, which does."""
-    bench = bench_of(4, rate_hz=50.0)
+    bench = bench_of(stations=4, rate_hz=50.0)
     bench.corrupt = lambda data: data.replace(b"   50  ", b"  120  ")
     assert bench.driver().wire.rate_hz == pytest.approx(50.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("stations", [4, 6])
 def test_an_overloaded_line_is_refused_without_mp(stations: int) -> None:
-    bench = bench_of(stations, rate_hz=120.0)
+    bench = bench_of(stations=stations, rate_hz=120.0)
     bench.corrupt = lambda data: data.replace(b"31P", b"31@")
     with pytest.raises(BadInput, match="but the line carries 115200"):
         bench.driver()
@@ -409,7 +401,7 @@ def test_a_contradictory_configuration_is_refused_at_once(
 def test_a_damaged_reply_or_command_is_repeated() -> None:
     """Configuration succeeds with one damaged reply or command, since both are repeated."""
     for at in range(20, 200, 7):
-        bench = bench_of(2)
+        bench = bench_of(stations=2)
         count = 0
 
         def corrupt(data: bytes, at: int = at) -> bytes:
@@ -423,7 +415,7 @@ def test_a_damaged_reply_or_command_is_repeated() -> None:
 
 
 def test_an_observer_sees_every_byte_and_the_format_before_data() -> None:
-    bench, log = bench_of(2), LineLog()
+    bench, log = bench_of(stations=2), LineLog()
     with Is900("bench", observer=log, host=bench.host) as stream:
         frames = frames_for(stream, bench, 0.5)
     assert bytes(log.sent_data) == bytes(bench.sent)

@@ -3,8 +3,7 @@
 import pytest
 
 from harness.stream.driver.config import DriverTiming
-from harness.stream.driver.connection import DeviceConnection
-from harness.stream.driver.host import Host
+from harness.stream.driver.connection import DeviceConnection, Host
 from harness.stream.line_events import NullLineObserver
 
 START_S, QUIET_S = 500.0, 0.1

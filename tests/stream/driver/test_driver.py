@@ -17,7 +17,7 @@ from harness.errors import BadInput
 from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
 from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.server import RunningEmulator
+from harness.stream.emulator.server import EmulatorServer
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts
@@ -26,12 +26,12 @@ from tests.stream.driver.bench import make_samples
 TIMEOUT_S = 120.0
 """Time that a loaded machine gets before a test fails [s]."""
 PORT_KINDS = ["pty", "tcp"]
-Serve = Callable[..., AbstractContextManager[RunningEmulator]]
+Serve = Callable[..., AbstractContextManager[EmulatorServer]]
 
 
 @pytest.fixture(params=PORT_KINDS)
 def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Serve:
-    def serve_at(config: EmulatorConfig | None = None) -> AbstractContextManager[RunningEmulator]:
+    def serve_at(config: EmulatorConfig | None = None) -> AbstractContextManager[EmulatorServer]:
         if request.param == "pty":
             return serve_emulator(make_samples(4), config, pty=tmp_path / "is900")
         return serve_emulator(make_samples(4), config, tcp="127.0.0.1:0")

@@ -14,7 +14,7 @@ from harness.errors import BadInput
 from harness.stream.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 from harness.stream.codec.replies import parse_reply
 from harness.stream.driver import DriverConfig
-from harness.stream.driver.device_settings import ALIGNMENT, STATION_SETTINGS
+from harness.stream.driver.session_settings import STATION_SETTINGS
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
 from harness.stream.frame import TrackerFrame
@@ -255,14 +255,14 @@ def test_what_cannot_be_read_is_set_and_told() -> None:
     ],
 )
 def test_alignments_are_compared_by_their_effect(values: tuple[float, ...], is_default: bool) -> None:
-    assert ALIGNMENT.is_default(values) == is_default
+    assert STATION_SETTINGS[0].is_default(values) == is_default
 
 
 def test_every_setting_is_read_and_set_as_the_device_has_it() -> None:
     device = EmulatedDevice(make_samples(1), None, START_S).emulator.device
     assert len({setting.name for setting in STATION_SETTINGS}) == 6
     for setting in STATION_SETTINGS:
-        device.receive(setting.query("1"), START_S)
+        device.receive(setting.query_command("1"), START_S)
         (message,) = device.messages(START_S)
         values = setting.values_of(parse_reply(message.data), "1")
         assert values is not None

@@ -7,9 +7,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.codec.filter_samples import MAX_RANGES, FilterSamples
 from harness.stream.codec.replies import Emitter
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.codec.samples import MAX_RANGES, DeviceSamples, FilterSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 

@@ -131,6 +131,15 @@ def test_19_acts_in_the_middle_of_a_line() -> None:
     assert session.send(b"S")[:3] == b"21S"
 
 
+def test_vrpn_resets_a_device_that_does_not_answer() -> None:
+    """CR, 19 and `c` come 2 s apart, then a wait of 20 s. The last attempts have letters without CR (11.1)."""
+    for characters in (b"\r\x19c", b"\rt\x19c", b"\rYt\x19c"):
+        session = DeviceSession(EmulatorConfig(restart_s=10.0))
+        for byte in characters:
+            assert session.send(bytes([byte]), after_s=2.0) == b""
+        assert len(session.send(b"S", after_s=20.0)) == 55
+
+
 def test_the_same_bytes_at_the_same_times_give_the_same_answer() -> None:
     def run(step_s: float) -> bytes:
         device = Device(make_samples(), EmulatorConfig(), 0.0)

@@ -17,11 +17,11 @@ import pytest
 
 from harness.errors import BadInput
 from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.device_state import SentMessage
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.pty_port import PtyPort
-from harness.stream.emulator.server import EmulatorServer, RunningEmulator, open_port, serve_emulator
+from harness.stream.emulator.server import EmulatorServer, open_port, serve_emulator
 from harness.stream.emulator.tcp_port import MAX_CLIENTS, TcpPort
 from tests.stream.emulator.played import make_samples
 
@@ -35,7 +35,7 @@ def link(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def pty_emulator(link: Path) -> Iterator[RunningEmulator]:
+def pty_emulator(link: Path) -> Iterator[EmulatorServer]:
     with serve_emulator(make_samples(), pty=link) as emulator:
         yield emulator
 
@@ -65,7 +65,7 @@ def open_client(link: Path) -> int:
     return os.open(link, os.O_RDWR | os.O_NOCTTY)
 
 
-def test_a_client_may_close_and_reopen_the_pty(pty_emulator: RunningEmulator, link: Path) -> None:
+def test_a_client_may_close_and_reopen_the_pty(pty_emulator: EmulatorServer, link: Path) -> None:
     for _ in range(3):
         client = open_client(link)
         os.write(client, b"S")
@@ -73,7 +73,7 @@ def test_a_client_may_close_and_reopen_the_pty(pty_emulator: RunningEmulator, li
         os.close(client)
 
 
-def test_a_pty_is_raw_and_echoes_nothing(pty_emulator: RunningEmulator, link: Path) -> None:
+def test_a_pty_is_raw_and_echoes_nothing(pty_emulator: EmulatorServer, link: Path) -> None:
     client = open_client(link)
     _, output, _, local = termios.tcgetattr(client)[:4]
     assert not local & (termios.ECHO | termios.ICANON | termios.ISIG)
@@ -84,15 +84,15 @@ def test_a_pty_is_raw_and_echoes_nothing(pty_emulator: RunningEmulator, link: Pa
 
 
 @pytest.mark.long
-def test_a_client_that_does_not_read_loses_whole_records(pty_emulator: RunningEmulator, link: Path) -> None:
+def test_a_client_that_does_not_read_loses_whole_records(pty_emulator: EmulatorServer, link: Path) -> None:
     client = open_client(link)
     os.write(client, SET_UP)
-    wait_until(lambda: pty_emulator.server.counts.unread > 50)
+    wait_until(lambda: pty_emulator.counts.unread > 50)
     os.write(client, b"c")
     wait_until(lambda: not pty_emulator.emulator.device.streaming)
     # The record on the line when `c` arrived is still sent, and fits if the client reads by then: read until silence.
     data = read_bytes(client, 2 * 4096, timeout_s=3.0)
-    assert len(data) == pty_emulator.server.counts.bytes <= 4096 + 38
+    assert len(data) == pty_emulator.counts.bytes <= 4096 + 38
     assert len(data) % 38 == 0
     assert {data[at : at + 1] for at in range(0, len(data), 38)} == {b"0"}
     os.write(client, b"S")
@@ -118,7 +118,7 @@ def test_an_unplugged_pty_disappears_and_returns(link: Path) -> None:
     assert not os.path.lexists(link)
 
 
-def test_no_existing_file_is_overwritten(link: Path, pty_emulator: RunningEmulator, tmp_path: Path) -> None:
+def test_no_existing_file_is_overwritten(link: Path, pty_emulator: EmulatorServer, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="leads to /dev/pts/"):
         PtyPort(link)
     (tmp_path / "file").write_text("mine")
@@ -152,18 +152,7 @@ def test_a_wrong_baud_rate_gives_noise(link: Path, rate: int, answered: bool) ->
         os.close(client)
 
 
-def test_tcp_serves_one_client_after_another(tmp_path: Path) -> None:
-    with serve_emulator(make_samples(), tcp="127.0.0.1:0") as emulator:
-        address = ("127.0.0.1", int(emulator.name.rpartition(":")[2]))
-        for _ in range(3):
-            with socket.create_connection(address, TIMEOUT_S) as client:
-                client.sendall(b"S")
-                assert read_bytes(client.fileno(), 55)[:6] == b"21S3F0"
-        with pytest.raises(BadInput, match="Choose another port"):
-            open_port(None, f"127.0.0.1:{address[1]}")
-
-
-def connect(emulator: RunningEmulator) -> socket.socket:
+def connect(emulator: EmulatorServer) -> socket.socket:
     return socket.create_connection(("127.0.0.1", int(emulator.name.rpartition(":")[2])), TIMEOUT_S)
 
 
@@ -177,6 +166,8 @@ def test_idle_tcp_clients_block_nobody() -> None:
                 assert read_bytes(client.fileno(), 55)[:6] == b"21S3F0"
         partial.sendall(b",21,1\rO1\r")
         assert read_bytes(partial.fileno(), 13) == b"21O 2 421 1\r\n"
+        with pytest.raises(BadInput, match="Choose another port"):
+            open_port(None, emulator.name.removeprefix("tcp://"))
 
 
 def test_a_client_that_has_the_device_keeps_it_until_it_is_idle() -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS
+from harness.stream.emulator.setting_commands import SET_ONLY_COMMANDS, SETTER_COMMANDS
 from tests.stream.emulator.played import DeviceSession
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"
@@ -17,6 +17,7 @@ REPLIES = [
     (b"l*\r\n", STATES),
     (b"l1\r", b"21l1111\r\n"),
     (b"l5\r", b"25l0111\r\n"),
+    (b"Mpa\rMsA\rla\r", b"3Ap 0\r\n3As000\r\n2Al0111\r\n"),
     (b"l2,0\rl1\rl*\r", b"21l1011\r\n21l1011" + b"0" * 28 + b"\r\n"),
     (b"l6,1\rl6\r", b"26l0111\r\n"),
     (b"A1\r\n", b"21A" + b"%7.2f" * 9 % (0, 0, 0, 200, 0, 0, 0, 200, 0) + b"\r\n"),

@@ -29,12 +29,12 @@ STATIC = Stretch("static", 4.0, "let the stations lie still", True)
 SLOW = Stretch("slow", 4.0, "sweep the stations", False)
 COVERED = Stretch("covered", 2.0, "cover them", True)
 ALL = (STATIC, SLOW, COVERED)
-RATE_HZ, REST_S, LOOP_S = 50.0, 20.0, 40.0
+RATE_HZ, REST_S, LOOP_S = 25.0, 12.0, 24.0
 PLACE_M = np.array([0.5, -0.2, 0.1])
 
 
 def resting_and_moving() -> DeviceSamples:
-    """Two stations that rest for 20 s, then sway for 20 s."""
+    """Two stations that rest for 12 s, then sway for 12 s."""
     taken_s = np.arange(round(LOOP_S * RATE_HZ))[:, None] / RATE_HZ + np.arange(2) / (8.0 * RATE_HZ)
     sway = np.where(taken_s < REST_S, 0.0, 0.3 * np.sin(2.0 * np.pi * (taken_s - REST_S) / 4.0))
     return replace(
@@ -240,7 +240,7 @@ capture_stretches(sys.argv[1], DriverConfig(), Path(sys.argv[2]), stretches, {},
 def test_a_killed_capture_goes_on_where_it_was(tmp_path: Path) -> None:
     """As by `kill -9`: what was recorded stays as it is, and the same command finishes the capture."""
     path = tmp_path / "a.rec"
-    samples = replace(resting_and_moving(), position_m=np.broadcast_to(PLACE_M, (2000, 2, 3)))
+    samples = replace(resting_and_moving(), position_m=np.broadcast_to(PLACE_M, (600, 2, 3)))
     with serve_emulator(samples, tcp="127.0.0.1:0") as device:
         before, finished = b"", set[str]()
         for kilobytes in (1, 4, 9):

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 import serial
 
-from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.emulator import serve_emulator
-from harness.stream.recording.client_pty import ABSENT_S, MAX_WAITING_BYTES, ClientPty
+from harness.stream.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
@@ -79,13 +78,8 @@ def test_a_plain_client_gets_only_answers_to_its_own_questions(tmp_path: Path, p
     assert len(read_recording(tmp_path / "a.rec").formats) == 1
 
 
-def test_a_foreign_file_is_not_overwritten(tmp_path: Path) -> None:
+def test_the_pty_has_a_baud_rate_and_takes_the_place_of_a_killed_process(tmp_path: Path) -> None:
     link = tmp_path / "link"
-    link.write_text("mine")
-    with pytest.raises(BadInput, match="nothing is overwritten"):
-        ClientPty(link, 115200)
-    assert link.read_text() == "mine"
-    link.unlink()
     link.symlink_to("/dev/pts/999999")  # left by a process that was killed
     pty = ClientPty(link, 9600)
     assert os.path.exists(link)

@@ -15,7 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, SystemFault
-from harness.stream.codec.blocks import (
+from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.codec.records import RecordFormat
+from harness.stream.line_events import LineEvent
+from harness.stream.recording.blocks import (
     BLOCK_MARKER,
     CONFIGURED,
     FILE_HEADER,
@@ -30,10 +33,6 @@ from harness.stream.codec.blocks import (
     encode_block,
     read_blocks,
 )
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.records import RecordFormat
-from harness.stream.line_events import LineEvent
 from harness.stream.recording.recording import Recording, RecordingWriter, read_marks, read_recording, record_capture
 from tests.stream.wire import FOUR
 

@@ -14,11 +14,18 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import ANSWERED, CONFIGURED, FILE_HEADER, RECEIVED, SENT, RecordingBlock, encode_block
-from harness.stream.codec.capture import ByteCapture
-from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.reader import ByteCapture, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
+from harness.stream.recording.blocks import (
+    ANSWERED,
+    CONFIGURED,
+    FILE_HEADER,
+    RECEIVED,
+    SENT,
+    RecordingBlock,
+    encode_block,
+)
 from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
 from harness.stream.recording.replay import RecordingStream, ReplaySpeed, parse_speed, wait_for_enter
 from harness.testing.stream_checks import check_stream

@@ -17,11 +17,9 @@ from harness.experiment.scenario import load_scenario, shipped_scenarios, varian
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.cell import Cell
 from harness.results.findings import PaperExperiment
-from harness.study.papers.database_size import database_size, one_database
-from harness.study.papers.frame_by_frame import frame_by_frame
+from harness.study.papers.database_size import GRAPH, database_size, one_database, other_approaches
 from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
-from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs
-from harness.study.papers.other_approaches import GRAPH, other_approaches
+from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs, frame_by_frame
 from harness.study.papers.paper import PAPERS, Motion, correct_experiments, load_paper
 from harness.study.papers.paper_study import PaperStudy
 

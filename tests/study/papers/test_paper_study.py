@@ -1,4 +1,4 @@
-"""A study measures, resumes after a kill, refuses another's folder, survives failures, and is read back as it was."""
+"""A study measures, resumes, refuses another's folder, survives failures, and is read back as it was."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.experiment.status import read_status
 from harness.results.digests import read_result_json, write_result_json
 from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
-from harness.results.lock import folder_lock
+from harness.results.folder_kind import folder_lock
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.tables import errors_by_unit
@@ -88,8 +88,8 @@ def test_a_finished_study_runs_and_measures_nothing_again(finished: Path) -> Non
     assert (finished / "measured" / "count.json").stat().st_mtime_ns == measured
 
 
-def stopped(out: Path, ending: signal.Signals) -> tuple[int, str]:
-    """The verb's exit code and all it printed, struck when the first cell was finished."""
+def stopped(out: Path) -> tuple[int, str]:
+    """The verb's exit code and all it printed, with Ctrl-C when the first cell was finished."""
     command = [sys.executable, "-m", "tests.study.papers.tiny", "--out", str(out)]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=heeding_interrupts
@@ -98,7 +98,7 @@ def stopped(out: Path, ending: signal.Signals) -> tuple[int, str]:
         while not made(out) and time.monotonic() < until_s:
             assert program.poll() is None, "it ended too soon"
             time.sleep(0.005)
-        program.send_signal(ending)
+        program.send_signal(signal.SIGINT)
         said = program.communicate(timeout=120)[0]
     assert made(out)
     assert not (out / "findings.json").exists()
@@ -106,21 +106,17 @@ def stopped(out: Path, ending: signal.Signals) -> tuple[int, str]:
 
 
 @pytest.mark.long
-def test_a_killed_study_keeps_its_cells_and_goes_on(tmp_path: Path) -> None:
+def test_ctrl_c_keeps_cells_and_says_how_to_go_on(tmp_path: Path) -> None:
     out = tmp_path / "tiny"
-    assert stopped(out, signal.SIGKILL)[0] == -signal.SIGKILL
-    kept = made(out)
-    assert reproduce(TINY, out)[1] is Outcome.PASS
-    assert kept.items() <= made(out).items()
-    assert len(made(out)) == count_cells(TINY.plan("builtin", 1)) == 6
-
-
-def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
-    code, said = stopped(tmp_path / "tiny", signal.SIGINT)
+    code, said = stopped(out)
     assert code == 130
     assert "the same command resumes" in said
     assert said.splitlines()[-1] == "interrupted"
     assert "Traceback" not in said
+    kept = made(out)
+    assert reproduce(TINY, out)[1] is Outcome.PASS
+    assert kept.items() <= made(out).items()
+    assert len(made(out)) == count_cells(TINY.plan("builtin", 1)) == 6
 
 
 def test_a_paper_is_running_while_its_experiments_are_evaluated(finished: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from harness.core.package_data import data_folder
 from harness.core.skeleton import Skeleton
 from harness.results.findings import PaperExperiment
 from harness.stream.inputs import make_inputs
-from harness.study.papers.eigenmodes import evaluate_bone_modes
+from harness.study.papers.bone_lengths import evaluate_bone_modes
 from harness.study.papers.kim2012 import PAPER as KIM
 from harness.study.papers.liu2011 import PAPER as LIU
 from harness.study.papers.liu2011 import PUBLISHED_DEG

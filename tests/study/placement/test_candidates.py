@@ -11,7 +11,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGrid,
@@ -51,7 +51,7 @@ def test_a_mirrored_place_is_the_mirror_image_of_its_place(body: Skeleton, rng: 
         3 * BONES, rng.uniform(0.0, 1.0, 72), rng.uniform(-180.0, 180.0, 72), strict=True
     ):
         side = body_side(bone, along)
-        here = StationPlacement(f"{side}_one" if side else "one", bone, along, around_deg, 0.02, side)
+        here = CandidatePlace(f"{side}_one" if side else "one", bone, along, around_deg, 0.02, side)
         there = mirror_place(here)
         assert mirror_place(there) == here
         if placement_fault(here, body):

@@ -19,10 +19,10 @@ from harness.results.placement_findings import PlacementFindings, StatisticalPow
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
 from harness.study.placement import placement_study
-from harness.study.placement.cell_cache import link_rate_hz
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import run_placement
 from harness.study.placement.plan import plan_placement
+from harness.study.placement.set_results import link_rate_hz
 from tests.results.finish import folder_bytes
 
 SCENARIO = """
@@ -127,12 +127,12 @@ def test_what_is_necessary_is_worth_much_and_what_is_useless_nothing(
     done: tuple[Path, Path, PlacementFindings],
 ) -> None:
     _, _, findings = done
-    for worth in findings.worth:
-        if worth.candidate == "pelvis":
-            assert worth.low is not None
-            assert worth.low > 0.5
+    for contribution in findings.contributions:
+        if contribution.candidate == "pelvis":
+            assert contribution.low is not None
+            assert contribution.low > 0.5
         else:
-            assert worth.difference == pytest.approx(0.0, abs=1e-12)
+            assert contribution.difference == pytest.approx(0.0, abs=1e-12)
     needed = findings.of(("pelvis",))
     assert needed is not None
     assert needed.mean == pytest.approx(0.0, abs=1e-3)  # float32 on the wire
@@ -193,7 +193,7 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
     assert own.best == noisy.best == {"1": ("pelvis",)}
     assert (own.kind, noisy.kind) == ("own", "noise")
     assert findings.compared == (("right_hand",), ("left_hand",), ("pelvis",))
-    assert own.stays == 1.0
+    assert own.selection_stability == 1.0
     assert len(findings.agreements) == 1
 
 

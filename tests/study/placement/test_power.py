@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.compare.significance import SIGNIFICANCE, count_needed, sign_flip_p
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 from harness.study.placement.power import (
     POWER,
     choose_pilot,
@@ -15,7 +15,7 @@ from harness.study.placement.power import (
     units_needed,
 )
 
-SETS = [(StationPlacement(f"place_{n}", "head", 0.5, 0.0),) for n in range(10)]
+SETS = [(CandidatePlace(f"place_{n}", "head", 0.5, 0.0),) for n in range(10)]
 
 
 @pytest.mark.parametrize(("comparisons", "least"), [(1, 6), (9, 9), (164, 13)])

@@ -6,7 +6,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.placement_findings import StationPlacement
+from harness.results.placement_findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGroup,
@@ -65,13 +65,13 @@ def names(units: Sequence[CandidateGroup]) -> list[str]:
 
 def test_ablation_finds_what_is_necessary_and_what_is_useless() -> None:
     truth = Truth()
-    found = ablate(AblateOptions(), UNITS, truth)
+    rankings, contributions = ablate(AblateOptions(), UNITS, truth)
     assert len(truth.asked) == 1 + len(UNITS)
-    (ranking,) = found.rankings
+    (ranking,) = rankings
     assert ranking.base == tuple(names(UNITS))
     assert "head" not in ranking.rows[0].stations
     assert "pelvis" not in ranking.rows[-1].stations
-    worth = {each.candidate: each for each in found.worth}
+    worth = {each.candidate: each for each in contributions}
     assert worth["head"].difference == 0.0
     low = worth["pelvis"].low
     assert low is not None
@@ -80,16 +80,16 @@ def test_ablation_finds_what_is_necessary_and_what_is_useless() -> None:
 
 
 def test_adding_finds_what_helps_a_base() -> None:
-    found = add(AddOptions(base=("head",)), UNITS, Truth())
-    (ranking,) = found.rankings
+    rankings, contributions = add(AddOptions(base=("head",)), UNITS, Truth())
+    (ranking,) = rankings
     assert ranking.rows[0].stations == ("pelvis", "head")
     assert not ranking.rows[1].tied
     assert len(ranking.rows) == len(UNITS) - 1
-    best = max(found.worth, key=lambda each: each.difference or 0.0)
+    best = max(contributions, key=lambda each: each.difference or 0.0)
     assert (best.candidate, best.base) == ("pelvis", ("head",))
     alone = add(AddOptions(), UNITS, Truth())
-    assert alone.worth == ()  # beside nothing there is nothing to compare with
-    assert alone.rankings[0].rows[0].stations == ("pelvis",)
+    assert alone[1] == ()  # beside nothing there is nothing to compare with
+    assert alone[0][0].rows[0].stations == ("pelvis",)
 
 
 def test_greedy_takes_the_necessary_one_first_and_the_useless_one_last() -> None:
@@ -121,16 +121,16 @@ def test_what_nothing_tells_apart_is_told_as_a_tie() -> None:
 
 def test_exhaustive_tries_every_set_once_and_ranks_each_size() -> None:
     truth = Truth()
-    found = search_exhaustive(ExhaustiveOptions(most=3), UNITS, truth)
+    rankings, contributions = search_exhaustive(ExhaustiveOptions(most=3), UNITS, truth)
     assert len(truth.asked) == len(set(truth.asked))
     assert {len(one) for one in truth.asked} == {1, 2, 3}
-    assert [len(ranking.rows) for ranking in found.rankings] == [4, 7, 8]  # the pair counts as two
-    assert [ranking.rows[0].stations for ranking in found.rankings] == [
+    assert [len(ranking.rows) for ranking in rankings] == [4, 7, 8]  # the pair counts as two
+    assert [ranking.rows[0].stations for ranking in rankings] == [
         ("pelvis",),
         ("right_hand", "pelvis"),
         ("right_ankle", "left_ankle", "pelvis"),
     ]
-    worth = {each.candidate: each.difference for each in found.worth}
+    worth = {each.candidate: each.difference for each in contributions}
     for name, saves in (("pelvis", 5.0), ("right_hand", 0.5), ("left_ankle", 2.0), ("head", 0.0)):
         assert worth[name] == pytest.approx(saves, abs=0.1)
 
@@ -219,7 +219,7 @@ def test_refining_on_too_few_clips_is_refused_with_how_many_it_takes() -> None:
 def test_stations_that_are_no_mirror_images_move_alone() -> None:
     right, left, pelvis = START
     assert find_move_groups(START) == ((0, 1), (2,))
-    assert find_move_groups((right, StationPlacement("left_ankle", "ltibia", 0.8, -90.0, side="left"), pelvis)) == (
+    assert find_move_groups((right, CandidatePlace("left_ankle", "ltibia", 0.8, -90.0, side="left"), pelvis)) == (
         (0,),
         (1,),
         (2,),
@@ -235,9 +235,10 @@ def test_the_best_that_was_tried_is_where_refining_may_begin() -> None:
 
 
 def test_where_all_sets_have_one_size_a_contribution_is_without_it_against_with_it() -> None:
-    found = search_exhaustive(ExhaustiveOptions(2, 2, ("hand", "pelvis", "head")), UNITS, Truth(noise=0.0))
-    worth = {each.candidate: each.difference for each in found.worth}
+    options = ExhaustiveOptions(2, 2, ("hand", "pelvis", "head"))
+    _, contributions = search_exhaustive(options, UNITS, Truth(noise=0.0))
+    worth = {each.candidate: each.difference for each in contributions}
     assert worth["pelvis"] == pytest.approx((9.25 + 9.5 + 9.75) / 3.0 - (4.5 + 4.75 + 5.0) / 3.0)
     assert worth["head"] == pytest.approx((4.5 + 4.75 + 9.25) / 3.0 - (5.0 + 9.5 + 9.75) / 3.0)
-    assert {each.mode for each in found.worth} == {"exhaustive"}
-    assert all(each.clips == len(CLIPS) for each in found.worth)
+    assert {each.mode for each in contributions} == {"exhaustive"}
+    assert all(each.clips == len(CLIPS) for each in contributions)

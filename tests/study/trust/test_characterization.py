@@ -11,8 +11,8 @@ from harness.study.trust.characterization import (
     Characterization,
     characterize_capture,
     measured_numbers,
+    preset_components,
 )
-from harness.study.trust.expected_values import preset_components
 
 pytestmark = pytest.mark.long
 

@@ -19,13 +19,12 @@ from harness.experiment.playback import prepare_playback
 from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.digests import read_result_json, write_result_json
-from harness.results.folder_kind import FINDINGS
-from harness.results.lock import folder_lock
+from harness.results.folder_kind import FINDINGS, folder_lock
 from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
-from harness.stream.codec.blocks import NOTE, RecordingBlock, encode_block
+from harness.stream.recording.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
-from harness.study.trust.capture_cells import Arm, CaptureTask, read_cell_errors, run_capture
-from harness.study.trust.expected_values import preset_components
+from harness.study.trust.arm_results import Arm, TrustTask, read_cell_errors, run_capture
+from harness.study.trust.characterization import preset_components
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import (
     OtherPlan,
@@ -72,7 +71,7 @@ def test_errors_of_the_simulation_are_not_those_of_the_device_though_the_seed_is
     arm = Arm("mean_pose", "two", ("head", "torso"))
     (tmp_path / "cells").mkdir()
     scenario = small_study.plan.with_name("small.toml")
-    task = CaptureTask(small_study.captures[0], "", scenario, (arm,), {}, ("mpjpe_mm",), (1,), None, tmp_path, None)
+    task = TrustTask(small_study.captures[0], "", scenario, (arm,), {}, ("mpjpe_mm",), (1,), None, tmp_path, None)
     device, simulated = (side["position error"][0].reshape(-1) for side in run_capture(task).readings)
     both = np.isfinite(device[: len(simulated)]) & np.isfinite(simulated[: len(device)])
     assert both.sum() > 1000
@@ -93,7 +92,7 @@ def test_a_capture_of_a_performer_is_registered_with_the_clip(small_study: Small
         arm = Arm("ik:previous", "all", simulation.stations)
         metrics = ("joint_angle_mean_deg",)
         scenario = tmp_path / "long.toml"
-        task = CaptureTask(capture, "boxing_p1_01", scenario, (arm,), {}, metrics, (1,), None, tmp_path, None)
+        task = TrustTask(capture, "boxing_p1_01", scenario, (arm,), {}, metrics, (1,), None, tmp_path, None)
         found.append(run_capture(task))
         with pytest.raises(BadInput, match="Name the clip"):
             run_capture(replace(task, clip=""))

@@ -16,7 +16,7 @@ from harness.mocap.read.c3d import MarkerClip
 from harness.mocap.write.export import export
 from harness.score.pair import compute_poses
 from harness.stream.frame import TrackerFrame
-from harness.stream.recording.frame_table import FRAME_COLUMNS, format_csv_row, frame_rows
+from harness.stream.station_counts import FRAME_COLUMNS, format_csv_row, frame_rows
 from harness.study.trust.truth_files import read_csv, read_truth_file, read_tum, truth_of_markers
 from tests.mocap.write.test_export import NAMES, SKELETON, Written, arbitrary_motion, joints_m
 

@@ -1,0 +1,225 @@
+"""Offset between two clocks, and which station is on which body, from the angular speeds of the same motion.
+
+Angular speed is the same in every frame, so neither room nor mounts need to be known.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.motion import count_steps
+from harness.errors import BadInput, NotComparable
+from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
+
+LEAST_GAIN = 0.1
+"""Least gain in the mean correlation of the stations concerned with which an exchange is believed [choice]."""
+_FEWEST_STEPS = 20
+_LEAST_OVERLAP_S = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedSeries:
+    """K angular speeds on a uniform grid."""
+
+    begin_s: float
+    """Time of the first value [s]."""
+    period_s: float
+    """Step of the grid [s]."""
+    rad_s: Floats
+    """(K,) angular speed [rad/s]; NaN where not known."""
+
+    def __post_init__(self) -> None:
+        freeze(self, rad_s=("K",))
+
+
+@dataclass(frozen=True)
+class TimeOffset:
+    """Offset of one clock from another."""
+
+    offset_s: float
+    """Time by the first clock minus time by the second at the same instant [s]."""
+    correlation: float
+    """Correlation of the angular speeds at this offset, up to 1."""
+    overlap_s: float
+    """Time for which both have angular speeds at this offset [s]."""
+
+
+def angular_speed(time_s: Floats, quaternions: Floats, valid: Bools, period_s: float) -> SpeedSeries:
+    """Angular speed between consecutive poses (N, 4), which are put on a grid of `period_s` [s].
+
+    Of several poses at one place of the grid the last counts. BadInput without a valid pose.
+    """
+    rows = np.flatnonzero(valid & np.isfinite(time_s))
+    if not len(rows):
+        raise BadInput("No pose has a time.", "Send time stamps with the records.")
+    begin_s = float(time_s[rows].min())
+    count_steps(float(time_s[rows].max()) - begin_s, period_s, "Times of poses")
+    place = np.round((time_s[rows] - begin_s) / period_s).astype(np.int64)
+    turn, at_s = np.full((place.max() + 1, 4), np.nan), np.full(place.max() + 1, np.nan)
+    turn[place], at_s[place] = quaternions[rows], time_s[rows]
+    step_s = np.diff(at_s)
+    angle = np.full(len(step_s), np.nan)
+    known = np.isfinite(step_s) & (step_s > 0.0)
+    angle[known] = rotations.angle_between_rad(turn[:-1][known], turn[1:][known]) / step_s[known]
+    return SpeedSeries(begin_s + 0.5 * period_s, period_s, angle)
+
+
+def time_offset(
+    first: Sequence[SpeedSeries], second: Sequence[SpeedSeries], *, least_overlap_s: float = 10.0
+) -> TimeOffset:
+    """Find the offset at which pairs of angular speeds correlate best; all pairs share the two clocks.
+
+    All series have one period. The offset is refined to a fraction of it by a parabola. NotComparable if no offset
+    leaves `least_overlap_s` of overlap [s].
+    """
+    period_s = first[0].period_s
+    if any(abs(series.period_s - period_s) > 1e-9 * period_s for series in (*first, *second)):
+        raise BadInput("Angular speeds of different periods.", "Put all on one grid.")
+    origin_a, origin_b = min(s.begin_s for s in first), min(s.begin_s for s in second)
+    for series, origin_s in ((first, origin_a), (second, origin_b)):
+        count_steps(max(s.begin_s for s in series) - origin_s, period_s, "Beginnings of the bodies' motion")
+    lags: list[Floats] = []
+    for a, b in zip(first, second, strict=True):
+        lags.append(_sums(_padded(a, origin_a), _padded(b, origin_b)))
+    length_a = max(len(_padded(a, origin_a)) for a in first)
+    length_b = max(len(_padded(b, origin_b)) for b in second)
+    total = np.zeros((3, length_a + length_b - 1))
+    for b, sums in zip(second, lags, strict=True):
+        begin = length_b - len(_padded(b, origin_b))
+        total[:, begin : begin + sums.shape[1]] += sums
+    overlap_s = total[2] * period_s / len(first)
+    enough = overlap_s >= least_overlap_s
+    if not enough.any():
+        raise NotComparable(
+            f"Capture and reference overlap by at most {overlap_s.max():.1f} s.",
+            f"At least {least_overlap_s:g} s of common motion are needed for the time offset.",
+        )
+    # Short overlaps correlate by chance: the lower end of Fisher's interval ranks the lags.
+    correlation = np.where(enough, total[0] / np.maximum(total[1], 1e-300), -1.0)
+    score = np.arctanh(np.clip(correlation, -0.999999, 0.999999)) - 3.0 / np.sqrt(np.maximum(total[2] - 3.0, 1.0))
+    best = int(np.argmax(np.where(enough, score, -np.inf)))
+    shift = best - (length_b - 1) + _parabola(correlation, best)
+    offset_s = origin_a - origin_b + shift * period_s
+    return TimeOffset(float(offset_s), float(correlation[best]), float(overlap_s[best]))
+
+
+def _padded(series: SpeedSeries, origin_s: float) -> Floats:
+    """The series from `origin_s` on, shifted to its grid; NaN before its beginning."""
+    before = max(round((series.begin_s - origin_s) / series.period_s), 0)
+    out: Floats = np.concatenate([np.full(before, np.nan), series.rad_s])
+    return out
+
+
+def _sums(a: Floats, b: Floats) -> Floats:
+    """(3, lags) covariance, product of the spreads, and count, of a masked cross-correlation."""
+    from scipy.signal import fftconvolve
+
+    known_a, known_b = np.isfinite(a).astype(float), np.isfinite(b)[::-1].astype(float)
+    x, y = np.where(np.isfinite(a), a, 0.0), np.where(np.isfinite(b), b, 0.0)[::-1]
+    count = np.maximum(np.round(fftconvolve(known_a, known_b)), 0.0)
+    sum_x, sum_y = fftconvolve(x, known_b), fftconvolve(known_a, y)
+    n = np.maximum(count, 1.0)
+    var_x = np.maximum(fftconvolve(x**2, known_b) - sum_x**2 / n, 0.0)
+    var_y = np.maximum(fftconvolve(known_a, y**2) - sum_y**2 / n, 0.0)
+    cross = fftconvolve(x, y) - sum_x * sum_y / n
+    return np.stack([cross, np.sqrt(var_x * var_y), count])
+
+
+def _parabola(values: Floats, best: int) -> float:
+    """Place of the peak of a parabola through three values, relative to the middle one, within half a step."""
+    if not 0 < best < len(values) - 1:
+        return 0.0
+    left, middle, right = values[best - 1 : best + 2]
+    bend = left - 2.0 * middle + right
+    return float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+
+
+def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
+    """Median time between records of a station [s]."""
+    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
+    return float(np.median(np.concatenate(steps_s)))
+
+
+def coarse_offset(
+    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
+) -> TimeOffset:
+    """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
+    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
+    expected = [reference_speed(splines[name], period_s) for name in stations]
+    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
+
+
+def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
+    """Angular speed of a reference, over steps of `period_s` as the device's."""
+    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
+    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
+    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
+
+
+def identify_stations(
+    stations: Mapping[str, MeasuredPoses], truths: Mapping[str, TruthPoses], stated: Mapping[str, str]
+) -> dict[str, str]:
+    """The body of each station: the stated one, unless another assignment correlates clearly better.
+
+    The assignment has the largest sum of correlations between the angular speed of a station and that of a body
+    (Kuhn 1955), over the time offsets of the stated assignment and of the first station on each body: one of those is
+    right. Bodies that no station is stated to be on are not considered.
+    """
+    names, bodies = list(stations), list(dict.fromkeys(stated[name] for name in stations))
+    if len(names) < 2 or len(bodies) < len(names):
+        return dict(stated)
+    splines = {body: TruthSpline(truths[body]) for body in bodies}
+    period_s = record_period_s(stations)
+
+    def correlations(worn: Mapping[str, str]) -> Floats:
+        on = {name: splines[body] for name, body in worn.items()}
+        offset_s = coarse_offset({name: stations[name] for name in worn}, on, period_s, _LEAST_OVERLAP_S).offset_s
+        return np.array([_correlations(stations[name], splines, offset_s) for name in names])
+
+    rows, own = np.arange(len(names)), [bodies.index(stated[name]) for name in names]
+    as_stated = correlations(stated)
+    assigned = [_assigned(as_stated), *(_assigned(correlations({names[0]: body})) for body in bodies)]
+    columns, correlation = max(assigned, key=lambda one: float(one[1].sum()))
+    changed = columns != np.array(own)
+    gain = correlation[changed] - as_stated[rows, own][changed]
+    if not changed.any() or gain.mean() < LEAST_GAIN:
+        return dict(stated)
+    return {name: bodies[column] for name, column in zip(names, columns, strict=True)}
+
+
+def _assigned(correlation: Floats) -> tuple[Ints, Floats]:
+    """The body of each station (N,) and its correlation (N,), of correlations (N, B) with the largest sum."""
+    from scipy import optimize
+
+    rows, columns = optimize.linear_sum_assignment(-correlation)
+    return columns, correlation[rows, columns]
+
+
+def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], offset_s: float) -> list[float]:
+    """Correlation of the station's angular speed with that of each body; 0 with too little in common."""
+    known = station.valid & np.isfinite(station.measured_s)
+    time_s, turn = station.measured_s[known], station.tracker_from_station[known]
+    lag = 4
+    middle_s, step_s = 0.5 * (time_s[lag:] + time_s[:-lag]) - offset_s, time_s[lag:] - time_s[:-lag]
+    measured = _angle(turn[:-lag], turn[lag:]) / np.maximum(step_s, 1e-6)
+    usable = (step_s > 0.0) & (step_s < 3.0 * np.median(step_s))
+    out = []
+    for spline in splines.values():
+        rows = usable & spline.covers(middle_s - step_s) & spline.covers(middle_s + step_s)
+        if rows.sum() < _FEWEST_STEPS:
+            out.append(0.0)
+            continue
+        before, after = (spline.poses(middle_s[rows] + sign * 0.5 * step_s[rows])[1] for sign in (-1.0, 1.0))
+        expected = _angle(before, after) / step_s[rows]
+        with np.errstate(invalid="ignore"):  # of a body that does not turn
+            pair = np.corrcoef(measured[rows], expected)[0, 1]
+        out.append(float(pair) if np.isfinite(pair) else 0.0)
+    return out
+
+
+def _angle(first: Floats, second: Floats) -> Floats:
+    out: Floats = 2.0 * np.arccos(np.clip(np.abs(np.sum(first * second, axis=1)), 0.0, 1.0))
+    return out

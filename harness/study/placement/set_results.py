@@ -1,0 +1,190 @@
+"""Cells of sets of stations: each set is run once and cached in the folder of the study.
+
+A set is a variant of the scenario with other stations, so that motion and fitted methods are shared. Where the serial
+line limits the rate, the set also has a rate of its own. The key of a cell contains the places of all stations. So no
+set is run twice, in whichever mode, in this run or a later one.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.compare.units import Sampling
+from harness.core.files import content_key, to_json_types
+from harness.core.progress import ProgressCallback
+from harness.core.split import ClipPart
+from harness.core.stream_health import BAUD, describe_line_loss
+from harness.errors import BadInput
+from harness.experiment.cells import cell_names, open_scenario_motion
+from harness.experiment.engine import BatchResults, run_cells
+from harness.experiment.executors import TaskExecutor
+from harness.experiment.scenario import Scenario, variants
+from harness.mocap.library import LibraryFolders
+from harness.study.placement.candidates import StationSet, station_name
+
+MAX_RATE_HZ = 180.0
+"""Highest rate of an IS-900 (docs/is900.md)."""
+
+
+def link_rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
+    """Rate of a number of stations: the scenario's, with `link` at most what the serial line carries.
+
+    BadInput when the line cannot carry them once a second.
+    """
+    tracker = scenario.tracker
+    if not link:
+        return tracker.rate_hz
+    link_hz = 1.0 / (tracker.record_s * stations)
+    if link_hz < 1.0:
+        raise BadInput(
+            f"A line of {tracker.baud} baud carries {stations} stations at {link_hz:.2f} Hz.", "Use fewer stations."
+        )
+    return min(tracker.rate_hz, MAX_RATE_HZ, link_hz)
+
+
+SetRequest = tuple[Scenario, tuple[StationSet, ...]]
+"""A scenario, whose stations are all candidates, and the sets of stations to measure in it."""
+RunCells = Callable[..., BatchResults]
+
+
+@dataclass
+class SetResults:
+    """Runs sets that were not measured yet, and caches their results."""
+
+    out: Path
+    """Folder of the study, as made by `open_study`."""
+    folder: LibraryFolders | None
+    """Motion library; None for synthetic motion."""
+    executor: TaskExecutor
+    command: str
+    progress: ProgressCallback
+    link: bool = False
+    """Whether the rate of each set is limited to what the serial line carries."""
+    run: RunCells = run_cells
+    failures: dict[str, str] = field(default_factory=dict)
+    """Cell -> why it has no result."""
+    planned: int = 0
+    """Number of cells that were requested."""
+    seconds: list[float] = field(default_factory=list)
+    """Duration of each cell on its worker [s], also of those of an earlier run."""
+    _rows: dict[tuple[str, str, str, str], Mapping[str, Any]] = field(default_factory=dict)
+    """(scenario, variant, method, clip) -> row."""
+    _variants: dict[str, set[str]] = field(default_factory=dict)
+    """Scenario -> variants that were run."""
+
+    @property
+    def line_loss(self) -> str:
+        """A sentence on cells whose line let nothing be measured; "" if there are none (see `core.stream_health`)."""
+        return describe_line_loss(row for row in self._rows.values() if BAUD in row["health"])
+
+    def run_missing(self, requests: Iterable[SetRequest]) -> None:
+        """Run all sets that were not run yet, together, so that they share the workers."""
+        todo: dict[str, Scenario] = {}
+        values: dict[str, dict[str, Any]] = {}
+        for asked, sets in requests:
+            for stations in sets:
+                scenario, varied = self._variant(asked, stations)
+                if _variant_key(varied) not in self._variants.get(scenario.name, ()):
+                    todo[scenario.name] = scenario
+                    values.setdefault(scenario.name, {})[_variant_key(varied)] = next(iter(varied.values()))
+        scenarios = []
+        for name, scenario in todo.items():
+            key = "worn" if not scenario.worn else "stations"
+            scenarios.append(replace(scenario, vary={key: list(values[name].values())}))
+            self._variants.setdefault(name, set()).update(values[name])
+        if not scenarios:
+            return
+        before = self.planned
+
+        def report(last: str, done: int, planned: int) -> None:
+            self.progress(last, before + done, before + planned)
+
+        options = {"folder": self.folder, "executor": self.executor, "command": self.command, "progress": report}
+        self._add(scenarios, self.run(scenarios, self.out, **options))
+
+    def errors(
+        self, request: SetRequest, metric: str, methods: tuple[str, ...] = ()
+    ) -> dict[StationSet, dict[str, float | None]]:
+        """Set -> unit -> mean error over its clips and `methods`, by default those of the scenario.
+
+        The error is None where one of the methods was not measured on one of the clips. Sets are run where necessary.
+        """
+        self.run_missing([request])
+        scenario, sets = request
+        units = clips_of_units(scenario, self.folder)
+        errors = {stations: self._errors(scenario, stations, metric, methods) for stations in sets}
+        return {
+            stations: {unit: _mean([by_clip[clip] for clip in clips]) for unit, clips in units.items()}
+            for stations, by_clip in errors.items()
+        }
+
+    def _errors(
+        self, asked: Scenario, stations: StationSet, metric: str, methods: tuple[str, ...]
+    ) -> dict[str, float | None]:
+        scenario, varied = self._variant(asked, stations)
+        by_clip: dict[str, float | None] = {}
+        for clip in scenario.motion.test:
+            rows = [
+                self._rows.get((scenario.name, _variant_key(varied), method, clip))
+                for method in methods or scenario.methods
+            ]
+            by_clip[clip] = _mean([row[metric] if row is not None else None for row in rows])
+        return by_clip
+
+    def _add(self, scenarios: Iterable[Scenario], cells: BatchResults) -> None:
+        """Add results; rows are in planned order, without those of failed cells."""
+        rows = iter(cells.rows)
+        for scenario in scenarios:
+            planned = [
+                (scenario.name, _variant_key(varied), method, clip)
+                for varied, variant in variants(scenario)
+                for clip in variant.motion.test
+                for method in variant.methods
+            ]
+            for cell, name in zip(planned, cell_names(scenario), strict=True):
+                if name not in cells.failures:
+                    self._rows[cell] = next(rows)
+                    if duration_s := self._rows[cell].get("seconds"):
+                        self.seconds.append(duration_s)
+        self.planned += cells.planned
+        self.failures |= cells.failures
+
+    def _variant(self, asked: Scenario, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
+        """The scenario that a set is a variant of, and its varied values: stations, or places of moved stations."""
+        rate = link_rate_hz(asked, len(stations), self.link)
+        scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate), vary={})
+        names = [station_name(place) for place in stations]
+        moved = {
+            station_name(place): {"along": place.along, "around_deg": place.around_deg}
+            for place in stations
+            if place.moved_from
+        }
+        if moved:
+            scenario = replace(scenario, worn=tuple(names))
+        name = f"{scenario.name}_{content_key(scenario.content())[:8]}"  # names are unique by content
+        return replace(scenario, name=name), {"stations": moved} if moved else {"worn": names}
+
+
+def clips_of_units(scenario: Scenario, folder: LibraryFolders | None) -> dict[str, list[str]]:
+    """Unit of statistics -> its test clips in a scenario, sorted (see `compare.units`)."""
+    source = open_scenario_motion(scenario.motion, folder, scenario.seed)
+    takes = {clip: ClipPart.parse(clip).clip for clip in scenario.motion.test}
+    performers = {take: known for take in takes.values() if (known := source.performer(take))}
+    sampling, units = Sampling(performers, scenario.unit), dict[str, list[str]]()
+    for clip in sorted(takes):
+        units.setdefault(sampling.unit_of(clip), []).append(clip)
+    return dict(sorted(units.items()))
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean; None where a value is missing."""
+    measured = [float(value) for value in values if value is not None]
+    return float(np.mean(measured)) if len(measured) == len(values) else None
+
+
+def _variant_key(varied: Mapping[str, Any]) -> str:
+    return json.dumps(to_json_types(varied), sort_keys=True)

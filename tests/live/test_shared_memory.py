@@ -1,0 +1,46 @@
+"""Frames through shared memory: all of them in order, or the newest ones for a slow reader."""
+
+from multiprocessing import get_context
+
+import numpy as np
+
+from harness.body import humanoid
+from harness.body.kinematics import Kinematics
+from harness.live.shared_memory import PoseRing
+from tests.live.posing import configuration, live_pose
+
+KINEMATICS = Kinematics(humanoid.build_body())
+
+
+def test_a_frame_comes_back_as_it_was(rng: np.random.Generator) -> None:
+    ring, qpos = PoseRing(get_context("spawn"), 2), configuration(rng)
+    count, records = ring.read(0)
+    assert (count, len(records)) == (0, 0)
+    pose = live_pose(qpos, 7, 2.5, KINEMATICS)
+    ring.put(pose)
+    count, records = ring.read(0)
+    assert count == 1
+    np.testing.assert_array_equal(records[0, :4], [7, 2.5, 0.0, 0])
+    np.testing.assert_array_equal(PoseRing.qpos(records)[0], qpos)
+    stations = ring.station_columns(records)[0]
+    np.testing.assert_array_equal(stations[:, 3:7], pose.frame.tracker_from_station)
+    np.testing.assert_array_equal(stations[:, 7:], np.ones((2, 3)))
+
+
+def test_a_reader_gets_every_frame_once(rng: np.random.Generator) -> None:
+    ring, qpos, seen, numbers = PoseRing(get_context("spawn"), 2), configuration(rng), 0, []
+    for number in range(3000):
+        ring.put(live_pose(qpos, number, kinematics=KINEMATICS))
+        if number % 700 == 699 or number == 2999:
+            seen, records = ring.read(seen)
+            numbers += records[:, 0].astype(int).tolist()
+    assert numbers == list(range(3000))
+
+
+def test_a_slow_reader_gets_the_newest_frames(rng: np.random.Generator) -> None:
+    ring, qpos = PoseRing(get_context("spawn"), 2), configuration(rng)
+    for number in range(2500):
+        ring.put(live_pose(qpos, number, kinematics=KINEMATICS))
+    count, records = ring.read(0)
+    assert count == 2500
+    np.testing.assert_array_equal(records[:, 0], np.arange(2500 - 1023, 2500))

@@ -1,0 +1,75 @@
+"""The slope of the mean against dense generalised least squares, and the coverage of its interval."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.core.number_format import Interval
+from harness.measure.gauss_markov import NOISE_KEYS
+from harness.measure.noise_fit import NoiseFit
+from harness.measure.rest_statistics import drift_speed, mean_drift
+from harness.simulate.noise import Noise
+from tests.measure.test_gauss_markov import dense_covariance
+from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth
+
+KNOWN = NoiseFit({key: Interval(value, value, value) for key, value in truth(PRESET).items()}, {})
+
+
+def test_the_slope_is_that_of_dense_least_squares() -> None:
+    series, _ = series_and_masks(PRESET, 1, 15.0, ("one", "two"))
+    left_out = nothing(series)
+    left_out[0][200:260] = True
+    found = mean_drift(series, left_out, KNOWN, "position_m")
+    rows, columns, blocks = [], [], []
+    for number, (one, mask) in enumerate(zip(series, left_out, strict=True)):
+        design = np.zeros((int((~mask).sum()), 3))
+        design[:, number], design[:, 2] = 1.0, np.flatnonzero(~mask) / 40.0
+        weight = np.linalg.inv(dense_covariance(~mask, 40.0, 0.00075, 0.0015, 1.0))
+        rows.append(design.T @ weight @ design)
+        columns.append(design.T @ weight @ one.position_m[~mask])
+        blocks.append(len(design))
+    covariance = np.linalg.inv(sum(rows))
+    expected = (covariance @ sum(columns))[2]
+    np.testing.assert_allclose([one.value for one in found], expected, rtol=1e-9)
+    np.testing.assert_allclose([one.high - one.value for one in found], 1.959964 * np.sqrt(covariance[2, 2]), rtol=1e-6)
+    assert found[0].count == sum(blocks)
+
+
+def test_the_velocity_of_a_station_that_creeps_is_found() -> None:
+    series, _ = series_and_masks(PRESET, 2, 300.0, ("one",))
+    creep = np.arange(12_000)[:, None] / 40.0 * np.array([2e-5, 0.0, -4e-5])
+    moved = [replace(series[0], position_m=series[0].position_m + creep)]
+    still, found = (mean_drift(one, nothing(series), KNOWN, "position_m") for one in (series, moved))
+    assert all(abs(one.value) < 5e-6 for one in still)
+    np.testing.assert_allclose([f.value - s.value for f, s in zip(found, still, strict=True)], creep[40], atol=1e-12)
+    assert not found[2].contains(0.0)
+
+
+def test_without_noise_or_readings_nothing_is_measured() -> None:
+    series, _ = series_and_masks(PRESET, 3, 10.0, ("one",))
+    quiet = NoiseFit(dict.fromkeys(NOISE_KEYS, Interval.missing("none")), {})
+    assert not any(one.is_measured for one in mean_drift(series, nothing(series), quiet, "position_m"))
+    assert not any(one.is_measured for one in mean_drift(series, [np.ones(400, bool)], KNOWN, "rotation_rad"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["position_m", "rotation_rad"])
+def test_intervals_contain_no_drift(name: str) -> None:
+    noise: Noise = PRESET
+    inside = np.zeros(3)
+    for seed in range(50):
+        series, _ = series_and_masks(noise, 500 + seed, 60.0, ("one",))
+        inside += [one.contains(0.0) for one in mean_drift(series, nothing(series), KNOWN, name)]
+    assert np.all(inside >= 43), inside
+
+
+def test_the_speed_of_a_station_without_drift_is_compatible_with_zero() -> None:
+    rng = np.random.default_rng(1)
+    compatible = 0
+    for _ in range(500):
+        velocity = [Interval.normal(float(value), 1.0) for value in rng.normal(size=3)]
+        compatible += drift_speed(velocity).low == 0.0
+    assert 0.92 <= compatible / 500 <= 0.98
+    assert drift_speed([Interval.normal(value, 0.1) for value in (3.0, 0.0, 4.0)]).value == pytest.approx(5.0)
+    assert not drift_speed([Interval.missing("why")] * 3).is_measured
