@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -20,7 +21,7 @@ from harness.commands import output
 from harness.errors import Outcome
 from tests.command import Command
 from tests.interrupts import heeding_interrupts
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 from tests.short_demo import short_demo
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
@@ -110,7 +111,7 @@ def test_a_closed_stdout_is_no_fault(tmp_path: Path) -> None:
 
 def test_a_reader_who_leaves_does_not_change_the_exit_code(tmp_path: Path) -> None:
     """`harness status DIR | head -1`: quiet, and still `incomplete`."""
-    out = fabricate(tmp_path / "run", Plan(**{**vars(PLAN), "failing": ("ik",)}))
+    out = planted_run(tmp_path / "run", replace(PLAN, failing=("ik",)))
     reader, writer = os.pipe()
     os.close(reader)
     ended = run("status", str(out), cwd=tmp_path, stdout=writer)
@@ -238,7 +239,7 @@ def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
 ) -> None:
     from harness.compare import baseline
 
-    fabricate(tmp_path / "run", PLAN)
+    planted_run(tmp_path / "run", PLAN)
     monkeypatch.chdir(tmp_path)
     command("baseline", "save", "one", "run")
     folder = tmp_path / "results" / "baselines"
@@ -252,7 +253,7 @@ def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
 
 def test_a_folder_that_is_read_only_can_be_looked_at(tmp_path: Path) -> None:
     """A mount is needed, because the superuser writes where permissions forbid it."""
-    out = fabricate(tmp_path / "run", PLAN)
+    out = planted_run(tmp_path / "run", PLAN)
     mount = shutil.which("mount")
     bind = mount and subprocess.run([mount, "--bind", out, out], capture_output=True).returncode == 0
     if not bind or not mount:

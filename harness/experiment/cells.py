@@ -46,8 +46,8 @@ from harness.stream.inputs import make_inputs
 
 VariedValues = Mapping[str, Any]
 _ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
-_READINGS = ("quality", "position_valid", "orientation_valid", "suspect")
-"""Fields of a method's answers and of frames that a cell has under the same names."""
+_READINGS = {"quality": float, "position_valid": bool, "orientation_valid": bool, "suspect": bool}
+"""Fields of a method's answers and of frames that a cell has under the same names, of frames with their type."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,8 @@ def evaluate_cell(
     too_slow = excess_loss(health, allowed=scenario.tracker.overload) > 0.0
     if too_slow:
         health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
-    readings = {name: np.array([getattr(frame, name) for frame in frames]) for name in _READINGS}
+    shape = len(frames), len(simulation.stations)  # also of no frame at all
+    readings = {n: np.array([getattr(f, n) for f in frames], kind).reshape(shape) for n, kind in _READINGS.items()}
     scores = score_estimate(
         evaluation.body.skeleton,
         scenario.tracker.rate_hz,

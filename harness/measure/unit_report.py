@@ -66,7 +66,7 @@ class CaptureSummary:
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter of the error model, of the clock or of the tracker."""
+    """One parameter of the error model or of the clock."""
 
     key: str
     """Dotted key of a scenario, such as "components.white.position_m", or a name of the timing."""
@@ -159,8 +159,6 @@ STATION_FIGURES = (
     "slow_m",
     "slope_m_min",
     "excursions_per_min",
-    "excursion_size_m",
-    "excursion_stay_s",
     "echo_share",
     "gap_share",
     "rate_hz",
@@ -171,8 +169,8 @@ STATION_FIGURES = (
 """Names of the figures of a station.
 
 Spread is the standard deviation of the position at rest (3-D) and of the orientation. White and slow are its two parts
-on each axis: white noise and first-order Gauss-Markov noise. Slope is the drift of the mean. A size or stay is the mean
-over the excursions. Gaps are readings of quality 0; lost records never came.
+on each axis: white noise and first-order Gauss-Markov noise. Slope is the drift of the mean. Gaps are readings of
+quality 0; lost records never came.
 """
 
 
@@ -202,7 +200,7 @@ class UnitReport:
     parameters: tuple[ParameterRow, ...]
     """Parameters of the error model."""
     timing: tuple[ParameterRow, ...]
-    """Numbers of clock, stamps and records: keys as "timing.rate_hz", and those of a scenario's tracker."""
+    """Numbers of clock, stamps and records: keys as "timing.rate_hz"."""
     checks: tuple[Departure, ...]
     """All checks, in their order; those that are named are the departures."""
     stations: tuple[StationFigures, ...]

@@ -9,9 +9,9 @@ from harness.bench import benchmarks
 from harness.bench.cpu_time import hold_cpu_to_limit
 from harness.bench.startup import DemoTimes, demo_rows
 from harness.errors import MissingExtra, Outcome, UnknownName
+from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit, state_verdict
 from tests.command import Command
-from tests.report.fabricate_physics import made_up
 
 
 @pytest.mark.parametrize(("name", "package"), [("index", "faiss-cpu"), ("ik", "mink"), ("methods", "mink")])
@@ -94,13 +94,18 @@ def test_the_demo_is_held_to_ratios_of_the_same_run() -> None:
     assert busy == [("no verdict", "overbooked"), ("no verdict", "overbooked"), ("missed", "")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["physics", "lab"])
 def test_a_missed_row_of_a_truth_table_ends_with_1(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
+    what: str,
+    error_models: ErrorModelComparison,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: Command,
 ) -> None:
     rows = [state_verdict("rest", "1 to 2 mm", "1.5 mm", True, "1.5 mm (Gilson et al. 2006)"), MISSED]
     monkeypatch.setattr("harness.bench.physics.truth.truth_rows", lambda *_: rows)
-    monkeypatch.setattr("harness.bench.physics.error_statistics.compare_error_models", lambda *_: made_up().models)
+    monkeypatch.setattr("harness.bench.physics.error_statistics.compare_error_models", lambda *_: error_models.models)
     monkeypatch.setattr("harness.bench.lab.truth.lab_truth_rows", lambda *_: rows)
     lines = command("bench", what, "--truth", "--seeds", "1", "--out", tmp_path, code=Outcome.REGRESSED.exit_code).lines
     assert lines[-2:] == ["1 of 2 targets missed", "regressed"]

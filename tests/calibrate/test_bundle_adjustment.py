@@ -1,5 +1,7 @@
 """The normal equations: gradients against finite differences, elimination of poses against the full system."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,3 +118,11 @@ def test_the_heading_between_points(rng: np.random.Generator) -> None:
     points = rng.normal(size=(6, 3))
     there = rotations.rotate(rotations.about_z(2.5), points) + np.array([1.0, 2.0, 3.0])
     assert heading_between_rad(points, there) == pytest.approx(2.5)
+
+
+def test_directions_in_which_people_differ_by_less_than_a_micrometre_are_fixed() -> None:
+    prior, mounts = space(), [DEFAULT_MOUNTS[station] for station in SIX]
+    across_m = np.zeros_like(prior.across_m)
+    fixed = SharedUnknowns(LIKE, replace(prior, across_m=across_m), mounts).count
+    across_m[3] = 0.9e-6, 1.1e-6
+    assert SharedUnknowns(LIKE, replace(prior, across_m=across_m), mounts).count == fixed + 1

@@ -118,6 +118,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     collector, said = collected(frames)
     assert said == list(range(1, 9))
     (passed,) = collector.rejected
+    assert collector.message == (str(passed) if place == 8 else "pose 8 of 8 taken")
     assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
     stills = [measure_hold(held, SIX) for held in collector.holds]
     assert [classifier().nearest(still, stills[0]) for still in stills] == list(range(8))

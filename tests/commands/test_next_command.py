@@ -11,13 +11,13 @@ from harness.commands.flags import LINE_FLAGS, repeat_flags
 from harness.experiment.playback import prepare_playback
 from harness.stream.recording.recording import record_capture
 from tests.command import Command
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = Plan(methods={"ik": 2.0, "mean_pose": 4.0}, takes=1, duration_s=2.0)
-    return fabricate(tmp_path_factory.mktemp("next") / "a run", plan)  # a blank is quoted
+    return planted_run(tmp_path_factory.mktemp("next") / "a run", plan)  # a blank is quoted
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,14 @@ from harness.report.sweep import page
 from harness.results.index import CellIndex
 from harness.results.integrity import compute_digests
 from tests.command import Command
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_a_damaged_cell_of_a_sweep_is_refused(
     damaged: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
-    out = fabricate(tmp_path / "sweep", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0}))
+    out = planted_run(tmp_path / "sweep", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0}))
     with CellIndex(out) as index:
         index.note(kind="sweep")
         index.write_digest(compute_digests(out))

@@ -19,8 +19,8 @@ from harness.score.pair import compute_poses
 from harness.view.page import ViewedMotion
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
+from tests.planted import Plan, planted_run
 from tests.report.conftest import renders as renders
-from tests.report.fabricate import Plan, fabricate
 
 CLIP = "boxing_p1_01"
 
@@ -32,7 +32,7 @@ def opened(what: Path | str, methods: list[str] | None = None, **playback: str |
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = Plan(methods={"ik": 2.0, "map": 1.0, "far": 9.0}, duration_s=3.0)
-    return fabricate(tmp_path_factory.mktemp("view") / "run", plan)
+    return planted_run(tmp_path_factory.mktemp("view") / "run", plan)
 
 
 def test_a_built_in_take_is_shown_on_its_own_skeleton() -> None:
@@ -131,7 +131,7 @@ def test_what_cannot_be_shown_is_refused(
 
 def test_a_run_without_estimates_is_refused(tmp_path: Path, command: Command) -> None:
     plan = Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0, silent=("ik",))
-    assert "no frames with an estimate" in command("view", fabricate(tmp_path / "run", plan), code=2).err
+    assert "no frames with an estimate" in command("view", planted_run(tmp_path / "run", plan), code=2).err
 
 
 def test_a_damaged_recording_is_refused(simulated: Path, tmp_path: Path, command: Command) -> None:

@@ -1,7 +1,6 @@
 """Cells that are judged in no time, by made-up errors; everything around them is real."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +13,16 @@ from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.reconstruct.contract import Method
 from harness.results.cell import Cell
 from harness.score.score import Scores
-from tests.report.fabricate import Plan, make_cell
+from tests.planted import measured_cell
 
 FAILING = "ik:previous+ik"
 """Cells of this method fail, while the file `broken` lies where the process works."""
 
 
-@cache
-def template() -> Cell:
-    return make_cell("walking", 1, "ik", 2.0, "pos+ori", Plan(duration_s=1.5), {})
-
-
 def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
     if planned.method == FAILING and Path("broken").exists():
         raise ZeroDivisionError("on purpose")
-    found = template()
+    found = measured_cell()
     error = float(generator(planned.scenario.seed, str(planned)).uniform(1.0, 5.0))
     metrics = {**found.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 5.0 * error, "step_p50_ms": 0.1}
     return replace(
@@ -49,6 +43,7 @@ def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: st
 @pytest.fixture
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where tests work; what is judged there is made up, and its page without charts, which others look at."""
+    measured_cell()  # by the real evaluation
     monkeypatch.setattr(cells, "evaluate_cell", judge)
     monkeypatch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
     monkeypatch.chdir(tmp_path)

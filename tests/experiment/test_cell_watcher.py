@@ -8,14 +8,14 @@ import pytest
 
 from harness.core.files import TEMPORARY
 from harness.experiment.cell_watcher import ProgressCount
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of one finished cell."""
     plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0)
-    (cell,) = (fabricate(tmp_path_factory.mktemp("watched") / "run", plan) / "cells").iterdir()
+    (cell,) = (planted_run(tmp_path_factory.mktemp("watched") / "run", plan) / "cells").iterdir()
     return cell
 
 

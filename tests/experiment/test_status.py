@@ -14,7 +14,7 @@ from harness.results.cell import as_row
 from harness.results.folder_kind import folder_lock
 from harness.results.index import CellIndex
 from harness.results.storage import read_cells
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
 
@@ -22,7 +22,7 @@ PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, tak
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four cells."""
-    return fabricate(tmp_path_factory.mktemp("status") / "run", PLAN)
+    return planted_run(tmp_path_factory.mktemp("status") / "run", PLAN)
 
 
 @pytest.fixture

@@ -4,7 +4,9 @@ import io
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -50,14 +52,16 @@ from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
 from harness.study.placement.config import base_scenario, load_placement_study
+from harness.study.placement.placement_study import run_placement
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
 from tests.fuzz.containers import DATABASE, NPZ, RECORDING
 from tests.fuzz.mending import mend_baseline, mend_calibration, mend_findings, mend_index, mend_run
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
+from tests.planted import Plan, SweepPlan, planted_run, planted_sweep
 from tests.reconstruct.database.test_motion_database import make_take
-from tests.report import fabricate, fabricate_paper, fabricate_placement, fabricate_sweep
+from tests.report.paper import findings as paper_findings
 
 OPTIONS = "dynamic_map[neighbours=40|60]+ik, local_pca[neighbours=100], kernel_cca[jump_m=0.5,outputs=angles]+ik"
 
@@ -196,9 +200,8 @@ def _read_recording(folder: Path) -> object:
 
 
 def _make_run(folder: Path) -> None:
-    fabricate.fabricate(
-        folder / "x", fabricate.Plan(behaviours=("walking",), methods={"ik": 1.5, "best_match": 3.0}, duration_s=1.0)
-    )
+    methods = {"ik": 1.5, "best_match": 3.0}
+    planted_run(folder / "x", Plan(behaviours=("walking",), methods=methods, duration_s=1.5))
 
 
 def _read_run(folder: Path) -> object:
@@ -237,11 +240,11 @@ def _read_baseline(folder: Path) -> object:
 
 
 def _make_sweep(folder: Path) -> None:
-    fabricate_sweep.fabricate_sweep(folder / "x", fabricate_sweep.Plan(failing=("dynamic_map",), to_come=2))
+    planted_sweep(folder / "x", SweepPlan(clips=2, failing=("dynamic_map",)))
 
 
 def _make_paper(folder: Path) -> None:
-    fabricate_paper.write_study(folder, fabricate_paper.kim())
+    paper_findings.write_study(folder, paper_findings.kim())
 
 
 def _read_paper(folder: Path) -> object:
@@ -250,7 +253,16 @@ def _read_paper(folder: Path) -> object:
 
 
 def _make_placement(folder: Path) -> None:
-    fabricate_placement.write_made_up(folder)
+    (folder / "findings.json").write_bytes(_placement_findings())
+
+
+@cache
+def _placement_findings() -> bytes:
+    from tests.study.placement.test_placement_study import ALL_MODES, written
+
+    with TemporaryDirectory() as folder:
+        run_placement(written(Path(folder), ALL_MODES), Path(folder) / "out")
+        return (Path(folder) / "out" / "findings.json").read_bytes()
 
 
 def _read_placement_findings(folder: Path) -> object:

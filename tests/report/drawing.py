@@ -1,8 +1,17 @@
 """Checks that every small chart must pass."""
 
+from collections.abc import Callable
+
+import numpy as np
+import pytest
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
+
+from harness.core.arrays import Floats
+from harness.report.kit.page import Drawing, Page
+from harness.report.kit.style import to_svg
 
 
 def texts_apart(figure: Figure) -> None:
@@ -23,3 +32,30 @@ def _ticks(axis: Axis) -> list[Text]:
     low, high = sorted(axis.get_view_interval())
     labels = [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]
     return [label for label in labels if label.get_visible()]
+
+
+def drawn_figures(draw: Callable[[], object]) -> dict[str, Figure]:
+    """Name of each chart that a function draws -> its figure."""
+    figures: dict[str, Figure] = {}
+
+    def keep(figure: Figure, name: str) -> str:
+        figures[name] = figure
+        return to_svg(figure, name)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("harness.report.kit.chart.to_svg", keep)
+        draw()
+    return figures
+
+
+def points(line: Line2D) -> tuple[Floats, Floats]:
+    """The coordinates of a line."""
+    return np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float)
+
+
+def draw_page(page: Page) -> None:
+    """Draw every chart of a page."""
+    for section in page.sections:
+        for block in section.blocks:
+            if isinstance(block, Drawing) and callable(block.chart):
+                block.chart()

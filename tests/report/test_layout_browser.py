@@ -1,31 +1,30 @@
 """Every kind of page in a browser, at 1400 and 700 pixels and in print, light and dark: nothing is cut."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from harness.measure.unit_report import UnitReport
+from harness.measure.validation_report import ValidationReport
 from harness.report.comparison.page import write_comparison_page
+from harness.report.coverage.content import CoverageContent
 from harness.report.coverage.page import coverage_page
 from harness.report.kit.page_html import write_page
 from harness.report.lab.trust_page import trust_page
 from harness.report.lab.unit_page import unit_page
 from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
+from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.page import write_physics_page
 from harness.report.placement import page as placement_page
 from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
-from tests.report.fabricate import Plan, fabricate
-from tests.report.fabricate_comparison import comparison
-from tests.report.fabricate_coverage import fabricate_coverage
-from tests.report.fabricate_lab import made_up_unit
-from tests.report.fabricate_paper import liu, write_study
-from tests.report.fabricate_physics import made_up as made_up_physics
-from tests.report.fabricate_placement import write_made_up
-from tests.report.fabricate_sweep import fabricate_sweep
-from tests.report.fabricate_trust import made_up_trust
-from tests.report.fabricate_validation import SCORES, made_up_validation
+from harness.results.trust_findings import TrustFindings
+from tests.planted import Plan, planted_run, planted_sweep
+from tests.report.comparison.compared import compared
+from tests.report.paper.findings import liu, write_study
 from tests.report.sweep.test_page import VARIED
 
 pytestmark = pytest.mark.long
@@ -42,27 +41,38 @@ SCROLLING = """() => [...document.querySelectorAll(".wide")].filter((box) => box
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def pages(
+    tmp_path_factory: pytest.TempPathFactory,
+    unit_with_faults: UnitReport,
+    late_capture: ValidationReport,
+    trust_findings: TrustFindings,
+    error_models: ErrorModelComparison,
+    coverages: tuple[CoverageContent, CoverageContent],
+    placement_study: Path,
+) -> dict[str, Path]:
     """Kind -> the file of its page."""
     folder = tmp_path_factory.mktemp("pages")
     methods = {f"a_method_with_a_long_name_{n}": 1.0 + n for n in range(12)} | {"ik": 3.0}
-    plan = Plan(behaviours=("walking", "boxing"), methods=methods, duration_s=3.0, failing=("ik",))
+    plan = Plan(behaviours=("walking", "boxing"), methods=methods, failing=("ik",))
+    (folder / "placement").mkdir()
+    shutil.copy(placement_study / "findings.json", folder / "placement")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
-        placement = placement_page.write_placement_page(write_made_up(folder / "placement"))
+        placement = placement_page.write_placement_page(folder / "placement")
+    shown = {
+        "coverage": coverage_page(coverages[1]),
+        "unit": unit_page(unit_with_faults, "harness characterize"),
+        "validation": validation_page(late_capture, {"ik": {"mpjpe_mm": 41.2}}, "harness validate"),
+        "trust": trust_page(trust_findings, "harness trust plan.toml"),
+    }
     return {
-        "coverage": write_page(coverage_page(fabricate_coverage()), folder / "coverage.html"),
-        "run": write_run_page(fabricate(folder / "run", plan), rendered=False),
-        "comparison": write_comparison_page(comparison(7, ("local_pca",)), folder / "comparison.html"),
-        "sweep": write_sweep_page(fabricate_sweep(folder / "sweep", VARIED)),
+        **{kind: write_page(page, folder / f"{kind}.html") for kind, page in shown.items()},
+        "run": write_run_page(planted_run(folder / "run", plan), rendered=False),
+        "comparison": write_comparison_page(compared({"local_pca": 0.05}, 7), folder / "comparison.html"),
+        "sweep": write_sweep_page(planted_sweep(folder / "sweep", VARIED)),
         "placement": placement,
         "paper": write_paper_page(write_study(folder / "paper", liu())),
-        "physics": write_physics_page(folder / "physics.html", made_up_physics()),
-        "unit": write_page(unit_page(made_up_unit(), "harness characterize"), folder / "unit.html"),
-        "validation": write_page(
-            validation_page(made_up_validation(), SCORES, "harness validate"), folder / "validation.html"
-        ),
-        "trust": write_page(trust_page(made_up_trust(), "harness trust plan.toml"), folder / "trust.html"),
+        "physics": write_physics_page(folder / "physics.html", error_models),
     }
 
 

@@ -17,14 +17,14 @@ from harness.results.folder_kind import folder_lock, is_running
 from harness.results.index import INDEX_FILE, CellCounts, CellIndex
 from harness.results.storage import read_cells
 from harness.results.table import SUMMARY_METRICS, TIME_COLUMNS, compute_group_statistics, write_table
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Eight cells: two behaviours, two methods, two values."""
-    plan = Plan(methods={"ik": 1.5, "mean_pose": 14.0}, duration_s=2.0, varied=({"noise": "clean"}, {"noise": "all"}))
-    return fabricate(tmp_path_factory.mktemp("index") / "run", plan)
+    plan = Plan(methods={"ik": 1.5, "mean_pose": 14.0}, duration_s=2.0, vary={"noise": ["clean", "noise"]})
+    return planted_run(tmp_path_factory.mktemp("index") / "run", plan)
 
 
 def rows_of(run: Path) -> list[dict[str, Any]]:
@@ -139,8 +139,8 @@ def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
     header, first, *_ = (tmp_path / "one" / "summary.csv").read_text().splitlines()
     found = dict(zip(header.split(","), first.split(","), strict=True))
-    assert found["scenario"] == "fabricated"
-    assert (found["vary.noise"], found["noise"]) == ("clean", "default")
+    assert found["scenario"] == "run"
+    assert (found["vary.noise"], found["noise"]) == ("clean", "clean")
     assert float(found["mpjpe_mm"]) == pytest.approx(rows[0]["mpjpe_mm"], rel=1e-8)
     assert set(TIME_COLUMNS) <= set(found)
 

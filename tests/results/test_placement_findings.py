@@ -7,15 +7,14 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile
-from harness.results.placement_findings import read_placement, write_placement
-from tests.report.fabricate_placement import made_up
+from harness.results.placement_findings import PlacementFindings, read_placement, write_placement
 from tests.results.rewrite import read_json, write_json
 
 Damage = Callable[[dict[str, Any]], Any]
 
 
-def test_findings_come_back_as_they_were_written(tmp_path: Path) -> None:
-    findings, path = made_up(at_most=2), tmp_path / "findings.json"
+def test_findings_come_back_as_they_were_written(tmp_path: Path, placement: PlacementFindings) -> None:
+    findings, path = placement, tmp_path / "findings.json"
     write_placement(path, findings)
     assert read_placement(path) == findings
     first = path.read_bytes()
@@ -42,9 +41,9 @@ def test_a_paper_is_no_placement(tmp_path: Path) -> None:
         (lambda c: c["contributions"][0].update(candidate="nose"), "nose"),
     ],
 )
-def test_damage_is_named(tmp_path: Path, damage: Damage, said: str) -> None:
+def test_damage_is_named(placement: PlacementFindings, tmp_path: Path, damage: Damage, said: str) -> None:
     path = tmp_path / "findings.json"
-    write_placement(path, made_up(at_most=2))
+    write_placement(path, placement)
     content = read_json(path)
     damage(content)
     write_json(path, content)
@@ -53,8 +52,10 @@ def test_damage_is_named(tmp_path: Path, damage: Damage, said: str) -> None:
 
 
 @pytest.mark.parametrize("other", [{"placement": "another"}, {"seed": 99}, {"motion": "cmu"}])
-def test_findings_of_another_study_are_refused(tmp_path: Path, other: dict[str, str | int]) -> None:
-    findings, path = made_up(at_most=2), tmp_path / "findings.json"
+def test_findings_of_another_study_are_refused(
+    placement: PlacementFindings, tmp_path: Path, other: dict[str, str | int]
+) -> None:
+    findings, path = placement, tmp_path / "findings.json"
     identity = {"placement": findings.name, "motion": findings.motion, "seed": findings.seed}
     write_placement(path, findings)
     write_json(tmp_path / "study.json", identity)

@@ -24,7 +24,7 @@ from harness.results.integrity import check_cells, check_folder
 from harness.results.reader import load_results, load_run
 from harness.results.storage import read_cells
 from tests.command import Command
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 from tests.results.rewrite import read_json, rewrite_digests, rewrite_json
 
 Change = Callable[[Path], object]
@@ -35,9 +35,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two runs, `run` and `other`, of which `other` has larger errors."""
     folder = tmp_path_factory.mktemp("made")
     plan = Plan(behaviours=("walking",), methods={"ik": 1.0, "mean_pose": 9.0}, takes=2, duration_s=2.0)
-    fabricate(folder / "run", plan)
+    planted_run(folder / "run", plan)
     larger = Plan(behaviours=("walking",), methods={"ik": 2.0, "mean_pose": 18.0}, takes=2, duration_s=2.0)
-    fabricate(folder / "other", larger)
+    planted_run(folder / "other", larger)
     return folder
 
 
@@ -151,7 +151,7 @@ OF_FOLDER: dict[str, tuple[Change, str]] = {
     "outcome forgotten": (lambda o: sql(o, "UPDATE plan SET key = NULL WHERE place = 1"), INDEX_FILE),
     "kind changed": (lambda o: sql(o, "UPDATE facts SET value = '\"sweep\"' WHERE name = 'kind'"), INDEX_FILE),
     "bytes of the index changed": (
-        of_run(INDEX_FILE, lambda f: f.write_bytes(f.read_bytes().replace(b"fabricated", b"febricated"))),
+        of_run(INDEX_FILE, lambda f: f.write_bytes(f.read_bytes().replace(b"walking", b"wolking"))),
         INDEX_FILE,
     ),
     "index cut": (of_run(INDEX_FILE, cut), INDEX_FILE),
@@ -171,7 +171,7 @@ OF_FOLDER: dict[str, tuple[Change, str]] = {
     "line removed": (of_run("summary.csv", lambda f: edit(f, r"\n.*\n$", "\n")), "summary.csv"),
     "table missing": (of_run("summary.csv", Path.unlink), "summary.csv"),
     "table of another run": (from_other("summary.csv"), "summary.csv"),
-    "seed changed": (of_run("manifest.json", lambda f: edit(f, '"name": "fab', '"name": "my_fab')), "manifest.json"),
+    "seed changed": (of_run("manifest.json", lambda f: edit(f, '"seed": ', '"seed": 9')), "manifest.json"),
     "processor changed": (
         of_run("manifest.json", lambda f: edit(f, '"processor": "', '"processor": "x')),
         "manifest.json",

@@ -209,7 +209,7 @@ def _scale(axes: Axes, lines: Sequence[Difference]) -> None:
         axes.set_xscale("symlog", linthresh=2.0 * middle, linscale=1.5)
         axes.xaxis.set_major_locator(FixedLocator(_ticks(2.0 * middle, end)))
     else:
-        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.xaxis.set_major_locator(MaxNLocator(5 if end < 100.0 else 3))  # three digits are wide
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("+0", "0").replace("-", "−"))
     axes.set_xlim(-end, end)
 

@@ -179,7 +179,7 @@ def _share_sentence(values: Mapping[str, Interval]) -> str:
 
 
 def _timing_sentence(values: Mapping[str, Interval]) -> str:
-    rate = _number(values, "tracker.rate_hz") or _number(values, "timing.rate_hz")
+    rate = _number(values, "timing.rate_hz")
     clock = values.get("components.clock.drift_ppm")
     parts = [f"records of a station come at {rate}"] if rate else []
     if clock:

@@ -17,6 +17,8 @@ _MM2 = 1e6
 """Square millimetres in a square metre."""
 _BAND: Mapping[str, Any] = {"color": GRID, "alpha": 0.6, "linewidth": 0.0}
 """Look of a range that episodes are held to."""
+_DURATIONS_S, _SIZES_M = (1.0, 10.0), (0.01, 0.04)
+"""Durations [s] and sizes [m] that the excursions are held to, marked in the chart."""
 _LEAST_SHARE = 1e-6
 """Share at which bars on a logarithmic axis begin, unless a smaller one is shown."""
 
@@ -58,16 +60,13 @@ def excursions_chart(comparison: ErrorModelComparison) -> Chart:
     counts = "; ".join(
         f"{model.label}: {count_noun(len(model.excursion_s), 'excursion')}" for model in comparison.models
     )
-    least_s = comparison.duration_range_s
-    lasting = f"; dashed: only those of {least_s[0]:g} s or more" if least_s else ""
-    has_band = comparison.duration_range_s is not None or comparison.peak_range_m is not None
-    band = " Grey: the durations and sizes that excursions are held to." if has_band else ""
     return draw_chart(
         "excursions",
         "Duration and size of excursions",
         f"An excursion is a stretch with an error above {limit}; those less than {comparison.merge_s:g} s apart are "
         "one. A curve shows how many excursions for each minute and station last at least as long (left) or reach at "
-        f"least this error (right{lasting}). {counts}.{band} {_truncated_note(comparison)}",
+        f"least this error (right; dashed: only those of {_DURATIONS_S[0]:g} s or more). {counts}. Grey: the durations "
+        f"and sizes that excursions are held to. {_truncated_note(comparison)}",
         f"Number of excursions above {limit} for each minute and station by duration and by largest error, for "
         f"{_names(comparison.models)}; the numbers are in the table below.",
         lambda figure: _draw_excursions(figure, comparison),
@@ -79,12 +78,9 @@ def _draw_excursions(figure: Figure, comparison: ErrorModelComparison) -> None:
     durations, peaks = figure.subplots(1, 2, sharey=True)
     _draw_rates(durations, comparison.models, lambda model: model.excursion_s)
     _draw_rates(peaks, comparison.models, lambda model: 1e3 * model.excursion_peak_m)
-    if comparison.duration_range_s:
-        least_s = comparison.duration_range_s[0]
-        _draw_rates(peaks, comparison.models, lambda m: 1e3 * m.excursion_peak_m[m.excursion_s >= least_s], "--")
-        durations.axvspan(*comparison.duration_range_s, **_BAND)
-    if comparison.peak_range_m:
-        peaks.axvspan(*(1e3 * end_m for end_m in comparison.peak_range_m), **_BAND)
+    _draw_rates(peaks, comparison.models, lambda m: 1e3 * m.excursion_peak_m[m.excursion_s >= _DURATIONS_S[0]], "--")
+    durations.axvspan(*_DURATIONS_S, **_BAND)
+    peaks.axvspan(*(1e3 * end_m for end_m in _SIZES_M), **_BAND)
     for axes in (durations, peaks):
         _scale_rates(axes)
     durations.set_xlabel("duration, at least [s]")

@@ -90,7 +90,3 @@ class ErrorModelComparison:
     """Excursions closer to each other than this are one [s]."""
     segment_s: float
     """Length of a segment of the spectrum [s]."""
-    duration_range_s: tuple[float, float] | None = (1.0, 10.0)
-    """Durations that the excursions are held to [s], marked in the chart; None without."""
-    peak_range_m: tuple[float, float] | None = (0.01, 0.04)
-    """Sizes that the excursions are held to [m], marked in the chart; None without."""

@@ -6,17 +6,17 @@ from typing import Any
 import pytest
 
 from harness.report.comparison.page import write_comparison_page
-from tests.report.fabricate_comparison import comparison
+from tests.report.comparison.compared import compared
 from tests.report.watching import is_whole_and_quiet
 
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_comparison_page(comparison(7, ("local_pca",)), tmp_path_factory.mktemp("browser") / "page.html")
+    return write_comparison_page(compared({"local_pca": 0.05}, 7), tmp_path_factory.mktemp("browser") / "page.html")
 
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_page_is_whole_and_quiet(browser: Any, page_file: Path, width: int) -> None:
     images, first = is_whole_and_quiet(browser, page_file, width)
-    assert images == 5
+    assert images == 4
     assert "Regressed" in first

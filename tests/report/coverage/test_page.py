@@ -3,138 +3,111 @@
 import base64
 import io
 import re
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
-from harness.report.coverage import page as coverage
+from harness.core.number_format import format_fixed
 from harness.report.coverage.content import CoverageContent
-from harness.report.coverage.page import (
-    coverage_page,
-    coverage_sentence,
-    dilution_chart,
-    heard_chart,
-    place_table,
-    station_chart,
-    station_table,
-)
-from harness.report.kit.chart import draw_chart
+from harness.report.coverage.page import coverage_page, coverage_sentence, dilution_chart
 from harness.report.kit.page_html import page_html, write_page
-from harness.report.kit.style import Chart
-from tests.report.drawing import texts_apart
-from tests.report.fabricate_coverage import fabricate_coverage
-from tests.report.reading import read, text_of
+from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
+from tests.report.reading import count_pictures, read, section_ids, text_of
+
+Coverages = tuple[CoverageContent, CoverageContent]
 
 
-def written(folder: Path, content: CoverageContent) -> Path:
-    return write_page(coverage_page(content), folder / "page.html")
+@pytest.fixture(scope="module")
+def figures(coverages: Coverages) -> dict[str, Figure]:
+    return drawn_figures(lambda: draw_page(coverage_page(coverages[1])))
 
 
-def test_the_heading_names_the_coverage_and_the_station_that_hears_least() -> None:
-    assert coverage_sentence(fabricate_coverage()) == (
-        "9 emitters: three or more are heard in 90 % of the cube below them, at a median DOP of 1.25; "
-        "<b>torso</b> hears three for 25 % of golf_p1_01"
+def test_the_heading_names_the_coverage_and_the_station_that_hears_least(coverages: Coverages) -> None:
+    plain, boxing = coverages
+    cube = plain.rows[0]
+    assert coverage_sentence(plain) == (
+        f"9 emitters: three or more are heard in {100.0 * cube.share:.0f} % of the cube below them, at a median DOP of "
+        f"{cube.dilution:.2f}"
     )
-    assert coverage_sentence(fabricate_coverage(stations=False)).endswith("at a median DOP of 1.25")
+    least = min(boxing.stations, key=lambda row: row.shares[3])
+    hears = f"; {least.station} hears three for {100.0 * least.shares[3]:.0f} % of boxing_p1_01"
+    assert coverage_sentence(boxing) == coverage_sentence(plain) + hears
 
 
-def test_tables_have_the_numbers() -> None:
-    content = fabricate_coverage()
-    assert list(place_table(content.rows, 1.0).rows) == [
-        ["0 to 2 m", "90.0", "80.0", "6", "1.25"],
-        ["1.7 m", "50.0", "0.0", "2", "no fix"],
-    ]
-    assert list(station_table(content.stations, content.clip).rows) == [
-        ["left_hand", "0.0", "0.0", "10.0", "90.0", "85.0", "1.50"],
-        ["<b>torso</b>", "25.0", "25.0", "25.0", "25.0", "20.0", "no fix"],
-    ]
-
-
-def test_the_page_is_whole_and_escapes_names(tmp_path: Path) -> None:
-    page = written(tmp_path, fabricate_coverage("<i>x</i>"))
+def test_the_page_has_every_number_and_escapes_names(tmp_path: Path, coverages: Coverages) -> None:
+    content = replace(coverages[1], name="<i>x</i>")
+    page = write_page(coverage_page(content), tmp_path / "page.html")
     text = text_of(page)
-    assert "By place" in text
-    assert "By station" in text
-    assert "<b>torso</b>" in text
+    assert section_ids(page) == ["place", "station"]
+    assert count_pictures(page) == 3
     assert not [tag for tag, _ in read(page).found if tag == "i"]
-    assert len([tag for tag, _ in read(page).found if tag == "img"]) == 3
+    for row in content.rows:
+        shares = f"{100.0 * row.share:.1f} {100.0 * row.fixed:.1f}"
+        assert f"{row.place} {shares} {format_fixed(row.heard, 0)} {row.dilution:.2f}" in text
+    for station in content.stations:
+        numbers = [f"{100.0 * share:.1f}" for share in (*station.shares, station.fixed)]
+        assert f"{station.station} {' '.join(numbers)} {station.dilution:.2f}" in text
 
 
-def test_a_page_without_a_clip_has_no_stations(tmp_path: Path) -> None:
-    text = text_of(written(tmp_path, fabricate_coverage(stations=False)))
-    assert "By station" not in text
-    assert "Clip" not in text
+def test_a_place_without_a_fix_has_no_dilution(tmp_path: Path, coverages: Coverages) -> None:
+    plain, boxing = coverages
+    nowhere = [replace(row, dilution=float("nan")) for row in plain.rows]
+    stations = [replace(row, dilution=float("nan")) for row in boxing.stations]
+    page = write_page(coverage_page(replace(boxing, rows=nowhere, stations=stations)), tmp_path / "page.html")
+    assert text_of(page).count("no fix") >= len(nowhere) + len(stations)
 
 
-def figure_of(monkeypatch: pytest.MonkeyPatch, chart: Callable[[CoverageContent], Chart]) -> Any:
-    """The figure of a chart, drawn as in its file."""
-    kept: list[Figure] = []
-
-    def draw_and_keep(
-        name: str, title: str, caption: str, alt: str, draw: Callable[[Figure], None], height_in: float
-    ) -> Chart:
-        def keep(figure: Figure) -> None:
-            draw(figure)
-            kept.append(figure)
-
-        return draw_chart(name, title, caption, alt, keep, height_in)
-
-    monkeypatch.setattr(coverage, "draw_chart", draw_and_keep)
-    chart(fabricate_coverage())
-    return kept[0]
+def test_a_page_without_a_clip_has_no_stations(tmp_path: Path, coverages: Coverages) -> None:
+    page = write_page(coverage_page(coverages[0]), tmp_path / "page.html")
+    assert section_ids(page) == ["place"]
+    assert "Clip" not in text_of(page)
 
 
-@pytest.mark.parametrize("chart", [heard_chart, dilution_chart, station_chart])
-def test_texts_of_charts_do_not_overlap(
-    chart: Callable[[CoverageContent], Chart], monkeypatch: pytest.MonkeyPatch
+def test_every_colour_has_its_name_apart_from_others(figures: dict[str, Figure]) -> None:
+    expected = {
+        "heard": ["0", "1", "2", "3", "4 to 5", "6 to 8", "9 to 12", "13 or more"],
+        "dilution": ["below 1", "1 to 1.5", "1.5 to 2", "2 to 3", "3 to 5", "5 to 10", "10 or more"],
+    }
+    for name, labels in expected.items():
+        assert [label.get_text() for label in figures[name].axes[-1].get_xticklabels()] == labels
+    for figure in figures.values():
+        texts_apart(figure)
+
+
+def test_a_plan_view_has_forward_at_the_top_and_right_on_the_right(
+    figures: dict[str, Figure], coverages: Coverages
 ) -> None:
-    texts_apart(figure_of(monkeypatch, chart))
+    content = coverages[1]
+    for axes, view in zip(figures["heard"].axes, content.views, strict=False):
+        (image,), (dots,) = axes.get_images(), axes.get_lines()
+        assert image.origin == "lower"
+        steps = [0.5 * (each[1] - each[0]) for each in (view.y_m, view.x_m)]
+        ends = [end for m, step in zip((view.y_m, view.x_m), steps, strict=True) for end in (m[0] - step, m[-1] + step)]
+        np.testing.assert_allclose(image.get_extent(), ends)
+        np.testing.assert_array_equal(np.asarray(image.get_array()), view.heard)
+        np.testing.assert_array_equal(np.transpose(points(dots)), content.emitter_m[:, [1, 0]])
 
 
-@pytest.mark.parametrize(
-    ("chart", "expected"),
-    [
-        (heard_chart, ["0", "1", "2", "3", "4 to 5", "6 to 8", "9 to 12", "13 or more"]),
-        (dilution_chart, ["below 1", "1 to 1.5", "1.5 to 2", "2 to 3", "3 to 5", "5 to 10", "10 or more"]),
-    ],
-)
-def test_every_colour_has_its_name(
-    chart: Callable[[CoverageContent], Chart], expected: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    figure = figure_of(monkeypatch, chart)
-    assert [label.get_text() for label in figure.axes[-1].get_xticklabels()] == expected
+def test_bars_of_a_station_add_up_to_the_whole_time(figures: dict[str, Figure], coverages: Coverages) -> None:
+    (axes,), count = figures["stations"].axes, len(coverages[1].stations)
+    ends = [max(bar.get_x() + bar.get_width() for bar in axes.patches[row::count]) for row in range(count)]  # type: ignore[attr-defined]
+    assert ends == pytest.approx([100.0] * count)
 
 
-def test_a_plan_view_has_forward_at_the_top_and_right_on_the_right(monkeypatch: pytest.MonkeyPatch) -> None:
-    axes = figure_of(monkeypatch, heard_chart).axes[0]
-    (image,) = axes.get_images()
-    assert image.origin == "lower"
-    np.testing.assert_allclose(image.get_extent(), [-2.1, 2.1, -3.1, 3.1])
-    content = fabricate_coverage()
-    np.testing.assert_array_equal(np.asarray(image.get_array()), content.views[0].heard)
-    (dots,) = axes.get_lines()
-    np.testing.assert_array_equal(np.transpose(dots.get_data()), content.emitter_m[:, [1, 0]])
+def test_the_same_content_gives_the_same_page(coverages: Coverages) -> None:
+    assert page_html(coverage_page(coverages[1])) == page_html(coverage_page(coverages[1]))
 
 
-def test_bars_of_a_station_add_up_to_the_whole_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    axes = figure_of(monkeypatch, station_chart).axes[0]
-    ends = [max(bar.get_x() + bar.get_width() for bar in axes.patches[row::2]) for row in (0, 1)]
-    assert ends == pytest.approx([100.0, 100.0])
-
-
-def test_the_same_content_gives_the_same_page() -> None:
-    pages = [page_html(coverage_page(fabricate_coverage())) for _ in range(2)]
-    assert pages[0] == pages[1]
-
-
-def test_places_without_a_fix_have_no_colour() -> None:
-    from PIL import Image
-
-    svg = dilution_chart(fabricate_coverage()).svg
+def test_places_without_a_fix_have_no_colour(coverages: Coverages) -> None:
+    content = coverages[0]
+    dilution = content.views[0].dilution
+    assert np.isnan(dilution[0, 0])
+    assert np.isfinite(dilution[dilution.shape[0] // 2, dilution.shape[1] // 2])
+    svg = dilution_chart(content).svg
     data = re.search(r"data:image/png;base64,\s*([A-Za-z0-9+/=\s]+)", svg)
     assert data is not None
     picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(data[1]))).convert("RGBA"))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 from tests.report.figures.made_up import conditions_run, ranked_run
 
 
@@ -21,5 +21,5 @@ def conditions(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def framed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two clips with frames, four methods, each with twice the errors in the second condition."""
-    plan = Plan(("walking",), takes=2, duration_s=3.0, varied=({"noise": "clean"}, {"noise": "default"}))
-    return fabricate(tmp_path_factory.mktemp("framed") / "run", plan)
+    plan = Plan(("walking",), takes=2, duration_s=3.0, vary={"noise": ["clean", "default"]})
+    return planted_run(tmp_path_factory.mktemp("framed") / "run", plan)

@@ -9,7 +9,7 @@ from harness.report.figures.conditions import check_metric, describe_absent, rea
 from harness.report.run.ranking import describe_rankings
 from harness.results.storage import read_summary
 from tests.compare.sides import side, write_run
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 from tests.report.figures.made_up import ranked_run
 
 
@@ -36,7 +36,7 @@ def test_varied_values_and_performers_are_conditions(conditions: Path) -> None:
 
 def test_each_lag_is_a_condition(tmp_path: Path) -> None:
     plan = Plan(("walking",), {"ik": 1.0, "late": 0.5}, duration_s=2.0, lags={"late": 2})
-    run = read_conditions(fabricate(tmp_path / "run", plan))
+    run = read_conditions(planted_run(tmp_path / "run", plan))
     assert [each.name for each in run.conditions] == ["no lag", "a lag of 2 frames"]
     assert [each.series for each in run.conditions] == [("ik",), ("late (lag 2)",)]
 

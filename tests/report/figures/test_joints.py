@@ -14,8 +14,8 @@ from harness.report.figures.mean_figures import joints_figure
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.run.joint_errors import BONE_ROWS
 from harness.score.pair import hinged_bones
+from tests.planted import Plan, planted_run
 from tests.report.drawing import texts_apart
-from tests.report.fabricate import Plan, fabricate
 from tests.report.figures.made_up import drawn
 
 BONES = [standard_skeleton().names[bone] for bone in hinged_bones(standard_skeleton())]
@@ -59,7 +59,7 @@ def test_one_clip_has_no_interval(framed: Path) -> None:
 
 def test_a_clip_on_which_the_leader_was_not_measured_is_refused(tmp_path: Path) -> None:
     plan = Plan(("walking", "boxing"), {"ik": 2.0, "best_match": 1.0}, duration_s=2.0)
-    out = fabricate(tmp_path / "run", plan)
+    out = planted_run(tmp_path / "run", plan)
     run = read_conditions(out)
     (condition,) = run.conditions
     clip = condition.clips[0]

@@ -12,7 +12,7 @@ from harness.compare.paired_statistics import mean_interval
 from harness.report.figures.performer_table import PerformerColumn, performer_columns, table_lines, update_readme
 from harness.results.reader import ResultSet
 from tests.compare.sides import cell, manifest, side, write_run
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 COMMAND = "harness run made_up --methods ik,expert_map --out /tmp/x --jobs 2 --no-report"
 
@@ -77,7 +77,7 @@ def test_a_second_update_replaces_the_first(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_verb_puts_the_table_of_a_run_into_a_page(tmp_path: Path) -> None:
-    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0, "mean_pose": 8.0}))
+    out = planted_run(tmp_path / "run", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0, "mean_pose": 8.0}))
     page = tmp_path / "README.md"
     page.write_text("# Page\n")
     assert main(["report", str(out), "--readme", str(page), "--methods", "ik"]) == 0

@@ -11,7 +11,6 @@ from harness.report.figures.conditions import read_conditions
 from harness.report.figures.table import MetricValue, build_table
 from harness.results.storage import read_summary
 from tests.compare.sides import side, write_run
-from tests.report.fabricate_placement import write_made_up
 from tests.report.figures.made_up import ranked_run
 
 ANGLE = "joint_angle_mean_deg"
@@ -89,8 +88,8 @@ def test_what_was_not_measured_is_a_dash(tmp_path: Path) -> None:
     assert (one.low, one.high, one.formatted()[1]) == (None, None, "")
 
 
-def test_unknown_metrics_and_other_folders_are_refused(ranked: Path, tmp_path: Path) -> None:
+def test_unknown_metrics_and_other_folders_are_refused(ranked: Path, placement_study: Path) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'mpjpe_mm'"):
         build_table(ranked, ("mpjpe_m",))
     with pytest.raises(BadFile, match="a placement study; expected a run"):
-        build_table(write_made_up(tmp_path / "study"))
+        build_table(placement_study)

@@ -8,7 +8,6 @@ from harness.errors import BadFile, BadInput, HarnessError, UnknownName
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.figures.writer import KINDS, write_figure, write_results_table
 from harness.results.index import CellIndex
-from tests.report.fabricate_placement import write_made_up
 from tests.report.figures.made_up import ranked_run
 
 
@@ -31,8 +30,10 @@ def test_every_kind_of_a_run_is_drawn_the_same_twice(kind: str, framed: Path, tm
     assert first.kind == kind
 
 
-def test_a_placement_study_is_drawn_by_default(tmp_path: Path) -> None:
-    study = write_made_up(tmp_path / "study")
+def test_a_placement_study_is_drawn_by_default(placement_study: Path, tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / "findings.json").write_bytes((placement_study / "findings.json").read_bytes())
     figure = write_figure(study)
     assert (figure.path, figure.kind, figure.width_mm) == (study / "figures" / "placement.pdf", "placement", 170.0)
 
@@ -59,9 +60,9 @@ def test_choices_that_do_not_fit_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_kinds_of_a_run_are_refused_for_a_study(tmp_path: Path) -> None:
+def test_kinds_of_a_run_are_refused_for_a_study(placement_study: Path) -> None:
     with pytest.raises(BadInput, match=r"a placement study\. It is for a run\. Choose placement\."):
-        write_figure(write_made_up(tmp_path), "time")
+        write_figure(placement_study, "time")
 
 
 def test_formats_that_do_not_exist_are_refused(ranked: Path, tmp_path: Path) -> None:

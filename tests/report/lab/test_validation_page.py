@@ -1,175 +1,156 @@
 """The page of a validated capture: the answer comes first, the registration is shown, each station has its errors."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from harness.core.number_format import Interval
+from harness.core.number_format import Interval, format_fixed
 from harness.errors import ShapeError
 from harness.measure.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
-from harness.report.kit.style import to_svg
+from harness.report.lab.quantities import find_quantity
 from harness.report.lab.validation_page import (
     largest_of_stretches,
-    offsets_chart,
-    registration_sentences,
-    residuals_chart,
     validation_answer,
     validation_page,
 )
-from tests.report.drawing import texts_apart
-from tests.report.fabricate_lab import STATIONS
-from tests.report.fabricate_validation import (
-    NO_STAMPS,
-    SCORES,
-    made_up_validation,
-    without_exchange,
-    without_truth_of_time,
-)
-from tests.report.reading import read, text_of
+from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
+from tests.report.reading import count_pictures, emptied, numbers_in_order, section_ids, text_of
 
-ANSWER = (
-    "walk.is900rec lies 2.5 to 3.1 mm and 0.46 to 0.57 deg (median of each station) from its reference. It departs "
-    "from the preset default in 2 of 3 checks: latency (6.0 times as much), turn of the station against its mount of "
-    "head (2.98 deg)."
-)
+COMMAND = "harness validate walk.rec"
+SCORES: dict[str, dict[str, float | None]] = {
+    "ik": {"joint_angle_mean_deg": 5.31, "mpjpe_mm": 41.2},
+    "local_pca": {"joint_angle_mean_deg": 3.02, "mpjpe_mm": None},
+}
+pytestmark = pytest.mark.long
+SECTIONS = ["checks", "registration", "poses", "accuracy", "residuals", "scores", "capture", "command"]
 
 
-def written(folder: Path, report: ValidationReport) -> Path:
-    scores = SCORES if report.accuracy else {}
-    return write_page(validation_page(report, scores, "harness validate walk.rec"), folder / "new" / "walk.html")
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory, late_capture: ValidationReport) -> Path:
+    return write_page(
+        validation_page(late_capture, SCORES, COMMAND), tmp_path_factory.mktemp("page") / "new" / "a.html"
+    )
 
 
 def printed(report: ValidationReport) -> str:
-    return page_text(validation_page(report, SCORES, "harness validate walk.rec"))
+    return page_text(validation_page(report, SCORES, COMMAND))
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return written(tmp_path_factory.mktemp("validation"), made_up_validation())
-
-
-@pytest.fixture(scope="module")
-def figures() -> dict[str, Figure]:
-    found: dict[str, Figure] = {}
-
-    def keep(figure: Figure, name: str) -> str:
-        found[name] = figure
-        return to_svg(figure, name)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("harness.report.kit.chart.to_svg", keep)
-        offsets_chart(made_up_validation())
-        residuals_chart(made_up_validation())
-    return found
-
-
-def section_ids(page: Path) -> list[str]:
-    return [str(attributes["id"]) for name, attributes in read(page).found if name == "section"]
-
-
-def test_the_answer_is_the_heading_and_the_faults_follow(page: Path) -> None:
+def test_the_answer_is_the_heading_and_the_departure_follows(page: Path, late_capture: ValidationReport) -> None:
     text = text_of(page)
-    heading, exchanged = text.index(ANSWER), text.index("left_foot and right_foot are exchanged.")
-    late = text.index("Latency: 24.0 ms (23.6 to 24.4), expected 4 ms, 6.0 times as much.")
-    assert heading < exchanged < late < text.index("2,390 of 2,400 frames were matched (99.6 %).")
-    assert "Reference clip boxing_p1_01, 60.0 s at 120 Hz" in text
+    answer = validation_answer(late_capture)
+    medians = [1e3 * row.position.median.value for row in late_capture.accuracy.values()]
+    assert f"lies {min(medians):.1f} to {max(medians):.1f} mm and " in answer
+    assert f"in 1 of {len(late_capture.checks)} checks: latency (" in answer
+    late = f"Latency: {find_quantity('latency_s').of(late_capture.numbers['latency_s'])}, expected "
+    matched = f"{late_capture.matched_frames:,} of {late_capture.expected_frames:,} frames were matched"
+    assert text.index(answer) < text.index(late) < text.index(matched)
+    assert f"Reference {late_capture.truth}" in text
+    without = validation_answer(replace(late_capture, checks=()))
+    assert without == answer.partition(" It departs")[0]
 
 
-def test_every_section_is_there(page: Path) -> None:
-    sections = ["checks", "registration", "poses", "accuracy", "residuals", "scores", "capture", "command"]
-    assert section_ids(page) == sections
-    pictures = [a for name, a in read(page).found if name in ("img", "svg") and (a.get("alt") or a.get("aria-label"))]
-    assert len(pictures) == 2
+def test_exchanged_stations_are_named_first(exchanged_capture: ValidationReport, tmp_path: Path) -> None:
+    text = text_of(write_page(validation_page(exchanged_capture, {}, COMMAND), tmp_path / "a.html"))
+    first, second = exchanged_capture.exchanged
+    answer = validation_answer(exchanged_capture)
+    assert f"It shows no departure from the preset default in {len(exchanged_capture.checks)} checks." in answer
+    assert text.index(answer) < text.index(first) < text.index(second) < text.index("frames were matched")
+    assert page_text(validation_page(exchanged_capture, {}, COMMAND)).count(f"\n- {first}") == 1
 
 
-def test_numbers_have_their_intervals(page: Path) -> None:
+def test_every_section_has_its_numbers_and_their_intervals(page: Path, late_capture: ValidationReport) -> None:
+    assert section_ids(page) == SECTIONS
+    assert count_pictures(page) == 2
     text = text_of(page)
-    assert "difference of the two time offsets 2.0 ms 1.4 to 2.6" in text
-    assert "heading error 0.06 deg −0.52 to 1.15" in text
-    assert "room 0 −1.5 to 1.5 −20.0 −21.5 to −18.5 2,500.0 2,498.5 to 2,501.5 1.0000 0.0000" in text
-    assert "head on head_bone 50.0" in text
-    assert "0.0000 ± 0.20 deg" in text
-    assert "head 2.50 2.38 to 2.62 3.20 3.04 to 3.36 7.10 6.75 to 7.46 0.458 0.435 to 0.481 0.573" in text
-    assert "2,390 0.40 %" in text
+    for key, number in late_capture.numbers.items():
+        assert numbers_in_order(text, find_quantity(key).label, find_quantity(key).of(number)), key
+    for pose in late_capture.poses:
+        name = f"{pose.name} on {pose.body}" if pose.body else pose.name
+        numbers = [
+            *(axis.scaled(1e3) for axis in pose.position_m),
+            *(format_fixed(float(q), 4) for q in pose.rotation),
+        ]
+        assert numbers_in_order(text, name, *numbers, f"± {math.degrees(pose.angle_rad):.2f} deg"), name
+    for station, row in late_capture.accuracy.items():
+        numbers = [q.scaled(1e3) for q in (row.position.median, row.position.rms, row.position.quantile95)]
+        numbers += [q.scaled(math.degrees(1.0)) for q in (row.orientation.median, row.orientation.rms)]
+        lost = f"{100.0 * row.lost_share:.2f} %"
+        assert numbers_in_order(text, f"{station} ", *numbers, f"{row.readings:,}", lost), station
     assert "local_pca 3.02 not measured" in text
 
 
-def test_without_departures_all_checks_are_there(tmp_path: Path) -> None:
-    text = text_of(written(tmp_path, without_exchange()))
-    assert "It shows no departure from the preset default in 3 checks." in text
-    assert "scale error all 0.09 % −0.01 to 0.19 0 % 0.078" in text
-
-
-def test_a_report_without_content_makes_a_page(tmp_path: Path) -> None:
-    report = without_truth_of_time()
-    page = written(tmp_path, report)
+def test_a_report_without_content_makes_a_page(tmp_path: Path, late_capture: ValidationReport) -> None:
+    """A stream without stamps shows no offset; its reason stands in the place of the number."""
+    numbers = {"time_offset_position_s": Interval.missing("The stream has no stamps.")}
+    capture = replace(late_capture.capture, stretches=())
+    empty = ("poses", "checks", "residuals", "notes")
+    report = replace(late_capture, numbers=numbers, accuracy={}, capture=capture, **emptied(empty))
+    page = write_page(validation_page(report, {}, COMMAND), tmp_path / "a.html")
     assert section_ids(page) == ["registration", "command"]
-    assert f"time offset by position not measured time offset by position: {NO_STAMPS}" in text_of(page)
-    assert validation_answer(report).startswith("No expected number could be compared with walk.is900rec")
-    assert registration_sentences(report) == ["2,390 of 2,400 frames were matched (99.6 %)."]
+    assert "time offset by position not measured time offset by position: The stream has no" in text_of(page)
+    assert validation_answer(report).startswith(f"No expected number could be compared with {report.name}")
+    assert "Estimated" not in text_of(page)
 
 
-def test_reasons_stand_below_the_accuracy(tmp_path: Path) -> None:
-    full = made_up_validation()
+def test_reasons_stand_below_the_accuracy(late_capture: ValidationReport) -> None:
+    """Stations with one reason share its line, and the answer is over the others."""
     short = Interval.missing("The capture is too short.")
-    places = ErrorQuantiles(short, short, short)
-    rows = {station: replace(full.accuracy[station], position=places) for station in STATIONS[:2]}
-    report = replace(full, accuracy={**full.accuracy, **rows})
-    text = f"{STATIONS[0]}, {STATIONS[1]}: The capture is too short."
-    assert text in text_of(written(tmp_path, report))
-    assert f"not measured: {text}" in printed(report)
-    assert "not measured: " not in printed(full)
-    assert validation_answer(report).startswith("walk.is900rec lies 2.8 to 3.1 mm")
+    first, second, *others = late_capture.accuracy
+    rows = {
+        station: replace(late_capture.accuracy[station], position=ErrorQuantiles(short, short, short))
+        for station in (first, second)
+    }
+    report = replace(late_capture, accuracy={**late_capture.accuracy, **rows})
+    assert f"not measured: {first}, {second}: {short.reason}" in printed(report)
+    assert "not measured: " not in printed(late_capture)
+    medians = [1e3 * late_capture.accuracy[station].position.median.value for station in others]
+    assert f"lies {min(medians):.1f} to {max(medians):.1f} mm" in validation_answer(report)
 
 
-def test_without_checks_the_answer_has_the_errors_alone() -> None:
-    answer = validation_answer(replace(made_up_validation(), checks=()))
-    assert answer == ANSWER.partition(" It departs")[0]
+def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path, late_capture: ValidationReport) -> None:
+    again = write_page(validation_page(late_capture, SCORES, COMMAND), tmp_path / "a.html")
+    assert again.read_bytes() == page.read_bytes()
 
 
-def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path) -> None:
-    assert written(tmp_path, made_up_validation()).read_bytes() == page.read_bytes()
-
-
-def test_the_terminal_has_the_answer_first_and_every_number() -> None:
-    lines = printed(made_up_validation()).splitlines()
-    assert " ".join(lines[:3]) == ANSWER
-    assert lines[3] == "- left_foot and right_foot are exchanged."
-    assert max(map(len, lines)) <= 118
-    text = "\n".join(lines)
-    for title in ("checks", "registration", "room and mounts", "accuracy", "reconstruction"):
+def test_the_terminal_has_the_answer_first_and_every_number(late_capture: ValidationReport) -> None:
+    text = printed(late_capture)
+    assert " ".join(text.split()).startswith(validation_answer(late_capture))
+    assert max(map(len, text.splitlines())) <= 118
+    for title in ("checks", "registration", "room and mounts", "accuracy", "reconstruction", "capture"):
         assert f"\n\n{title}\n" in text
-    assert "head                2.50      3.20       7.10" in text
-    assert "not measured: time offset by position: The stream" in printed(without_truth_of_time())
-    assert "Latency is known to 0.4 ms" in text
+    for note in late_capture.notes:
+        assert note in " ".join(text.split())
+    for station, row in late_capture.accuracy.items():
+        assert numbers_in_order(text, f"\n{station} ", row.position.median.scaled(1e3).number, f"{row.readings:,}")
 
 
-def test_the_two_offsets_have_their_intervals(figures: dict[str, Figure]) -> None:
+def test_charts_have_both_offsets_and_the_errors_of_each_station(late_capture: ValidationReport) -> None:
+    figures = drawn_figures(lambda: draw_page(validation_page(late_capture, {}, "")))
+    for figure in figures.values():
+        texts_apart(figure)
     (axes,) = figures["offsets"].axes
-    values = [np.asarray(line.get_xdata(), dtype=float).tolist() for line in axes.lines]
-    assert values == [pytest.approx(each) for each in ([23.6, 24.4], [24.0], [21.5, 22.5], [22.0])]
+    offsets = [late_capture.numbers[f"time_offset_{of}_s"] for of in ("orientation", "position")]
+    expected = [x for one in offsets for x in ([1e3 * one.low, 1e3 * one.high], [1e3 * one.value])]
+    assert [points(line)[0].tolist() for line in axes.lines] == [pytest.approx(each) for each in expected]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["by orientation", "by position"]
-    texts_apart(figures["offsets"])
-
-
-def test_each_station_has_its_errors_in_millimetres_and_degrees(figures: dict[str, Figure]) -> None:
-    axes = figures["residuals"].axes
-    assert len(axes) == 2 * len(STATIONS)
-    one = made_up_validation().residuals[0]
-    drawn_mm, drawn_deg = (np.asarray(each.lines[0].get_ydata(), dtype=float) for each in axes[:2])
-    assert np.nanmax(drawn_mm) == pytest.approx(1e3 * np.nanmax(one.position_m))
-    assert np.nanmax(drawn_deg) == pytest.approx(np.degrees(np.nanmax(one.angle_rad)))
-    assert [each.get_title(loc="left") for each in axes[:3]] == ["head: position [mm]", "orientation [deg]", "pelvis"]
+    panels, stations = figures["residuals"].axes, list(late_capture.accuracy)
+    assert len(panels) == 2 * len(stations)
+    for n, one in enumerate(late_capture.residuals):
+        drawn_mm, drawn_deg = (points(each.lines[0])[1] for each in panels[2 * n : 2 * n + 2])
+        assert np.nanmax(drawn_mm) == pytest.approx(1e3 * np.nanmax(one.position_m))
+        assert np.nanmax(drawn_deg) == pytest.approx(np.degrees(np.nanmax(one.angle_rad)))
+    titles = [each.get_title(loc="left") for each in panels[:3]]
+    assert titles == [f"{stations[0]}: position [mm]", "orientation [deg]", stations[1]]
 
 
 def test_long_series_keep_their_largest_error_and_their_gaps() -> None:
-    time_s = np.arange(5000.0)
-    values = np.zeros(5000)
+    time_s, values = np.arange(5000.0), np.zeros(5000)
     values[1234] = 9.0
     values[2000:2010] = np.nan
     times, largest = largest_of_stretches(time_s, values)
@@ -177,10 +158,9 @@ def test_long_series_keep_their_largest_error_and_their_gaps() -> None:
     assert largest[246] == 9.0
     assert np.isnan(largest[400:402]).all()
     assert not np.isnan(largest[402:]).any()
-    short_s, short = largest_of_stretches(time_s[:7], values[:7])
-    assert short_s.tolist() == time_s[:7].tolist()
-    assert short.tolist() == values[:7].tolist()
-    assert [len(each) for each in largest_of_stretches(np.zeros(0), np.zeros(0))] == [0, 0]
+    for length in (7, 0):
+        short_s, short = largest_of_stretches(time_s[:length], values[:length])
+        assert (short_s.tolist(), short.tolist()) == (time_s[:length].tolist(), values[:length].tolist())
 
 
 def test_series_that_do_not_fit_are_refused() -> None:

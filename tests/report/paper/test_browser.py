@@ -1,13 +1,13 @@
 """The page of a paper in a browser, at the widths of a desktop and of a phone: it fits, and it loads nothing."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from harness.report.paper.page import write_paper_page
-from tests.report.fabricate_paper import liu, write_study
+from tests.report.paper.findings import liu, write_study
+from tests.report.watching import is_whole_and_quiet
 
 
 @pytest.fixture(scope="module")
@@ -15,42 +15,22 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_paper_page(write_study(tmp_path_factory.mktemp("browser") / "study", liu()))
 
 
-@pytest.fixture(params=[1280, 390])
-def page(request: pytest.FixtureRequest, browser: Any, page_file: Path) -> Iterator[Any]:
-    opened = browser.new_page(viewport={"width": request.param, "height": 844})
-    opened.goto(page_file.as_uri())
-    yield opened
-    opened.close()
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_is_whole_and_quiet(browser: Any, page_file: Path, width: int) -> None:
+    assert is_whole_and_quiet(browser, page_file, width)[0] == 3
 
 
-def test_the_page_is_whole(page: Any) -> None:
-    width = page.viewport_size["width"]
-    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
-    assert page.evaluate("document.documentElement.scrollWidth") <= width, "the page scrolls sideways"
-    page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
-    sizes = page.evaluate("[...document.images].map((image) => [image.naturalWidth, image.naturalHeight, image.alt])")
-    assert len(sizes) == 3
-    assert all(w > 0 and h > 0 and alt for w, h, alt in sizes)
-
-
-def test_the_page_asks_nothing_of_anyone(browser: Any, page_file: Path) -> None:
-    seen: list[str] = []
-    opened = browser.new_page()
-    opened.on("request", lambda r: None if r.url.startswith(("data:", page_file.as_uri())) else seen.append(r.url))
-    opened.on("console", lambda message: seen.append(message.text))
-    opened.on("pageerror", lambda error: seen.append(str(error)))
-    opened.goto(page_file.as_uri())
-    assert seen == []
-    opened.close()
-
-
-def test_each_figure_of_a_claim_has_its_name_beside_it_on_a_phone(page: Any) -> None:
+@pytest.mark.parametrize("width", [1280, 390])
+def test_each_figure_of_a_claim_has_its_name_beside_it_on_a_phone(browser: Any, page_file: Path, width: int) -> None:
     """The head of the table is not shown there, but read out; the rows are still rows of a table."""
-    phone = page.viewport_size["width"] < 640
+    page = browser.new_page(viewport={"width": width, "height": 844})
+    page.goto(page_file.as_uri())
     name = "(cell) => getComputedStyle(cell, '::before').content"
     cell = page.get_by_role("table", name="claims", exact=True).locator("td").first
-    assert cell.evaluate(name) == ('"kind"' if phone else "none")
+    assert cell.evaluate(name) == ('"kind"' if width < 640 else "none")
     table = page.get_by_role("table", name="claims", exact=True)
     assert table.get_by_role("columnheader").count() == 7
-    assert table.get_by_role("rowheader").count() == 16 + 4
+    claims = [len(experiment.claims) for experiment in liu().experiments if experiment.claims]
+    assert table.get_by_role("rowheader").count() == sum(claims) + len(claims)
     assert table.get_by_role("cell", name="reproduced").first.is_visible()
+    page.close()

@@ -18,7 +18,7 @@ from harness.report.kit.style import COLOURS
 from harness.report.paper.charts import figure_charts, figure_table
 from harness.report.paper.figures import draw_bars, draw_lines, height_in, is_horizontal
 from harness.results.findings import BarChart, LineChart, PaperExperiment
-from tests.report.fabricate_paper import METHODS, curves, liu, sets
+from tests.report.paper.findings import METHODS, curves, liu, sets
 
 EMPTY = PaperExperiment("empty", "", "", ())
 PLACES = {name: n for n, name in enumerate(("kernel_cca", "dynamic_map", "local_pca", "ik", "a", "b"))}
@@ -135,6 +135,6 @@ def test_the_table_of_a_figure_has_every_number() -> None:
     shown = sets("boxing")
     rows = figure_table(shown).rows
     assert len(rows) == 31
-    for row, group, value in zip(rows, shown.groups, shown.series["kernel_cca"], strict=True):
-        assert value is not None
-        assert row == (group, str(Interval.of(value, 0.9 * value, 1.15 * value)))
+    columns = (shown.groups, shown.series["kernel_cca"], shown.low["kernel_cca"], shown.high["kernel_cca"])
+    for row, group, value, low, high in zip(rows, *columns, strict=True):
+        assert row == (group, str(Interval.of(value, low, high)))

@@ -13,23 +13,19 @@ from harness.report.placement.wording import (
     power_sentences,
     ranks_by_condition,
 )
-from harness.results.placement_findings import (
-    BestSet,
-    ChangedOrder,
-    PlacementFindings,
-    RankAgreement,
-    StatisticalPower,
-)
-from tests.report.fabricate_placement import made_up
+from harness.results.placement_findings import BestSet, ChangedOrder, PlacementFindings, RankAgreement, StatisticalPower
 
 POWER = StatisticalPower(
     *(16, 165, "deg", 13, 590.0, 480.0, 0.4, 0.7, 1.02, 0.3, 190, 7000.0, 4),
 )
 
 
+CHOSEN = " Sets were chosen on 7 clips of 1 performer, this performer only."
+
+
 @pytest.fixture(scope="module")
-def findings() -> PlacementFindings:
-    return replace(made_up(), power=POWER)
+def findings(placement: PlacementFindings) -> PlacementFindings:
+    return replace(placement, power=POWER)
 
 
 def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFindings) -> None:
@@ -38,10 +34,10 @@ def test_the_answer_is_of_the_size_that_was_asked_for(findings: PlacementFinding
     tied = replace(tested, ties=(("head", "pelvis"), ("sternum", "pelvis")), of=55)
     asked = replace(findings, sizes=(2,), best=(findings.best[0], tied, findings.best[2]))
     assert placement_sentence(asked) == (
-        "Best two stations for walking: both ankles, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of the "
-        "54 other pairs that were tried: head + pelvis; sternum + pelvis. Sets were chosen on 8 clips."
+        "Best two stations for walking: left hand + pelvis, 2.0 deg (1.8 to 2.2) on 16 held-out units; tied with 2 of "
+        f"the 54 other pairs that were tried: head + pelvis; sternum + pelvis.{CHOSEN}"
     )
-    assert placement_text(asked).startswith("Best two stations for walking: both ankles")
+    assert placement_text(asked).startswith("Best two stations for walking: left hand + pelvis")
     assert placement_page(asked).headline == placement_sentence(asked)
 
 
@@ -49,12 +45,12 @@ def test_every_size_that_was_asked_for_has_its_sentence(findings: PlacementFindi
     asked = replace(findings, sizes=(1, 3, 4), behaviours=("walking", "table_tennis"))
     said = placement_sentence(asked)
     assert said.startswith("Best station for walking and table tennis: ")
-    assert "Best three stations for walking and table tennis: both ankles + pelvis, " in said
-    assert said.endswith("No set of 4 stations was measured. Sets were chosen on 8 clips.")
+    assert "Best three stations for walking and table tennis: both hands + pelvis, " in said
+    assert said.endswith(f"No set of 4 stations was measured.{CHOSEN}")
 
 
 def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: PlacementFindings) -> None:
-    alone = BestSet(findings.best[0].stations, of=11)
+    alone = BestSet(findings.best[0].stations, of=3)
     said = placement_sentence(replace(findings, sizes=(1,), best=(alone,)))
     assert "on the clips on which it was chosen; no other place is tied with it." in said
     assert "no other place was tried" in placement_sentence(replace(findings, sizes=(1,), best=(replace(alone, of=1),)))
@@ -63,12 +59,10 @@ def test_without_ties_and_without_held_out_clips_the_answer_says_so(findings: Pl
 def test_clips_that_cannot_tell_sets_apart_are_no_tie(findings: PlacementFindings) -> None:
     best = findings.best[0]
     others = tuple((place.name,) for place in findings.candidates if (place.name,) != best.stations)
-    asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=11),))
-    assert placement_sentence(asked).endswith(
-        " 8 units cannot tell it from the other 10 places (13 might). Sets were chosen on 8 clips."
-    )
-    enough = replace(asked, power=replace(POWER, least_clips=8))
-    assert "tied with 10 of the 10 other places that were tried: " in placement_sentence(enough)
+    asked = replace(findings, sizes=(1,), best=(replace(best, ties=others, of=3),))
+    assert placement_sentence(asked).endswith(f" cannot tell it from the other 2 places (13 might).{CHOSEN}")
+    enough = replace(asked, power=replace(POWER, least_clips=1))
+    assert "tied with 2 of the 2 other places that were tried: " in placement_sentence(enough)
     two = replace(enough, best=(replace(best, ties=others[:1], of=2),))
     assert "tied with the only other place that was tried: " in placement_sentence(two)
 
@@ -115,7 +109,8 @@ def test_durations_are_rough(seconds: float | None, said: str) -> None:
 
 def test_sets_have_a_rank_under_each_condition(findings: PlacementFindings) -> None:
     means = ((2.0, 1.0, 3.0), (2.0, 2.0, None), (1.0, 2.0, 3.0))
-    conditions = tuple(replace(c, means=m) for c, m in zip(findings.conditions, means, strict=True))
+    like = (*findings.conditions, findings.conditions[-1])
+    conditions = tuple(replace(c, means=m) for c, m in zip(like, means, strict=True))
     few = replace(findings, compared=(("head",), ("pelvis",), ("sternum",)), conditions=conditions)
     assert ranks_by_condition(few, 9) == [
         (("pelvis",), [1, 1, 2]),
@@ -146,10 +141,16 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
     assert changes_sentence(findings, replace(pair, changes=0, changed=())) == "no pair of 10 changes its order"
 
 
-def test_the_answer_states_how_many_performers_the_clips_are_of() -> None:
-    units = [f"performer {k}" for k in range(1, 7)]
-    clips = [f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)]
-    for sizes in ((), (2,)):
-        assert placement_sentence(replace(made_up(units), sizes=sizes)).endswith(" Sets were chosen on 6 performers.")
-        earlier = placement_sentence(replace(made_up(clips), sizes=sizes))
-        assert earlier.endswith(" Sets were chosen on 6 clips of 3 performers.")
+@pytest.mark.parametrize(
+    ("clips", "said"),
+    [
+        ([f"performer {k}" for k in range(1, 7)], " Sets were chosen on 6 performers."),
+        ([f"walking_p{1 + k % 3}_{k:02d}" for k in range(1, 7)], " Sets were chosen on 6 clips of 3 performers."),
+    ],
+)
+@pytest.mark.parametrize("sizes", [(), (2,)])
+def test_the_answer_states_how_many_performers_the_clips_are_of(
+    clips: list[str], said: str, sizes: tuple[int, ...], findings: PlacementFindings
+) -> None:
+    tried = tuple(replace(one, errors=dict(zip(clips, one.errors.values(), strict=False))) for one in findings.tried)
+    assert placement_sentence(replace(findings, tried=tried, sizes=sizes)).endswith(said)

@@ -10,7 +10,7 @@ import pytest
 
 from harness.report.run.data import read_run
 from harness.report.run.page import write_run_page
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 pytestmark = pytest.mark.long
 METHODS = {"expert_map": 1.0, "ik": 4.0} | {f"method_{n}": 2.0 + n for n in range(11)}
@@ -20,7 +20,7 @@ METHODS = {"expert_map": 1.0, "ik": 4.0} | {f"method_{n}": 2.0 + n for n in rang
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of 13 methods with its page; rendered where that is possible."""
     plan = Plan(methods=METHODS, behaviours=("walking",), takes=2, duration_s=4.0)
-    out = fabricate(tmp_path_factory.mktemp("first") / "run", plan)
+    out = planted_run(tmp_path_factory.mktemp("first") / "run", plan)
     write_run_page(out)
     return out
 
@@ -50,7 +50,7 @@ def test_the_first_screen_has_verdict_ranking_and_picture_and_3d_follows(page: A
 
 
 def test_a_picture_that_is_missing_is_explained_in_its_place(browser: Any, run_folder: Path, tmp_path: Path) -> None:
-    out = fabricate(tmp_path / "run", Plan(methods={"ik": 2.0}, behaviours=("walking",), duration_s=3.0))
+    out = planted_run(tmp_path / "run", Plan(methods={"ik": 2.0}, behaviours=("walking",), duration_s=2.5))
     opened = browser.new_page(viewport={"width": 1400, "height": 900})
     opened.goto(write_run_page(out, rendered=False).as_uri())
     text = opened.locator(".overview .still").inner_text()

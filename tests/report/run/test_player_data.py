@@ -15,7 +15,7 @@ from harness.report.run.data import pose_pair, read_run
 from harness.report.run.player_data import run_motion, station_poses
 from harness.report.run.worst_window import WorstWindow, find_worst_window
 from harness.score.pair import compute_poses
-from tests.report.fabricate import METHODS, Plan, fabricate
+from tests.planted import METHODS, Plan, planted_run
 
 METRIC = "mpjpe_mm"
 
@@ -33,7 +33,10 @@ def motion_of(out: Path) -> tuple[PlayerMotion, str]:
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return fabricate(tmp_path_factory.mktemp("player") / "run", Plan(duration_s=4.0, covered=0.8))
+    return planted_run(
+        tmp_path_factory.mktemp("player") / "run",
+        Plan(duration_s=4.0, covered=0.8, components={"dropout": {"share": 0.1}}),
+    )
 
 
 def test_every_clip_has_every_method_the_best_first(run_folder: Path) -> None:
@@ -123,7 +126,7 @@ def test_a_still_larger_run_shows_the_worst_seconds(run_folder: Path, monkeypatc
 
 
 def test_clips_of_several_seeds_are_told_apart(tmp_path: Path) -> None:
-    run = read_run(fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0)))
+    run = read_run(planted_run(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 1.0}, duration_s=2.0)))
     both = [*run.cells, {**run.cells[0], "seed": 2}]
     summary = {**run.summary, "cells": both}
     motion, _ = run_motion(type(run)(run.out, run.manifest, summary, run.traces, summary), {}, run.cell)

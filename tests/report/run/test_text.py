@@ -7,14 +7,14 @@ import pytest
 from harness.report.run.text import MOST_ROWS, run_table
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
 
 @pytest.fixture(scope="module")
 def summary(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Fourteen methods on two behaviours; the first is best."""
     methods = {f"m{n:02d}": 1.0 + 0.5 * n for n in range(14)}
-    out = fabricate(tmp_path_factory.mktemp("text") / "run", Plan(methods=methods, takes=1, duration_s=2.0))
+    out = planted_run(tmp_path_factory.mktemp("text") / "run", Plan(methods=methods, takes=1, duration_s=2.0))
     return read_summary(out)
 
 

@@ -15,30 +15,30 @@ from harness.report.run.joint_errors import error_against_sigma
 from harness.report.run.page import write_run_page
 from harness.report.run.tables import results_tables, sigma_table
 from harness.results.storage import read_summary
-from tests.report.fabricate import Plan, fabricate
+from tests.planted import Plan, planted_run
 
-LATE = "user:Smooth (lag 2)"
+LATE = "smooth (lag 2)"
 
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two methods that state standard deviations, of which one is late, as is the most accurate one."""
     plan = Plan(
-        methods={"ik": 2.0, "gauss": 1.5, "user:Smooth": 0.5, "gauss[lag=2]": 1.0},
-        sigma_deg={"gauss": 2.5, "gauss[lag=2]": 1.0},
-        lags={"user:Smooth": 2, "gauss[lag=2]": 2},
+        methods={"ik": 2.0, "gauss": 1.5, "smooth": 0.5, "late": 1.0},
+        sigma_deg={"gauss": 2.5, "late": 1.0},
+        lags={"smooth": 2, "late": 2},
         takes=10,
-        duration_s=2.5,
+        duration_s=2.0,
         behaviours=("walking",),
     )
-    out = fabricate(tmp_path_factory.mktemp("sigma") / "run", plan)
+    out = planted_run(tmp_path_factory.mktemp("sigma") / "run", plan)
     write_run_page(out, rendered=False)
     return out
 
 
 def test_the_late_methods_are_named_and_ranked_apart(run_folder: Path) -> None:
     run = read_run(run_folder)
-    assert set(run.series) == {"ik", "gauss", LATE, "gauss[lag=2]"}
+    assert set(run.series) == {"ik", "gauss", LATE, "late (lag 2)"}
     verdict, lowest = run_verdict(run)
     assert lowest == "gauss"
     assert verdict.startswith("gauss is best: ")
@@ -58,7 +58,7 @@ def test_each_group_has_its_bold_cell(run_folder: Path) -> None:
 
 
 def test_a_run_of_causal_methods_has_none_of_this(tmp_path: Path) -> None:
-    out = fabricate(tmp_path / "run", Plan(methods={"ik": 2.0, "gauss": 1.5}, behaviours=("walking",)))
+    out = planted_run(tmp_path / "run", Plan(methods={"ik": 2.0, "gauss": 1.5}, behaviours=("walking",)))
     page = write_run_page(out, rendered=False).read_text(encoding="utf-8")
     assert LAG_NOTE not in page
     assert "Stated uncertainty" not in page
@@ -77,8 +77,8 @@ def test_the_table_has_the_scores_of_the_summary(run_folder: Path) -> None:
     table = re.sub(r"<[^>]*>", "|", page_table(sigma_table(read_run(run_folder))))
     texts = [text.strip() for text in table.split("|") if text.strip()]
     pooled = {row["method"]: row["sigma_scores"] for row in read_summary(run_folder)["behaviours"]}
-    for method in ("gauss", "gauss[lag=2]"):
-        row = texts[texts.index(method) :]
+    for method in ("gauss", "late"):
+        row = texts[texts.index(f"{method} (lag 2)" if method == "late" else method) :]
         assert row[1] == "walking"
         assert row[2] == f"{100.0 * pooled[method]['sigma_coverage_1']:.1f}"
         assert row[3] == f"{100.0 * pooled[method]['sigma_coverage_2']:.1f}"

@@ -30,25 +30,33 @@ from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collec
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
 from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
 from harness.results.index import CellIndex
+from harness.results.integrity import compute_digests
 from harness.results.reported_metrics import PRIMARY_METRIC
+from tests.planted import SweepPlan, planted_sweep
 from tests.report.drawing import texts_apart
-from tests.report.fabricate import Plan as RunPlan
-from tests.report.fabricate import fabricate
-from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of
 from tests.report.watching import is_whole_and_quiet
 
+pytestmark = pytest.mark.long
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- -->"
 RATE, NOISE = "tracker.rate_hz", "noise"
-VARIED = Plan(vary={RATE: (120, 20, 60), NOISE: ("clean", "default")}, failing=("local_pca",), to_come=5)
+VARIED = SweepPlan(vary={RATE: (120.0, 20.0, 60.0), NOISE: ("clean", "default")}, failing=("local_pca",))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep folder with its page."""
-    out = fabricate_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
+    out = planted_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
+    with CellIndex(out) as index:
+        index.expect([f"to come {n}" for n in range(5)])  # as of a sweep that was made larger, and stopped
+        index.write_digest(compute_digests(out))
     write_sweep_page(out)
     return out
+
+
+def sweep_command(folder: Path) -> str:
+    with CellIndex(folder, read_only=True) as index:
+        return str(index.facts()["command"])
 
 
 @pytest.fixture
@@ -126,8 +134,9 @@ def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folde
     assert "84 cells: ValueError: <b>no</b> pose & no plan" in said
     assert "and 64 more" in said
     assert said.count("Traceback (most recent call last)") == 1
-    assert said.count(COMMAND) == 3
-    assert f"{COMMAND} --cell {shlex.quote(failed[0])}" in said
+    command = sweep_command(folder)
+    assert said.count(command) == 3
+    assert f"{command} --cell {shlex.quote(failed[0])}" in said
     assert "FAILED 84, such as walking seed 1: local_pca on walking_p1_01" in sweep_text(read_sweep(folder))
 
 
@@ -142,30 +151,34 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("plan", "said"),
     [
-        (Plan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
-        (Plan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")), "6 of 6 cells finished. Nothing was measured."),
-        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to run."),
-        (Plan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
-        (Plan(performers=("known", "new")), "dynamic_map (known) has the lowest mean joint-angle error, "),
-        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
+        (SweepPlan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
+        (
+            SweepPlan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")),
+            "6 of 6 cells finished. Nothing was measured.",
+        ),
+        (SweepPlan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
+        (SweepPlan(known=4), "dynamic_map (known) has the lowest mean joint-angle error, "),
+        (SweepPlan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
     ],
 )
-def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
-    page = write_sweep_page(fabricate_sweep(tmp_path, plan))
+def test_nothing_is_too_little_to_be_told(plan: SweepPlan, said: str, tmp_path: Path) -> None:
+    page = write_sweep_page(planted_sweep(tmp_path / "out", plan))
     shown = text_of(page)
     assert said in shown
-    assert said in sweep_text(read_sweep(tmp_path))
+    assert said in sweep_text(read_sweep(tmp_path / "out"))
     assert "nan" not in shown.lower().split()
 
 
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(known=4)))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
     assert sweep_sentence(sweep).count("has the lowest mean joint-angle error") == 2
 
 
 def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), vary={NOISE: ("clean", "default")})))
+    sweep = read_sweep(
+        planted_sweep(tmp_path / "out", SweepPlan(scenarios=("walking",), vary={NOISE: ("clean", "default")}))
+    )
     first, *others = sweep.clips
     takes = [name.rpartition(": ")[2].partition("@")[0] for name in sweep.clips]
     owner = {take: "Anna" if take == takes[0] else f"performer of {take}" for take in takes} | {takes[1]: "Anna"}
@@ -184,15 +197,15 @@ def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), seeds=(1, 2, 3))))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(scenarios=("walking",), seeds=(1, 2, 3))))
     assert len(sweep) == 63
     assert sweep.statistic(PRIMARY_METRIC, sweep.select(0, 0)).clips == 7
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
-    few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
-    alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
+    few = planted_sweep(tmp_path / "few", SweepPlan(scenarios=("walking",), clips=5))
+    alike = planted_sweep(tmp_path / "alike", SweepPlan(methods={"ik": 1.5, "local_pca": 1.5}))
     assert sweep_sentence(read_sweep(few)).endswith(
         "but cannot be called better than any of the other 2 (too few units: 5, of at least 6)."
     )
@@ -205,9 +218,9 @@ def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
 def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Path) -> None:
     """Six performers are too few for 4 lines, as 4 * 2 / 2^6 is above 0.05, however many clips they have."""
     for clips, columns in ((6, 0), (10, 3)):
-        plan = Plan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=clips)
+        plan = SweepPlan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=clips)
         out = tmp_path / str(clips)
-        page = write_sweep_page(fabricate_sweep(out, plan)).read_text(encoding="utf-8")
+        page = write_sweep_page(planted_sweep(out, plan)).read_text(encoding="utf-8")
         sweep = read_sweep(out)
         over_all = sweep.statistic(PRIMARY_METRIC, sweep.select(series=sweep.series.index("dynamic_map"))).mean
         table = page.split(f'aria-label="{PRIMARY_METRIC}"')[-1].split("</table>")[0]
@@ -217,7 +230,7 @@ def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Pat
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=5, vary={NOISE: ("clean", "default")})))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=5, vary={NOISE: ("clean", "default")})))
     points = [point for curve in curves(sweep, sweep.keys[0], 0).values() for point in curve]
     assert len(points) == 6
     assert all(point.mean is not None and point.low is None for point in points)
@@ -235,7 +248,7 @@ def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
 def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     """The late method has the lowest error of all; without its lag it would be the only best one."""
     methods = {"ik": 6.0, "good": 2.0, "late": 0.1}
-    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=10, methods=methods, lags={"late": 2})))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=10, methods=methods, lags={"late": 2})))
     assert sweep.series == ("ik", "good", "late (lag 2)")
     causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sweep_sentence(sweep))
     assert "good is best: " in causal
@@ -244,21 +257,24 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
     table = str(page_table(scenario_table(sweep, PRIMARY_METRIC)))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
-    plain = read_sweep(fabricate_sweep(tmp_path / "plain", Plan(clips=10, methods=methods)))
+    plain = read_sweep(planted_sweep(tmp_path / "plain", SweepPlan(clips=10, methods=methods)))
     assert "late is best: " in sweep_sentence(plain)
     assert "lag" not in sweep_sentence(plain)
 
 
-def test_hostile_names_stay_text(tmp_path: Path) -> None:
-    plan = Plan(
-        scenarios=(HOSTILE,), methods={HOSTILE: 1.0, "ik": 2.0}, vary={HOSTILE: (HOSTILE, "b")}, failing=("ik",)
-    )
-    page = write_sweep_page(fabricate_sweep(tmp_path, plan))
-    raw = page.read_text(encoding="utf-8")
+def test_hostile_names_stay_text() -> None:
+    """Names of clips and words of a scenario are a user's."""
+    key = json.dumps(HOSTILE)
+    rows = [
+        (HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, "", f"{{{key}:{value}}}", *([1.0] * len(READ_METRICS)))
+        for value in (key, '"b"')
+    ]
+    sweep = collect_cells(iter(rows), name=HOSTILE, planned=3, failures={HOSTILE: HOSTILE})
+    raw = page_html(sweep_page(sweep))
     assert "<script>alert" not in raw
-    assert read(page).text.count(HOSTILE) > 5
+    assert raw.count("&lt;script&gt;alert(1)&lt;/script&gt;") > 5
     assert not re.search(r"(?:src|href)=\"(?!data:|#)", raw)
-    assert HOSTILE in sweep_text(read_sweep(tmp_path))
+    assert HOSTILE in sweep_text(sweep)
 
 
 def test_names_and_values_on_a_chart_do_not_meet() -> None:
@@ -313,19 +329,16 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The verb reads the cells too: a sweep with a damaged one is refused."""
-    fabricate(tmp_path, RunPlan(behaviours=("walking",), methods={"ik": 3.0, "mean_pose": 9.0}, duration_s=3.0))
-    with CellIndex(tmp_path) as index:
-        index.note(kind="sweep", name="made_up", command=COMMAND)
-        index.write_digest({})
-    page = write_sweep_page(tmp_path)
+    out = planted_sweep(tmp_path / "out", SweepPlan(("walking",), clips=2, methods={"ik": 3.0, "mean_pose": 9.0}))
+    page = write_sweep_page(out)
     before = page.read_bytes()
-    assert main(["report", str(tmp_path)]) == 0
+    assert main(["report", str(out)]) == 0
     assert page.read_bytes() == before
     assert str(page) in capsys.readouterr().out
-    assert main(["report", str(tmp_path), "--methods", "ik", "--readme", str(tmp_path / "README.md")]) == 2
-    cell = next((tmp_path / "cells").glob("*/cell.json"))
+    assert main(["report", str(out), "--methods", "ik", "--readme", str(out / "README.md")]) == 2
+    cell = next((out / "cells").glob("*/cell.json"))
     cell.write_text(cell.read_text().replace("walking", "running"))
-    assert main(["report", str(tmp_path)]) == 2
+    assert main(["report", str(out)]) == 2
     assert str(cell) in capsys.readouterr().err
     assert page.read_bytes() == before
 

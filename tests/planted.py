@@ -1,0 +1,229 @@
+"""Runs of the verb `run` whose methods err by a known size: everything but the answers of the methods is the verb's."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.ndimage import gaussian_filter1d
+
+from harness.core.arrays import Floats, Ints
+from harness.core.humanoid24 import pack, unpack
+from harness.core.seeds import generator
+from harness.experiment import cells
+from harness.experiment.cells import PlannedCell
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.evaluation import Evaluation
+from harness.experiment.method_run import MethodAnswers
+from harness.experiment.observed_take import ObservedTake
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method
+from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.results.cell import Cell
+from harness.results.storage import read_cells
+from tests.products import run_verb
+
+METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}
+"""Method -> size of its errors [deg]. A plan may have other names too."""
+RATE_HZ = 40.0
+FAILURE = "<b>no</b> pose & no plan"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the run contains."""
+
+    behaviours: tuple[str, ...] = ("walking", "boxing")
+    methods: Mapping[str, float] = field(default_factory=lambda: dict(METHODS))
+    takes: int = 1
+    """Performers of each behaviour, with one take each."""
+    duration_s: float = 2.0
+    inputs: Sequence[str] = ("pos+ori",)
+    failing: tuple[str, ...] = ()
+    """Methods whose cells fail."""
+    covered: float = 1.0
+    """Share of the frames that have an estimate."""
+    silent: tuple[str, ...] = ()
+    """Methods that never answer."""
+    known: int | None = None
+    """Number of performers that methods know from other takes; by default nobody knows of examples."""
+    vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Key of the scenario -> values; errors of the n-th one are n times as large."""
+    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Changes to the noise."""
+    sigma_deg: Mapping[str, float] = field(default_factory=dict)
+    """Method -> mean standard deviation that it states, half of it for the first hinge and changing over time [deg]."""
+    lags: Mapping[str, int] = field(default_factory=dict)
+    """Method -> its lag [frames]."""
+
+
+def planted_run(out: Path, plan: Plan = Plan()) -> Path:
+    """The folder of the run, without its page; the same plan gives the same errors."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    scenario = out.with_name(f"{out.name}.toml")
+    scenario.write_text(tomli_w.dumps(_scenario(plan)), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        for name in {name.partition("+")[0] for name in plan.methods} - set(registry.methods()):
+            patch.setitem(registry._BUILT_IN, name, MeanPose)
+        patch.setattr(cells, "evaluate", lambda method, name, take: _answer(method, name, take, plan))
+        measured = plan.covered >= 0.5 and set(plan.methods) > set(plan.silent)
+        run_verb("run", scenario, "--out", out, "--no-report", code=4 if plan.failing else 0 if measured else 3)
+    return out
+
+
+def _scenario(plan: Plan) -> dict[str, Any]:
+    takes = [f"{behaviour}_p{n}_01" for behaviour in plan.behaviours for n in range(1, plan.takes + 1)]
+    known = takes[: plan.known or 0]
+    behaviours = [behaviour for behaviour in plan.behaviours for _ in range(plan.takes)]
+    return {
+        "schema": 1,
+        "methods": list(plan.methods),
+        "stations": "liu2011",
+        "inputs": list(plan.inputs),
+        "motion": {
+            "source": "builtin",
+            "body": "common",
+            "longest_s": plan.duration_s,
+            "behaviours": behaviours,
+            "test": takes,
+            "examples": [name.replace("_01", "_02") for name in known],
+        },
+        **({"vary": dict(plan.vary)} if plan.vary else {}),
+        "components": dict(plan.components),
+    }
+
+
+def _answer(method: Method, name: str, take: ObservedTake, plan: Plan) -> Evaluation:
+    """The truth with smooth errors in every hinge and the root, four times as large where readings are missing."""
+    if name in plan.failing:
+        raise ValueError(FAILURE)
+    rng = generator(1, "planted", str(take.clip.part), name, str(take.calibration.stations))
+    (loop,), lag = take.loops, plan.lags.get(name, 0)
+    kept = rng.random(len(loop.rows)) < (0.0 if name in plan.silent else plan.covered)
+    loop = replace(loop, rows=loop.rows[kept], index=loop.index[kept])
+    truth = np.zeros((len(take.frames) - lag, 55))
+    truth[:, 3] = 1.0
+    seen = take.truth_row[: len(truth)]
+    truth[seen >= 0] = take.truth_qpos[seen[seen >= 0]]
+    valid = np.array([frame.position_valid for frame in take.frames[: len(truth)]], dtype=float)
+    worse = gaussian_filter1d(1.0 + 3.0 * (1.0 - valid).sum(axis=1), 4.0)[:, None]
+
+    def smooth(width: int) -> Floats:
+        noise: Floats = gaussian_filter1d(rng.normal(size=(len(truth), width)), 6.0, axis=0)
+        unit: Floats = noise / noise.std()
+        return unit
+
+    error_deg = plan.methods[name] * _worse_by(take, plan)
+    root_m, quaternion, angles_rad = unpack(truth)
+    angles_rad = angles_rad + np.deg2rad(error_deg) * worse * smooth(angles_rad.shape[1])
+    qpos = pack(root_m + 0.003 * error_deg * worse * smooth(3), quaternion, angles_rad)
+    sigma_rad = None
+    if name in plan.sigma_deg:
+        over_time = 1.0 + 0.1 * np.sin(np.arange(len(truth)) / 7.0)
+        sigma_rad = np.deg2rad(plan.sigma_deg[name]) * over_time[:, None] * np.linspace(0.5, 1.5, 48)
+    status: Ints = np.where((valid < 1.0).any(axis=1), 1, 0)
+    step_ms = rng.gamma(4.0, 0.15, len(truth))
+    nothing, zero = np.full(len(truth), np.nan), np.zeros(len(truth), dtype=np.int64)
+    answers = MethodAnswers(qpos, status, zero, step_ms, nothing, nothing, zero, sigma_rad)
+    return Evaluation(name, replace(take, loops=(loop,)), answers, lag)
+
+
+def _worse_by(take: ObservedTake, plan: Plan) -> int:
+    """How many times as large errors are: the place of the first varied value among its values, from 1."""
+    for key, values in plan.vary.items():
+        value: Any = take.clip.scenario
+        for part in key.split("."):
+            value = value[part] if isinstance(value, Mapping) else getattr(value, part)
+        return 1 + list(values).index(value)
+    return 1
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What the sweep contains."""
+
+    scenarios: Sequence[str] = ("walking", "boxing")
+    """Behaviours, each a scenario."""
+    clips: int = 7
+    methods: Mapping[str, float] = field(default_factory=lambda: {"ik": 3.0, "local_pca": 1.6, "dynamic_map": 1.4})
+    """Method -> its error [deg]."""
+    vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Key -> values; the n-th makes errors larger by n tenths."""
+    seeds: Sequence[int] = (1,)
+    known: int = 0
+    """Number of performers of each scenario that methods know from other takes."""
+    failing: tuple[str, ...] = ()
+    """Methods whose cells fail."""
+    unmeasured: tuple[str, ...] = ()
+    """Methods whose metrics are None."""
+    lags: Mapping[str, int] = field(default_factory=dict)
+    """Method -> its lag [frames]."""
+
+
+@cache
+def measured_cell() -> Cell:
+    """A cell of the verb `run`."""
+    with TemporaryDirectory() as folder:
+        plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
+        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
+        return cell
+
+
+def planted_sweep(out: Path, plan: SweepPlan = SweepPlan()) -> Path:
+    """The folder of a sweep, without its page, by the verb `sweep`; only the errors of its cells are planted."""
+    template = measured_cell()
+    folder = out.with_name(f"{out.name}_scenarios")
+    folder.mkdir(parents=True)
+    for behaviour in plan.scenarios:
+        like = Plan((behaviour,), plan.methods, takes=plan.clips, duration_s=1.5, known=plan.known)
+        (folder / f"{behaviour}.toml").write_text(tomli_w.dumps(_scenario(like)), encoding="utf-8")
+    content = {
+        "schema": 1,
+        "name": "planted",
+        "scenarios": [f"./{behaviour}.toml" for behaviour in plan.scenarios],
+        "methods": list(plan.methods),
+        "seeds": list(plan.seeds),
+        **({"vary": dict(plan.vary)} if plan.vary else {}),
+    }
+    (folder / "sweep.toml").write_text(tomli_w.dumps(content), encoding="utf-8")
+
+    def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
+        name, clip, seed = planned.method, str(setting.part), planned.scenario.seed
+        if name in plan.failing:
+            raise ValueError(FAILURE)
+        worse = 1.0 + 0.1 * sum(list(plan.vary[varied]).index(value) for varied, value in planned.varied.items())
+        draw = generator(seed, "planted sweep", name, clip, str(planned.varied)).normal()
+        error = plan.methods[name] * worse * float(np.exp(0.2 * draw))
+        metrics = {**template.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 6.0 * error, "mpjre_deg": 1.7 * error}
+        if name in plan.unmeasured:
+            metrics = dict.fromkeys(metrics)
+        lag = {"lag": plan.lags[name]} if name in plan.lags else {}
+        return replace(
+            template,
+            key=key,
+            method=name,
+            clip=clip,
+            behaviour=setting.behaviour,
+            inputs=planned.inputs,
+            seed=seed,
+            noise=planned.scenario.noise,
+            varied=planned.varied,
+            scenario=planned.scenario.name,
+            performer=setting.subject.performer,
+            defined_by=setting.conditions_of(method, planned.inputs) | lag,
+            scores=replace(template.scores, metrics=metrics),
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in set(plan.methods) - set(registry.methods()):
+            patch.setitem(registry._BUILT_IN, name, MeanPose)
+        patch.setattr(cells, "evaluate_cell", judge)
+        patch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
+        code = 4 if plan.failing else 3 if set(plan.methods) <= set(plan.unmeasured) else 0
+        run_verb("sweep", folder / "sweep.toml", "--out", out, "--jobs", "1", code=code)
+    return out
