@@ -86,7 +86,7 @@ def missing_extras() -> list[tuple[str, ast.Call]]:
 
 def test_errors_name_extras_that_exist() -> None:
     calls = missing_extras()
-    assert len(calls) >= 10
+    assert len(calls) >= 9
     for name, call in calls:
         extra = call.args[2]
         assert isinstance(extra, ast.Constant), name

@@ -77,8 +77,9 @@ def run_benchmarks(
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
-            if name in _REFERENCES and find_spec(_REFERENCES[name][0]) is None:
-                raise MissingExtra(*_REFERENCES[name][1:], "bench")
+            reference = _REFERENCES.get(name)
+            if reference and find_spec(reference[0]) is None:
+                raise MissingExtra(reference[1], reference[2], "bench")
             rows += BENCHMARKS[name](seed, large, runs)
         except (MissingExtra, NoLibrary) as missing:
             if names:

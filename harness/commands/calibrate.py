@@ -87,7 +87,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
 def _draw_sheet(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.poses import POSES
     from harness.core.humanoid24 import standard_skeleton
-    from harness.live.viewer import draw_poses
+    from harness.live.pose_sheet import draw_poses
 
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]

@@ -99,7 +99,7 @@ def test_the_meter_and_the_words() -> None:
 
 def test_the_block_is_replaced_and_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that others print stay above it; after the end there are only those."""
-    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((100, 40)))
+    monkeypatch.setattr("shutil.get_terminal_size", lambda **_: os.terminal_size((100, 40)))
     stream = Terminal()
     terminal = PoseTerminal(OWN, stream)
     terminal.show(GUIDED)
@@ -117,7 +117,7 @@ def test_the_block_is_replaced_and_leaves_nothing(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize(("columns", "rows"), [(50, 40), (100, 12)])
 def test_a_small_terminal_gets_the_meter(columns: int, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((columns, rows)))
+    monkeypatch.setattr("shutil.get_terminal_size", lambda **_: os.terminal_size((columns, rows)))
     stream = Terminal()
     PoseTerminal(OWN, stream).show(GUIDED)
     (line,) = screen(stream.getvalue())

@@ -15,7 +15,8 @@ from harness.calibrate.performer_preview import PerformerPose
 from harness.calibrate.poses import POSES
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile, BadInput
-from harness.live.viewer import SHEET_NAME, ViewerOutput, _prepare_folder, draw_poses
+from harness.live.pose_sheet import SHEET_NAME, draw_poses
+from harness.live.viewer import ViewerOutput, _prepare_folder
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
