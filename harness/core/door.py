@@ -1,0 +1,41 @@
+"""The door of a folder: its public names, each imported when it is first used (PEP 562)."""
+
+import ast
+import inspect
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+
+def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` of a package, for the names that its `if TYPE_CHECKING` block imports.
+
+    Type checkers read the block, and the program reads the block's source. Nothing is imported before a name is used.
+    """
+
+    def load_name(name: str) -> Any:
+        place = public_names(package).get(name)
+        if place is None:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module, attribute = place
+        value = getattr(import_module(module), attribute)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return load_name, lambda: sorted({*vars(sys.modules[package]), *public_names(package)})
+
+
+@cache
+def public_names(package: str) -> dict[str, tuple[str, str]]:
+    """Each name of a door -> the module that defines it, and its name there."""
+    tree = ast.parse(inspect.getsource(sys.modules[package]))
+    blocks = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    return {
+        alias.asname or alias.name: (str(node.module), alias.name)
+        for block in blocks
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
