@@ -3,7 +3,6 @@
 import errno
 import os
 import shlex
-import sqlite3
 import sys
 import tempfile
 import traceback
@@ -68,6 +67,8 @@ def find_system_fault(error: BaseException) -> SystemFault | None:
 @contextmanager
 def named_folder_fault(folder: Path) -> Iterator[None]:
     """Turn an error of the operating system or of SQLite in the block into a SystemFault that names the folder."""
+    import sqlite3  # here, since `harness --help` needs none of it
+
     try:
         yield
     except (OSError, sqlite3.Error) as error:
@@ -81,6 +82,8 @@ def named_folder_fault(folder: Path) -> Iterator[None]:
 
 def describe_fault(error: BaseException) -> tuple[str, str]:
     """The cause of a fault, and what to do about it; one line each."""
+    import sqlite3
+
     match error:
         case SystemFault():
             cause, advice = error.what, error.advice

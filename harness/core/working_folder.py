@@ -13,7 +13,6 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import FrameType, ModuleType
@@ -23,7 +22,7 @@ from harness.core.package_data import PACKAGE_FOLDER
 _SITE_FOLDERS = ("site-packages", "dist-packages")
 
 
-class FolderFinder(MetaPathFinder):
+class FolderFinder:
     """Finds the named modules of a folder, and those that modules of the folder import, after all other finders."""
 
     def __init__(self, folder: str) -> None:
