@@ -1,7 +1,6 @@
 """The door of a folder: its public names, each imported when it is first used (PEP 562)."""
 
 import ast
-import inspect
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -12,11 +11,11 @@ from typing import Any
 def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """`__getattr__` and `__dir__` of a package, for the names that its `if TYPE_CHECKING` block imports.
 
-    Type checkers read the block, and the program reads the block's source. Nothing is imported before a name is used.
+    Type checkers read the block as it stands, and the program reads its source. A name is imported when it is used.
     """
 
     def load_name(name: str) -> Any:
-        place = public_names(package).get(name)
+        place = None if name.startswith("__") and name != "__version__" else door_names(package).get(name)
         if place is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module, attribute = place
@@ -24,14 +23,14 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
         setattr(sys.modules[package], name, value)
         return value
 
-    return load_name, lambda: sorted({*vars(sys.modules[package]), *public_names(package)})
+    return load_name, lambda: sorted({*vars(sys.modules[package]), *door_names(package)})
 
 
 @cache
-def public_names(package: str) -> dict[str, tuple[str, str]]:
+def door_names(package: str) -> dict[str, tuple[str, str]]:
     """Each name of a door -> the module that defines it, and its name there."""
-    tree = ast.parse(inspect.getsource(sys.modules[package]))
-    blocks = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    source = sys.modules[package].__loader__.get_source(package)  # type: ignore[union-attr]
+    blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If)]
     return {
         alias.asname or alias.name: (str(node.module), alias.name)
         for block in blocks
