@@ -175,7 +175,7 @@ class Scenario:
     left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
-    """Faults of the line when an emulator (`harness.stream.is900.emulator`) plays the scenario; runs ignore them."""
+    """Faults of the line when an emulator plays the scenario (see `stream.is900.emulator`); runs ignore them."""
 
     def __post_init__(self) -> None:
         check_fields(self)
