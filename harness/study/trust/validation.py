@@ -34,7 +34,7 @@ from harness.measure.validation_report import (
 )
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
-from harness.stream.codec.items import BITS_PER_BYTE, record_size
+from harness.stream.is900.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
