@@ -22,6 +22,7 @@ from harness.report.run.text import run_table
 from harness.results.storage import read_summary
 from harness.testing.contract_case import make_case
 from tests.short_demo import short_demo
+from tests.test_doors import DOORS
 
 ROOT = Path(harness.__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -232,13 +233,15 @@ def test_the_results_format_names_every_column(tmp_path: Path) -> None:
     assert [name for name in (*header, *names, *keys) if f"`{name}`" not in text] == []
 
 
-def test_the_api_reference_has_a_page_for_every_folder() -> None:
-    """mkdocstrings then lists every public name below it: `show_submodules` and `show_if_no_docstring` are on."""
-    folders = {path.parent.name for path in (ROOT / "harness").glob("*/__init__.py")}
-    pages = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md")}
-    assert pages.keys() == {*folders, "index"}
-    assert all(f"::: harness.{folder}\n" in pages[folder] for folder in folders)
-    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+def test_the_api_reference_has_every_door() -> None:
+    """mkdocstrings lists the names in the `__all__` of a door, and every public name of `core` and `testing`."""
+    folder = ROOT / "docs" / "api"
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.md")}
+    text, config = "".join(pages.values()), (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    for door in DOORS:
+        assert f"::: {door}\n    options:\n      show_submodules: false\n      summary: true\n" in text, door
+    for package in ("core", "testing"):
+        assert f"::: harness.{package}\n" in pages[package]
     assert "show_submodules: true" in config
     assert "show_if_no_docstring: true" in config
     assert all(f"api/{page}.md" in config for page in pages)

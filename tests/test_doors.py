@@ -1,0 +1,97 @@
+"""Folders of the package use each other through doors: the names in the `__init__.py` of a folder."""
+
+import ast
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from harness.core.door import door_names
+from tests.test_layers import PACKAGE, modules, tree_of
+
+FOLDERS_WITH_A_DOOR = {
+    *("stream", "reconstruct", "simulate", "mocap", "calibrate", "measure", "results", "compare", "score", "body"),
+    *("view", "live", "experiment"),
+}
+MOST_NAMES = 40
+DOORS = sorted(
+    name
+    for name, file in modules().items()
+    if file.name == "__init__.py" and name != "harness" and "lazy_names(" in file.read_text(encoding="utf-8")
+)
+TESTS = Path(__file__).parent
+LOOSE_TESTS = {"fuzz", "benchmarks", "clients", "mutants", "old_files"}
+"""Folders of tests that mirror no folder of the package."""
+
+
+def door_of(module: str) -> str:
+    """The door through which others use a module; "" for a module of a folder without one."""
+    return max((door for door in DOORS if f"{module}.".startswith(f"{door}.")), key=len, default="")
+
+
+def imports(file: Path) -> Iterator[tuple[str, str]]:
+    """Module and name of each import from the package in a file."""
+    for node in ast.walk(tree_of(file)):
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("harness."):
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                yield (whole, "") if whole in modules() else (str(node.module), alias.name)
+        elif isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names if alias.name.startswith("harness."))
+
+
+def reaches_inside(file: Path, own: str) -> list[str]:
+    """What a file imports from inside other folders than its own."""
+    return [
+        f"{module}.{name}"
+        for module, name in imports(file)
+        if (door := door_of(module)) and door.split(".")[1] != own and module != door
+    ]
+
+
+def test_every_folder_of_the_design_has_a_door() -> None:
+    assert {door.split(".")[1] for door in DOORS if door.count(".") == 1} == FOLDERS_WITH_A_DOOR
+
+
+@pytest.mark.parametrize("folder", sorted(path.name for path in PACKAGE.iterdir() if path.is_dir()))
+def test_a_folder_uses_others_through_their_doors(folder: str) -> None:
+    for file in (PACKAGE / folder).rglob("*.py"):
+        assert not reaches_inside(file, folder), file.relative_to(PACKAGE)
+
+
+def test_tests_look_inside_their_own_folder_only() -> None:
+    for file in TESTS.rglob("*.py"):
+        own = file.relative_to(TESTS).parts[0]
+        assert not reaches_inside(file, own), file.relative_to(TESTS)
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_door_is_narrow_and_its_names_can_be_used(door: str) -> None:
+    package = import_module(door)
+    names = list(package.__all__)
+    assert 0 < len(names) <= MOST_NAMES
+    assert set(names) == set(door_names(door))
+    inside = {module.removeprefix(f"{door}.").split(".")[0] for module in modules() if module.startswith(f"{door}.")}
+    assert not inside & set(names), "the import of a module of that name would hide the name"
+    for name in names:
+        value = getattr(package, name)
+        assert not inspect.isclass(value) and not inspect.isfunction(value) or inspect.getdoc(value), f"{door}.{name}"
+        module, _ = door_names(door)[name]
+        assert door_of(module) == door, f"{door}.{name} lies behind another door"
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_every_name_of_a_door_is_used_by_others(door: str) -> None:
+    own = door.split(".")[1]
+    sources = {*PACKAGE.rglob("*.py"), *TESTS.rglob("*.py"), *(TESTS.parent / "examples").rglob("*.py")}
+    used = set[str]()
+    for file in sources:
+        folder = file.relative_to(TESTS.parent).parts[1]
+        if folder == own:
+            continue
+        used |= {name for module, name in imports(file) if module == door and name}
+        if (door, "") in set(imports(file)):
+            used |= {node.attr for node in ast.walk(tree_of(file)) if isinstance(node, ast.Attribute)}
+    assert set(import_module(door).__all__) <= used
