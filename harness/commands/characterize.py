@@ -95,7 +95,7 @@ def _capture_of(args: argparse.Namespace) -> Path:
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
     from harness.measure.episode_distributions import events_for_precision
-    from harness.stream.driver import DriverConfig
+    from harness.stream.is900.driver import DriverConfig
     from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
 
     path: Path = args.out.with_suffix(".rec")

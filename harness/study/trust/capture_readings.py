@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.errors import BadFile
 from harness.measure.pose_series import MeasuredPoses
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.station_readings import CaptureReader, StationReadings
 
 

@@ -24,8 +24,8 @@ from harness.measure.validation_report import (
     estimated_poses,
     residual_series,
 )
-from harness.stream.codec.items import BITS_PER_BYTE, record_size
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.items import BITS_PER_BYTE, record_size
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
