@@ -6,7 +6,7 @@ import pytest
 from harness.calibrate.hold import HoldReadings, UnusableHold, measure_hold, median_rotation, span_s
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.stream.frame import TrackerFrame
+from harness.stream.frame import split_frames
 
 
 def measured(
@@ -16,10 +16,17 @@ def measured(
     count = len(position_m)
     turn = np.tile(rotations.IDENTITY, (count, 1)) if turn is None else turn
     valid = np.ones(count, bool) if usable is None else usable
-    frames = [
-        TrackerFrame(time_s, np.full(1, time_s), place[None], turned[None], *[np.array([seen])] * 2, np.ones(1), np.zeros(1, bool))
-        for time_s, place, turned, seen in zip(np.linspace(0.0, seconds, count), position_m, turn, valid, strict=True)
-    ]
+    time_s = np.linspace(0.0, seconds, count)
+    frames = split_frames(
+        time_s.tolist(),
+        time_s[:, None],
+        position_m[:, None],
+        turn[:, None],
+        valid[:, None],
+        valid[:, None],
+        np.ones((count, 1)),
+        np.zeros((count, 1), bool),
+    )
     assert span_s(frames) == seconds
     return measure_hold(frames, ["head"])
 
