@@ -20,6 +20,8 @@ The public names, which are imported when they are first used:
 
 from typing import TYPE_CHECKING
 
+from harness.core.door import lazy_names
+
 if TYPE_CHECKING:
     from harness.compare.comparison import compare_runs
     from harness.core.package_data import VERSION as __version__
@@ -35,36 +37,7 @@ if TYPE_CHECKING:
     from harness.stream.is900.emulator.emulator import Emulator
     from harness.stream.is900.emulator.server import serve_emulator
 else:
-    _MODULES = {
-        "Emulator": "harness.stream.is900.emulator.emulator",
-        "HarnessError": "harness.errors",
-        "Is900": "harness.stream.is900.driver.is900",
-        "__version__": "harness.core.package_data",
-        "compare_runs": "harness.compare.comparison",
-        "load": "harness.results.reader",
-        "load_scenario": "harness.experiment.scenario",
-        "methods": "harness.reconstruct.registry",
-        "read_clip": "harness.mocap.clip_file",
-        "run": "harness.experiment.engine",
-        "score_estimate": "harness.score.score",
-        "serve_emulator": "harness.stream.is900.emulator.server",
-        "simulate_clip": "harness.experiment.clip_simulation",
-    }
-    """Public name -> module that defines it."""
-
-    def __getattr__(name):
-        """Import a public name when it is first used (PEP 562)."""
-        if name not in _MODULES:
-            raise AttributeError(f"module 'harness' has no attribute {name!r}")
-        from importlib import import_module
-
-        attribute = {"load": "load_run", "__version__": "VERSION"}.get(name, name)
-        globals()[name] = getattr(import_module(_MODULES[name]), attribute)
-        return globals()[name]
-
-    def __dir__():
-        return sorted({*globals(), *_MODULES})
-
+    __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
     "Emulator",
