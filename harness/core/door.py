@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
@@ -29,7 +30,7 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
 @cache
 def door_names(package: str) -> dict[str, tuple[str, str]]:
     """Each name of a door -> the module that defines it, and its name there."""
-    source = sys.modules[package].__loader__.get_source(package)  # type: ignore[union-attr]
+    source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If)]
     return {
         alias.asname or alias.name: (str(node.module), alias.name)
