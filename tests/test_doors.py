@@ -2,7 +2,7 @@
 
 import ast
 import inspect
-from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -31,22 +31,25 @@ def door_of(module: str) -> str:
     return max((door for door in DOORS if f"{module}.".startswith(f"{door}.")), key=len, default="")
 
 
-def imports(file: Path) -> Iterator[tuple[str, str]]:
-    """Module and name of each import from the package in a file."""
+@cache
+def imports(file: Path) -> frozenset[tuple[str, str]]:
+    """Module and name of each import from the package in a file; the name of an imported module is ""."""
+    found = set[tuple[str, str]]()
     for node in ast.walk(tree_of(file)):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("harness."):
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
-                yield (whole, "") if whole in modules() else (str(node.module), alias.name)
+                found.add((whole, "") if whole in modules() else (str(node.module), alias.name))
         elif isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names if alias.name.startswith("harness."))
+            found |= {(alias.name, "") for alias in node.names if alias.name.startswith("harness.")}
+    return frozenset(found)
 
 
 def reaches_inside(file: Path, own: str) -> list[str]:
     """What a file imports from inside other folders than its own."""
     return [
         f"{module}.{name}"
-        for module, name in imports(file)
+        for module, name in sorted(imports(file))
         if (door := door_of(module)) and door.split(".")[1] != own and module != door
     ]
 
@@ -92,6 +95,6 @@ def test_every_name_of_a_door_is_used_by_others(door: str) -> None:
         if folder == own:
             continue
         used |= {name for module, name in imports(file) if module == door and name}
-        if (door, "") in set(imports(file)):
+        if (door, "") in imports(file):
             used |= {node.attr for node in ast.walk(tree_of(file)) if isinstance(node, ast.Attribute)}
     assert set(import_module(door).__all__) <= used
