@@ -14,7 +14,6 @@ from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import find_playback, registered_take
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
-from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import (
     LEAST_OVERLAP_S,
@@ -23,15 +22,16 @@ from harness.measure.registration import (
     register,
     require_stamps,
 )
-from harness.measure.unit_file import UnitFile
-from harness.measure.unit_report import CaptureSummary
-from harness.measure.validation_report import (
+from harness.measure.reports.departures import Departure, compare_with_expected
+from harness.measure.reports.unit_report import CaptureSummary
+from harness.measure.reports.validation_report import (
     StationAccuracy,
     ValidationReport,
     error_quantiles,
     estimated_poses,
     residual_series,
 )
+from harness.measure.unit_file import UnitFile
 from harness.mocap.clip_file import FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.codec.items import BITS_PER_BYTE, record_size
