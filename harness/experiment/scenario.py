@@ -27,7 +27,7 @@ from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
-from harness.stream.emulator.faults import Fault
+from harness.stream.is900.emulator.faults import Fault
 
 SCHEMA = 1
 MOST_VARIANTS = 1_000_000
@@ -175,7 +175,7 @@ class Scenario:
     left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
-    """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
+    """Faults of the line when an emulator plays the scenario (see `stream.is900.emulator`); runs ignore them."""
 
     def __post_init__(self) -> None:
         check_fields(self)
