@@ -102,7 +102,15 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.recorder import RecordingSwitch
 
     output_options = OutputOptions(
-        args.vmc, args.lsl, args.anywhere, args.bvh, args.poses, args.view, args.no_browser, args.out, args.force
+        vmc=args.vmc,
+        lsl=args.lsl,
+        anywhere=args.anywhere,
+        bvh=args.bvh,
+        poses=args.poses,
+        view=args.view,
+        no_browser=args.no_browser,
+        out=args.out,
+        force=args.force,
     )
     stations = parse_device_stations(args.stations)
     playback_options = PlaybackOptions(args.scenario, stations, args.clip, args.rate, args.seed, args.mocap)
@@ -111,8 +119,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":
-        with _open_device(args.port, config, playback, events) as device:
-            calibration = _calibrate_by_poses(device, args.port, playback_options, playback)
+        calibration = _calibrate_by_poses(args.port, config, playback, events, playback_options)
         playback = playback.with_calibration(calibration)
     elif args.calibration not in _CALIBRATION_KINDS:
         calibration = _read_calibration(args.calibration)
@@ -128,10 +135,10 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
             reconstructor = playback.clip_evaluation.fit_method(method, args.method)
             warm_up(reconstructor, playback.calibration, playback.simulation.frames[:_WARM_UP_FRAMES])
             with defer_interrupts():
-                floor = opened.enter_context(JitterProbe())
+                probe = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
             options = LiveOptions(setup.rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
-            done = run_session(
+            result = run_session(
                 device,
                 playback.performer_calibration.body,
                 reconstructor,
@@ -141,21 +148,21 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 say=print_status,
                 progress=show_progress,
             )
-        beside = floor.finish()
+        jitter = probe.finish()
         content = {
             "method": args.method,
             "scenario": playback.scenario.name,
             "stations": list(setup.stations),
             "rate_hz": setup.rate_hz,
-            **summary.as_dict(done, beside),
+            **summary.as_dict(result, jitter),
             "line": device.counts,
             "events": [asdict(event) for event in events.events],
         }
     line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
-    outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
-    if done.stopped and not done.poses and not done.failed:
+    outcome = Outcome.PASS if result.poses and not result.failed else Outcome.INCOMPLETE
+    if result.stopped and not result.poses and not result.failed:
         outcome = Outcome.INTERRUPTED
-    lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
+    lines = (*summary.lines(result, jitter), f"line: {', '.join(line)}")
     names = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
     following = ["record", args.port, "take.rec", "--stations", names, *repeat_flags(args, "rate", *LINE_FLAGS)]
     return print_result(args, content, *lines, outcome=outcome, following=following)
@@ -223,18 +230,19 @@ def _read_calibration(name: str) -> "CalibrationFile":
 
 
 def _calibrate_by_poses(
-    device: "Tracker", port: str, options: PlaybackOptions, playback: "Playback"
+    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", options: PlaybackOptions
 ) -> "CalibrationFile":
     """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.live.pose_terminal import PoseTerminal
 
     session = CalibrationSession(options.scenario, tuple(playback.scenario.stations), folder=options.folder)
-    terminal = PoseTerminal(session.body.skeleton, sys.stderr)
-    try:
-        held = session.collect_poses(device, print_status, [terminal]).holds
-    finally:
-        terminal.close()
+    with _open_device(port, config, playback, events) as device:
+        terminal = PoseTerminal(session.body.skeleton, sys.stderr)
+        try:
+            held = session.collect_poses(device, print_status, [terminal]).holds
+        finally:
+            terminal.close()
     found = session.solve(held, port)
     for line in found.lines:
         print_status(line)
