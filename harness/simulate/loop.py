@@ -18,7 +18,7 @@ from harness.core.motion import BodyMotion
 from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import filter_samples
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings

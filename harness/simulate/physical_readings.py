@@ -15,7 +15,7 @@ from harness.core.calibration import Calibration
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
 from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room, place_room
 from harness.simulate.physics.settings import Physics

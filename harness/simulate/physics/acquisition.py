@@ -50,17 +50,8 @@ _MOTION_M_S2 = 5.0
 """Acceleration that a motion may have whose variance is not yet known [choice]."""
 _INFLATION = 2.0
 """Factor on the covariance of a fix, for what its model leaves out [choice]."""
-FIRST_TILT_VARIANCE, LOST_TILT_VARIANCE, _LEAST_TILT_VARIANCE = 1.0, 0.1, 1e-6
-"""Variances of the tilt at switch-on and after ranges refuted it, and the least one [rad^2] [choice]."""
-
-
-@compiled
-def begin_search(search: Search, s: int, tilt_variance: float) -> None:
-    """Forget what station s has collected."""
-    search.stored[s] = 0
-    search.path[s] = 0.0
-    search.gravity[s] = 0.0
-    search.tilt_variance[s] = tilt_variance
+FIRST_TILT_VARIANCE, _LEAST_TILT_VARIANCE = 1.0, 1e-6
+"""Variance of the tilt at switch-on, and the least one [rad^2] [choice]."""
 
 
 @compiled

@@ -11,7 +11,7 @@ from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate
 from harness.simulate.physics.acquisition import add_force, fix, level_attitude
-from harness.simulate.physics.filter_record import MODES, add_to_offset, write_record
+from harness.simulate.physics.filter_record import MODES, add_to_offset, decay_slot, write_record
 from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, Scratch, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.strapdown import (
@@ -88,6 +88,7 @@ def advance(
             else:
                 correct(model, state, s, slot, range_m[f, s], scratch)
             finish_slot(model, state, s, slot)
+            decay_slot(model, state, s)
 
 
 @compiled

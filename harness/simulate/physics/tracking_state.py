@@ -1,12 +1,8 @@
 """The state of a station: when it is tracked, doubted or lost, and what its records report (docs/is900.md 16.7)."""
 
-import numpy as np
-
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.simulate.physics.acquisition import LOST_TILT_VARIANCE, begin_search
-from harness.simulate.physics.filter_record import decay
-from harness.simulate.physics.filter_state import FilterModel, FilterState
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Search
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.strapdown import MOTION_ERRORS, attitude_sigma_rad, position_sigma_m
 
@@ -24,6 +20,8 @@ _DOUBTED_SIGMA_M = 0.15
 """Standard deviation of the position at which a doubted station needs a new fix [choice]."""
 _COAST_SIGMA_M = 0.5
 """Standard deviation of the position at which a lost station stops coasting [choice]."""
+LOST_TILT_VARIANCE = 0.1
+"""Variance of the tilt after ranges refuted it [rad^2] [choice]."""
 LOST, CONFIRMING, TRACKING, DOUBTED = 0, 1, 2, 3
 """Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one; with one whose position
 has become too uncertain. Records show quality 0 for all but the third."""
@@ -68,10 +66,6 @@ def finish_slot(model: FilterModel, state: FilterState, s: int, slot: int) -> No
                 distrust(model, state, s)
     if status[0] == LOST and not sigma < _COAST_SIGMA_M:
         freeze(state, s)
-    motion = state.motion[s, TICKS_PER_SLOT]
-    speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
-    turn = state.turn_rad_s[s]
-    decay(state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2))
     received = sum_last(counts[0, s], slot, CYCLE_SLOTS)
     rejected = sum_last(counts[1, s], slot, CYCLE_SLOTS)
     report = state.report[s]
@@ -84,6 +78,15 @@ def lose(state: FilterState, s: int, tilt_variance: float) -> None:
     """Declare a station lost."""
     state.status[s, 0] = LOST
     begin_search(state.search, s, tilt_variance)
+
+
+@compiled
+def begin_search(search: Search, s: int, tilt_variance: float) -> None:
+    """Forget what station s has collected."""
+    search.stored[s] = 0
+    search.path[s] = 0.0
+    search.gravity[s] = 0.0
+    search.tilt_variance[s] = tilt_variance
 
 
 @compiled

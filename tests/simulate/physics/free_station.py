@@ -7,8 +7,9 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
-from harness.simulate.physics.fusion import Fusion, FusionFilter, empty_outputs
+from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s

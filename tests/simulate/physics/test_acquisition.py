@@ -5,10 +5,12 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.physics.acquisition import add_force, begin_search, fix, invert, level_attitude
+from harness.simulate.physics.acquisition import add_force, fix, invert, level_attitude
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Search
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
+from harness.simulate.physics.tracking_state import begin_search
 from harness.simulate.readings import GRAVITY_M_S2
 from tests.simulate.physics.free_station import (
     FreeStation,

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.sound import Sound
 from tests.simulate.physics.free_station import (

@@ -8,8 +8,9 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import ShapeError
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
 from tests.simulate.physics.free_station import (
     EMITTER_M,

@@ -9,7 +9,7 @@ from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
 from harness.simulate.physics import physical_tracker
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
 from harness.simulate.physics.ranging import Ranges
 from harness.simulate.physics.settings import Physics

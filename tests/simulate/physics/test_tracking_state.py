@@ -11,7 +11,7 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.tracking_state import (
