@@ -75,7 +75,7 @@ def add_to_offset(offset: Floats, moved: Floats, x: float, y: float, z: float) -
 
 
 @compiled
-def decay(offsets: Floats, duration_s: float, speed_m_s: float, turn_rad_s: float) -> None:
+def decay_offsets(offsets: Floats, duration_s: float, speed_m_s: float, turn_rad_s: float) -> None:
     """Let the offsets (2, 6) of modes 1 and 2 decay."""
     for mode in range(2):
         rate = 1.0 / _DECAY_S if mode == 0 else min(speed_m_s / _DECAY_M + turn_rad_s / _DECAY_RAD, 1.0 / _SLOWEST_S)
@@ -89,4 +89,6 @@ def decay_slot(model: FilterModel, state: FilterState, s: int) -> None:
     """Let the offsets of a station decay over a slot, at the speed and turn rate of its end."""
     motion, turn = state.motion[s, TICKS_PER_SLOT], state.turn_rad_s[s]
     speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
-    decay(state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2))
+    decay_offsets(
+        state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    )

@@ -23,7 +23,7 @@ class Fusion(CheckedFields):
     inertial_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
     """Assumed standard deviation of scale and misalignment of the inertial sensors [choice]."""
     sigma_limit_m: Annotated[float, Range(1e-3, 10.0)] = 0.03
-    """Standard deviation of the position beyond which the station is doubted and has quality 0 [m] [choice]."""
+    """Standard deviation of the position beyond which the station is suspect and has quality 0 [m] [choice]."""
     reject_share: Annotated[float, Range(0.0, 1.0)] = 0.6
     """Share of rejected ranges in a second beyond which the station is lost [choice]."""
     coast_s: Annotated[float, Range(0.05, 60.0)] = 1.5
