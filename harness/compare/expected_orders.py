@@ -26,8 +26,10 @@ from typing import Any
 import numpy as np
 
 from harness.results.cell import varied_text
+from harness.results.reported_metrics import PRIMARY_METRIC
 
-METRIC, DECIMALS = "joint_angle_mean_deg", 2
+DECIMALS = 2
+"""Decimals of the printed errors."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,8 @@ def _evaluate_by_group(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) 
 def _outcome(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     errors: dict[str, dict[str, float]] = {name: {} for name in order.names}
     for row in rows:
-        if row[METRIC] is not None:
-            errors[row[order.by]][row["clip"]] = row[METRIC]
+        if row[PRIMARY_METRIC] is not None:
+            errors[row[order.by]][row["clip"]] = row[PRIMARY_METRIC]
     shared = sorted(set.intersection(*(set(each) for each in errors.values())))
     found = {"clips": len(shared), "clips_of_any": len({clip for each in errors.values() for clip in each})}
     if not shared:

@@ -4,14 +4,18 @@ Two means are given, because they differ when takes differ in length: over seque
 sequence means, as public evaluators print it) and over frames.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from harness.compare.expected_orders import ExpectedOrder, evaluate_orders
+from harness.compare.recovery import RecoveryCollector
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
-from harness.results.cell import Cell, as_row, varied_text
+from harness.results.cell import Cell, as_row, cell_folder, read_cell, varied_text
+from harness.results.index import CellIndex
 from harness.score.loops import pool_frames
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.timing import step_relative, step_times_ms
@@ -20,6 +24,31 @@ from harness.score.uncertainty import SigmaSums, score_sigma
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
 GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")
 """Cells that differ in one of these are never pooled."""
+
+
+def run_statistics(
+    index: CellIndex, out: Path, orders: Sequence[ExpectedOrder], training_data: Mapping[str, str]
+) -> dict[str, Any]:
+    """What `summary.json` says of a run beyond its counts; every finished cell is read once.
+
+    methods (with the `training_data` that they declare) and behaviours (see `SummaryStatistics.rows`), recovery (see
+    `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
+    and cells (the rows).
+    """
+    rows, recovery = [], RecoveryCollector()
+    methods, behaviours = SummaryStatistics(*GROUP_KEYS), SummaryStatistics(*GROUP_KEYS, "behaviour")
+    for (key,) in index.columns("key"):
+        cell = read_cell(cell_folder(out, key))
+        rows.append(as_row(cell))
+        for statistics in (methods, behaviours, recovery):
+            statistics.add(cell)
+    return {
+        "methods": [{**row, "training_data": training_data.get(row["method"])} for row in methods.rows()],
+        "behaviours": behaviours.rows(),
+        "recovery": recovery.rows(),
+        "expected_orders": evaluate_orders(orders, rows),
+        "cells": rows,
+    }
 
 
 class SummaryStatistics:

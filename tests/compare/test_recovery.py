@@ -6,10 +6,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from harness.compare.recovery import RecoveryCollector, tabulate_recovery
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.files import to_json_types
-from harness.results.recovery import RecoveryCollector, tabulate_recovery
 from harness.results.storage import Cell
 
 MakeCell = Callable[..., Cell]
