@@ -54,7 +54,7 @@ class DriftNoise(CheckedFields):
 
 
 def gauss_markov(white: Floats, correlation: float) -> Floats:
-    """Gauss-Markov sequences (N, ...) of unit variance and the given lag-1 correlation, from white noise."""
+    """Gauss-Markov sequences (N, ...) of unit variance and the given correlation of neighbours, from white noise."""
     out: Floats = white * np.sqrt(1.0 - correlation**2)
     out[:1] = white[:1]
     for previous, row in pairwise(out.reshape(len(out), -1)):
