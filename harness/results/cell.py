@@ -161,7 +161,7 @@ class Cell:
     @property
     def lag(self) -> int:
         """Number of later frames that the method used for each estimate; 0 for a causal one."""
-        return int(self.defined_by.get("lag", 0))
+        return lag_of(self.defined_by)
 
     @property
     def sigma_scores(self) -> Mapping[str, float]:
@@ -333,12 +333,17 @@ def read_row(folder: Path) -> dict[str, Any]:
     return row_of_content(folder, content)
 
 
+def lag_of(row: Mapping[str, Any]) -> int:
+    """Lag of the method of a row or of a cell's conditions [frames]; those of older versions are of causal methods."""
+    return int(row.get("lag", OPTIONAL_COLUMNS["lag"]))
+
+
 def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
     """The row of a cell from the content of its cell.json; BadFile when columns are missing."""
     try:
         first, rest = ({name: content[name] for name in names} for names in (IDENTITY, TRAILING_COLUMNS))
         optional = {
-            "lag": int(content["defined_by"].get("lag", OPTIONAL_COLUMNS["lag"])),
+            "lag": lag_of(content["defined_by"]),
             "sigma_scores": content.get("sigma_scores", OPTIONAL_COLUMNS["sigma_scores"]),
         }
         return {**first, **content["metrics"], **rest, **optional}

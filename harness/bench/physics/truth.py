@@ -239,7 +239,7 @@ def _at_speed(seed: int, speed_m_s: float) -> StationErrors:
     if speed_m_s:
         seconds = _PATH_M / speed_m_s
         return track_free_station(lambda: free_source(seed, seconds, speed_m_s, physics), seconds, physics, seed)
-    path = free_source(seed, _PATH_M, 1.0, physics).advance(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
+    path = free_source(seed, _PATH_M, 1.0, physics).sample_motion(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
     parts = []
     for place in range(_PLACES):
         pose = path.position_m[place, 0], path.tracker_from_station[place, 0]

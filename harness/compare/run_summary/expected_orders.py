@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.results.cell import varied_text
+from harness.results.cell import lag_of, varied_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 DECIMALS = 2
@@ -102,7 +102,7 @@ def _outcome(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) -> dict[st
         missing = [name for name, each in errors.items() if not each]
         gap = f"{', '.join(missing)} not measured" if missing else "no clip on which all were measured"
         return {**found, "means_deg": None, "holds": None, "why": [gap]}
-    if len({row.get("lag", 0) for row in rows}) > 1:
+    if len({lag_of(row) for row in rows}) > 1:
         return {**found, "means_deg": None, "holds": None, "why": ["methods with different lags are not ranked"]}
     means = [float(np.mean([each[clip] for clip in shared])) for each in errors.values()]
     as_printed = [round(mean, DECIMALS) for mean in means]

@@ -324,10 +324,10 @@ def _compare_station(results: Sequence[ArmResults], k: int, station: str, featur
 def _carried_plans(path: Path) -> tuple[str, ...]:
     """Digests of the plans that a capture's notes carry; BadFile for notes of different clips."""
     capture = read_recording(path)
-    if len(clips := capture.noted_values("clip")) > 1:
+    if len(clips := capture.note_values("clip")) > 1:
         found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
         raise BadFile(path, found, "one clip", "Record each clip into a file of its own.")
-    return capture.noted_values(PLAN)
+    return capture.note_values(PLAN)
 
 
 def _unit_keys(unit: UnitFile) -> dict[str, Any]:

@@ -41,10 +41,10 @@ def with_rest_after(spline: PPoly, rest_s: float) -> PPoly:
         raise BadInput(f"A rest of {rest_s:g} s is too short.", f"The stop of the motion takes {STOP_S:g} s.")
     end_s = float(spline.x[-1])
     pieces = np.concatenate([stop_piece(spline), rest_piece(spline(end_s))], axis=1)
-    return extended(spline, pieces, np.array([end_s + STOP_S, end_s + rest_s]))
+    return extend(spline, pieces, np.array([end_s + STOP_S, end_s + rest_s]))
 
 
-def extended(spline: PPoly, pieces: Floats, ends_s: Floats) -> PPoly:
+def extend(spline: PPoly, pieces: Floats, ends_s: Floats) -> PPoly:
     """A spline with P more pieces (4, P, ...) at its end, which end at these times (P,) [s]."""
     c, x = np.concatenate([spline.c, pieces], axis=1), np.concatenate([spline.x, ends_s])
     return PPoly.construct_fast(c, x, spline.extrapolate)

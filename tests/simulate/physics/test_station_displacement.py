@@ -22,7 +22,7 @@ from harness.simulate.components.soft_tissue import (
 from harness.simulate.noise import Noise
 from harness.simulate.physics.inertial import Inertial, InertialUnit, true_increments
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource
-from harness.simulate.physics.worn import BodyMotionSource, Worn, minimum_jerk_share
+from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement, minimum_jerk_share
 from harness.simulate.simulation import TrackerConfig, exact_calibration, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import SIX, worn
@@ -50,7 +50,7 @@ def source_of(
     trajectory, mounts = Trajectory(body, take).with_lead_in(warm_up_s), worn(*stations)
     calibration = exact_calibration(body, mounts, TrackerConfig(origin_m=(0.1, 0.2, 2.5)))
     skin = skin_below(body.skeleton, mounts, calibration)
-    components = Worn(
+    components = StationDisplacement(
         noise, calibration.stations, skin, tick_hz=TICK_HZ, ends_s=trajectory.duration_s, seed=1, take=take.name
     )
     return BodyMotionSource(trajectory, calibration, components)
@@ -61,9 +61,9 @@ def in_blocks(source: TrackerMotionSource, time_s: Floats, ticks: int) -> list[F
     unit = InertialUnit(Inertial(), source.stations, seed=1, take="t")
     parts = []
     for first in range(0, len(time_s) - 1, ticks):
-        motion = source.advance(time_s[first : first + ticks + 1])
+        motion = source.sample_motion(time_s[first : first + ticks + 1])
         true = true_increments(motion, np.array([0.0, 0.015, 0.0]))
-        measured = unit.measure(*true)
+        measured = unit.measure_increments(*true)
         arrays = motion.position_m, motion.tracker_from_station, motion.velocity_m_s, motion.turn_rad_s
         parts.append([*(array[:-1] for array in arrays), *true, *measured])
     return [np.concatenate(column) for column in zip(*parts, strict=True)]
@@ -72,7 +72,7 @@ def in_blocks(source: TrackerMotionSource, time_s: Floats, ticks: int) -> list[F
 def test_it_is_the_trajectory_in_the_frame_of_the_tracker(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
     time_s = ticks_s(0.0, 2.0)
-    found = source_of(boxer, Noise()).advance(time_s)
+    found = source_of(boxer, Noise()).sample_motion(time_s)
     calibration = exact_calibration(body, worn(), TrackerConfig())
     true = Trajectory(body, take).station_motion(calibration, np.repeat(time_s[:, None], 6, axis=1))
     flip = np.array([1.0, -1.0, -1.0])
@@ -102,7 +102,9 @@ def test_blocks_of_any_size_give_the_same_bytes(boxer: tuple[Body, BodyMotion], 
 
 def test_orientations_have_no_flips_between_blocks(boxer: tuple[Body, BodyMotion]) -> None:
     source, time_s = source_of(boxer, Noise()), ticks_s(-1.0, 12.0)
-    turns = [source.advance(time_s[first : first + 6]).tracker_from_station for first in range(0, len(time_s) - 1, 5)]
+    turns = [
+        source.sample_motion(time_s[first : first + 6]).tracker_from_station for first in range(0, len(time_s) - 1, 5)
+    ]
     turn = np.concatenate([*(block[:-1] for block in turns)])
     assert (np.sum(turn[1:] * turn[:-1], axis=-1) > 0.9).all()
     for block, following in pairwise(turns):
@@ -111,7 +113,7 @@ def test_orientations_have_no_flips_between_blocks(boxer: tuple[Body, BodyMotion
 
 def test_times_outside_the_trajectory_are_refused(boxer: tuple[Body, BodyMotion]) -> None:
     with pytest.raises(BadInput, match="outside the take"):
-        source_of(boxer, Noise()).advance(ticks_s(-2.0, 0.0))
+        source_of(boxer, Noise()).sample_motion(ticks_s(-2.0, 0.0))
 
 
 def central_differences(motion: TrackerMotion) -> tuple[Floats, Floats]:
@@ -153,7 +155,9 @@ def turning(stations: int, time_s: Floats) -> TrackerMotion:
 def test_velocity_is_the_derivative_of_position(name: str) -> None:
     stations, time_s = ("torso", "head", "left_wrist"), STEP_S * np.arange(20001.0)
     skin = Skin(np.array([0.12, 0.1, 0.04]), np.array([0.01, 0.005, 0.02]))
-    components = Worn(COMPONENTS[name], stations, skin, tick_hz=1.0 / STEP_S, ends_s=1.0, seed=3, take="t")
+    components = StationDisplacement(
+        COMPONENTS[name], stations, skin, tick_hz=1.0 / STEP_S, ends_s=1.0, seed=3, take="t"
+    )
     motion = turning(3, time_s)
     phase = time_s[:, None, None] * np.array([11.0, 17.0, 23.0])
     components.apply(motion, 30.0 * np.sin(phase) * np.array([[1.0], [0.5], [2.0]]))
@@ -165,7 +169,7 @@ def test_velocity_is_the_derivative_of_position(name: str) -> None:
 def test_the_derivative_holds_while_a_body_boxes(boxer: tuple[Body, BodyMotion]) -> None:
     """At 400 Hz central differences are coarse: the bound is a tenth of what a tissue adds."""
     time_s = ticks_s(0.0, 12.0)
-    bare, moved = source_of(boxer, Noise()).advance(time_s), source_of(boxer, TISSUE).advance(time_s)
+    bare, moved = source_of(boxer, Noise()).sample_motion(time_s), source_of(boxer, TISSUE).sample_motion(time_s)
     added = np.abs(moved.velocity_m_s - bare.velocity_m_s).max()
     assert added > 0.3
     coarse = np.abs(central_differences(bare)[0] - bare.velocity_m_s[1:-1]).max()
@@ -181,7 +185,9 @@ def test_tissue_is_the_oscillator_of_the_component() -> None:
     motion = turning(2, time_s)
     before_m = motion.position_m.copy()
     turn = motion.tracker_from_station.copy()
-    Worn(Noise(soft_tissue=component), stations, skin, tick_hz=400.0, ends_s=2.0, seed=1, take="t").apply(motion, force)
+    StationDisplacement(
+        Noise(soft_tissue=component), stations, skin, tick_hz=400.0, ends_s=2.0, seed=1, take="t"
+    ).apply(motion, force)
     pace = 2 * np.pi * 5.0 * np.sqrt(0.04 / skin.tissue_m)[:, None] * [1.0, 1.0, 2.0]
     expected_m = soft_limit(simulate_oscillators(-force, pace, 0.3, 1.0 / 400.0), skin.tissue_m[:, None])
     found_m = rotations.rotate(rotations.inverse(turn), motion.position_m - before_m)
@@ -192,7 +198,7 @@ def test_tissue_is_the_oscillator_of_the_component() -> None:
 
 
 def test_tissue_is_still_while_the_performer_stands(boxer: tuple[Body, BodyMotion]) -> None:
-    motion = source_of(boxer, TISSUE).advance(ticks_s(-1.0, -0.41))
+    motion = source_of(boxer, TISSUE).sample_motion(ticks_s(-1.0, -0.41))
     assert np.abs(motion.velocity_m_s).max() < 1e-9
     assert np.abs(motion.position_m - motion.position_m[0]).max() < 1e-9
 
@@ -212,7 +218,9 @@ def test_it_ends_where_the_statistical_component_does(boxer: tuple[Body, BodyMot
     flip = np.array([1.0, -1.0, -1.0])
     position_m = flip * (true.position_m - calibration.tracker_origin_m)
     motion = TrackerMotion(time_s[:, 0], position_m, turn, flip * true.velocity_m_s, flip * true.turn_rad_s)
-    Worn(noise, SIX, skin, tick_hz=40.0, ends_s=float(time_s.max()), seed=5, take=take.name).apply(motion, None)
+    StationDisplacement(noise, SIX, skin, tick_hz=40.0, ends_s=float(time_s.max()), seed=5, take=take.name).apply(
+        motion, None
+    )
     clear = np.all(np.abs(motion.position_m - read.position_m) < 1e-9, axis=-1)
     # while a strap slips, minimum jerk and uniform motion differ: half a second of twelve
     assert clear[-1].all()
@@ -224,7 +232,9 @@ def test_a_mount_belongs_to_the_session() -> None:
     def mounted(take: str, session: str) -> Floats:
         motion, skin = turning(2, np.zeros(1)), Skin(np.ones(2), np.ones(2))
         noise = COMPONENTS["mount"]
-        Worn(noise, "ab", skin, tick_hz=400.0, ends_s=1.0, seed=1, take=take, session=session).apply(motion, None)
+        StationDisplacement(noise, "ab", skin, tick_hz=400.0, ends_s=1.0, seed=1, take=take, session=session).apply(
+            motion, None
+        )
         return motion.position_m
 
     assert np.array_equal(mounted("one", "day"), mounted("two", "day"))
@@ -240,7 +250,7 @@ def test_a_slip_is_a_minimum_jerk_motion() -> None:
 
 def test_a_slip_of_a_station_that_is_not_worn_is_refused() -> None:
     with pytest.raises(UnknownName, match="torso"):
-        Worn(
+        StationDisplacement(
             Noise(mount_slip=(SLIP,)),
             ("head",),
             Skin(np.ones(1), np.ones(1)),

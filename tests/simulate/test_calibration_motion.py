@@ -11,8 +11,8 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.mocap import synthetic
+from harness.simulate.calibration_motion import hold_poses, hold_times_s
 from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.held_poses import hold_poses, hold_times_s
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.simulation import simulate_tracker

@@ -12,28 +12,28 @@ from harness.simulate.physics.room import PlacedRoom
 with plain_import():
     import mujoco
 
-_YIELD_M = 0.02
+_TISSUE_MARGIN_M = 0.02
 """A surface closer to the end of a path than this does not block it [m] [choice]. Soft tissue or a misplaced mount may
 bring a microphone below the rigid surface of the model, where real skin would give way."""
 
 
-class Sight:
+class LineOfSight:
     """Casts rays in a room with one performer, or with none. Paths are in the tracker's frame."""
 
     def __init__(self, body: Body | None, placed: PlacedRoom) -> None:
         spec = mujoco.MjSpec() if body is None else body_spec(body.skeleton)
         self._world_from_tracker = rotations.to_matrix(placed.world_from_tracker)
         self._origin_m = np.array(placed.origin_m)
-        self._model = sight_model(spec, placed)
+        self._model = ray_model(spec, placed)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
 
-    def set(self, qpos: Floats) -> None:
+    def pose_body(self, qpos: Floats) -> None:
         """Put the performer into a configuration (55,)."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
 
-    def blocked(self, from_m: Floats, to_m: Floats) -> Bools:
+    def occlusion(self, from_m: Floats, to_m: Floats) -> Bools:
         """(N,) whether something lies between a point (3,) and each of N points (N, 3) [m]."""
         start_m, rays, length_m = _rays(self._world_from_tracker, self._origin_m, from_m, to_m)
         count = len(to_m)
@@ -42,7 +42,7 @@ class Sight:
         mujoco.mj_multiRay(
             self._model, self._data, start_m, rays, None, True, -1, geom, share, None, count, mujoco.mjMAXVAL
         )
-        out: Bools = (share >= 0.0) & (share * length_m < length_m - _YIELD_M)
+        out: Bools = (share >= 0.0) & (share * length_m < length_m - _TISSUE_MARGIN_M)
         return out
 
 
@@ -66,7 +66,7 @@ def _rays(turn: Floats, origin_m: Floats, from_m: Floats, to_m: Floats) -> tuple
     return start_m, rays, length_m
 
 
-def sight_model(spec: mujoco.MjSpec, placed: PlacedRoom) -> mujoco.MjModel:
+def ray_model(spec: mujoco.MjSpec, placed: PlacedRoom) -> mujoco.MjModel:
     """Compile a body and the furniture for rays; the spec is changed.
 
     The floor is taken out. `mj_multiRay` looks only at geoms that may collide, so that every geom gets a contact flag.

@@ -1,30 +1,28 @@
-"""The state of a station: when it is tracked, doubted or lost, and what its records report (docs/is900.md 16.7)."""
-
-import numpy as np
+"""The status of a station: lost, tentative, tracking or suspect, and what its records report (docs/is900.md 16.7)."""
 
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.simulate.physics.acquisition import LOST_TILT_VARIANCE, begin_search
-from harness.simulate.physics.filter_record import decay
-from harness.simulate.physics.filter_state import FilterModel, FilterState
+from harness.simulate.physics.filter_state import AcquisitionState, FilterModel, FilterState
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.strapdown import MOTION_ERRORS, attitude_sigma_rad, position_sigma_m
 
-CONFIRMING_RANGES, CONFIRMING_SLOTS = 6, 12
+CONFIRMATION_RANGES, CONFIRMATION_SLOTS = 6, 12
 """Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
-_CONFIRMING_REJECTS = 0.3
+_LARGEST_REJECT_SHARE = 0.3
 """Share of rejected ranges that refutes one [choice]."""
-_CONFIRMED_SIGMA_RAD = 0.1
+_LARGEST_ATTITUDE_SIGMA_RAD = 0.1
 """Largest standard deviation of the attitude of a confirmed fix [rad] [choice]."""
-_CONFIRMED_NIS = 2.0
+_LARGEST_NIS = 2.0
 """Largest mean normalised squared innovation of the ranges that confirm a fix; it is 1 for a perfect model [choice]."""
-_FEWEST_JUDGED = 10
-"""Ranges in a second below which no share of rejected ones is judged [choice]."""
-_DOUBTED_SIGMA_M = 0.15
-"""Standard deviation of the position at which a doubted station needs a new fix [choice]."""
+_FEWEST_RANGES = 10
+"""Ranges in a second below which no share of rejected ones is computed [choice]."""
+_SUSPECT_SIGMA_M = 0.15
+"""Standard deviation of the position at which a suspect station needs a new fix [choice]."""
 _COAST_SIGMA_M = 0.5
 """Standard deviation of the position at which a lost station stops coasting [choice]."""
-LOST, CONFIRMING, TRACKING, DOUBTED = 0, 1, 2, 3
+LOST_TILT_VARIANCE = 0.1
+"""Variance of the tilt after ranges refuted it [rad^2] [choice]."""
+LOST, TENTATIVE, TRACKING, SUSPECT = 0, 1, 2, 3
 """Without a fix; with a fix that further ranges have not yet confirmed; with a confirmed one; with one whose position
 has become too uncertain. Records show quality 0 for all but the third."""
 CYCLE_SLOTS = 6
@@ -34,79 +32,84 @@ LEAST_QUALITY = 1.0 / 255.0
 
 
 @compiled
-def finish_slot(model: FilterModel, state: FilterState, s: int, slot: int) -> None:
+def update_status(model: FilterModel, state: FilterState, s: int, slot: int) -> None:
     """Decide whether a station is lost or confirmed, and what its records report from now on."""
     status, counts, covariance = state.status[s], state.counts, state.covariance[s]
     sigma = position_sigma_m(covariance)
     status[5] += 1
     if status[0] == TRACKING:
-        received = sum_last(counts[0, s], slot, model.judged_slots)
-        rejected = sum_last(counts[1, s], slot, model.judged_slots)
-        if received >= _FEWEST_JUDGED and rejected > model.reject_share * received:
-            distrust(model, state, s)
+        received = sum_window(counts[0, s], slot, model.reject_slots)
+        rejected = sum_window(counts[1, s], slot, model.reject_slots)
+        if received >= _FEWEST_RANGES and rejected > model.reject_share * received:
+            reset_station(model, state, s)
         elif status[2] > model.coast_slots:
-            lose(state, s, kept_tilt_variance(covariance))
+            mark_lost(state, s, tilt_variance_of(covariance))
         elif sigma > model.sigma_limit_m:
-            doubt(state, s)
+            flag_suspect(state, s)
     elif status[0] != LOST:
-        judged, doubted = status[3] + status[4], status[0] == DOUBTED
-        if judged >= CONFIRMING_RANGES and status[4] > _CONFIRMING_REJECTS * judged:
-            distrust(model, state, s)
-        elif doubted and (status[2] > model.coast_slots or not sigma < _DOUBTED_SIGMA_M):
-            lose(state, s, kept_tilt_variance(covariance))
-        elif not doubted and (status[2] > model.confirm_slots or not sigma < _COAST_SIGMA_M):
-            lose(state, s, LOST_TILT_VARIANCE)
+        count, suspect = status[3] + status[4], status[0] == SUSPECT
+        if count >= CONFIRMATION_RANGES and status[4] > _LARGEST_REJECT_SHARE * count:
+            reset_station(model, state, s)
+        elif suspect and (status[2] > model.coast_slots or not sigma < _SUSPECT_SIGMA_M):
+            mark_lost(state, s, tilt_variance_of(covariance))
+        elif not suspect and (status[2] > model.confirmation_slots or not sigma < _COAST_SIGMA_M):
+            mark_lost(state, s, LOST_TILT_VARIANCE)
         elif (
-            status[3] >= CONFIRMING_RANGES
-            and status[5] >= (CONFIRMING_SLOTS if doubted else model.confirm_slots)
+            status[3] >= CONFIRMATION_RANGES
+            and status[5] >= (CONFIRMATION_SLOTS if suspect else model.confirmation_slots)
             and sigma < model.sigma_limit_m
-            and attitude_sigma_rad(covariance) < _CONFIRMED_SIGMA_RAD
+            and attitude_sigma_rad(covariance) < _LARGEST_ATTITUDE_SIGMA_RAD
         ):
-            if state.nis[s, 0] < _CONFIRMED_NIS * state.nis[s, 1]:
+            if state.nis[s, 0] < _LARGEST_NIS * state.nis[s, 1]:
                 status[0] = TRACKING
             else:
-                distrust(model, state, s)
+                reset_station(model, state, s)
     if status[0] == LOST and not sigma < _COAST_SIGMA_M:
-        freeze(state, s)
-    motion = state.motion[s, TICKS_PER_SLOT]
-    speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
-    turn = state.turn_rad_s[s]
-    decay(state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2))
-    received = sum_last(counts[0, s], slot, CYCLE_SLOTS)
-    rejected = sum_last(counts[1, s], slot, CYCLE_SLOTS)
+        freeze_position(state, s)
+    received = sum_window(counts[0, s], slot, CYCLE_SLOTS)
+    rejected = sum_window(counts[1, s], slot, CYCLE_SLOTS)
     report = state.report[s]
-    report[0] = quality(status[0], sigma, received, rejected, model.best_sigma_m)
+    report[0] = tracking_quality(status[0], sigma, received, rejected, model.best_sigma_m)
     report[1], report[2], report[3] = sigma, received, rejected
 
 
 @compiled
-def lose(state: FilterState, s: int, tilt_variance: float) -> None:
+def mark_lost(state: FilterState, s: int, tilt_variance: float) -> None:
     """Declare a station lost."""
     state.status[s, 0] = LOST
-    begin_search(state.search, s, tilt_variance)
+    reset_acquisition(state.acquisition, s, tilt_variance)
 
 
 @compiled
-def doubt(state: FilterState, s: int) -> None:
+def reset_acquisition(acquisition: AcquisitionState, s: int, tilt_variance: float) -> None:
+    """Forget what station s has collected."""
+    acquisition.range_count[s] = 0
+    acquisition.path[s] = 0.0
+    acquisition.gravity[s] = 0.0
+    acquisition.tilt_variance[s] = tilt_variance
+
+
+@compiled
+def flag_suspect(state: FilterState, s: int) -> None:
     """Report a station as lost whose position is too uncertain; ranges go on to correct it until it is sure again."""
     status = state.status[s]
-    status[0] = DOUBTED
+    status[0] = SUSPECT
     status[3], status[4], status[5] = 0, 0, 0
     state.nis[s] = 0.0
 
 
 @compiled
-def kept_tilt_variance(covariance: Floats) -> float:
+def tilt_variance_of(covariance: Floats) -> float:
     """Variance of the tilt about each horizontal axis that a station keeps when it is lost [rad^2]."""
     out: float = max(0.5 * (covariance[6, 6] + covariance[7, 7]), 1e-6)
     return out
 
 
 @compiled
-def distrust(model: FilterModel, state: FilterState, s: int) -> None:
+def reset_station(model: FilterModel, state: FilterState, s: int) -> None:
     """Declare a station lost whose ranges contradict it: velocity, tilt and biases are then worth nothing either."""
-    lose(state, s, LOST_TILT_VARIANCE)
-    freeze(state, s)
+    mark_lost(state, s, LOST_TILT_VARIANCE)
+    freeze_position(state, s)
     state.bias[s] = 0.0
     set_bias_covariance(model, state.covariance[s])
 
@@ -121,7 +124,7 @@ def set_bias_covariance(model: FilterModel, covariance: Floats) -> None:
 
 
 @compiled
-def freeze(state: FilterState, s: int) -> None:
+def freeze_position(state: FilterState, s: int) -> None:
     """Stop the position of a station that knows its motion no longer; its covariance stays bounded, too."""
     state.status[s, 1] = 1
     state.motion[s, TICKS_PER_SLOT, 3:6] = 0.0
@@ -134,7 +137,7 @@ def freeze(state: FilterState, s: int) -> None:
 
 
 @compiled
-def sum_last(counts: Ints, slot: int, slots: int) -> int:
+def sum_window(counts: Ints, slot: int, slots: int) -> int:
     """Sum of the counts of the last slots, up to `slot`, in a ring (N,) with one entry per slot."""
     total = 0
     for k in range(slots):
@@ -143,7 +146,7 @@ def sum_last(counts: Ints, slot: int, slots: int) -> int:
 
 
 @compiled
-def quality(state: int, sigma_m: float, received: int, rejected: int, best_sigma_m: float) -> float:
+def tracking_quality(state: int, sigma_m: float, received: int, rejected: int, best_sigma_m: float) -> float:
     """Quality in 0..1 [choice]: `best_sigma_m` over the position's standard deviation [m], at most 1.
 
     The share of accepted ranges scales it by 0.5 to 1. A station without a confirmed fix has 0.

@@ -1,4 +1,4 @@
-"""Status of a station: what is counted, when it is doubted, and how sure it is of itself."""
+"""Status of a station: what is counted, when it is suspect, and how sure it is of itself."""
 
 from dataclasses import replace
 
@@ -11,26 +11,26 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.tracking_state import (
-    CONFIRMING,
-    DOUBTED,
+from harness.simulate.physics.tracking_status import (
     LEAST_QUALITY,
     LOST,
+    SUSPECT,
+    TENTATIVE,
     TRACKING,
-    quality,
-    sum_last,
+    sum_window,
+    tracking_quality,
 )
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.physics.free_station import EMITTER_M, TICK_HZ, FreeStation, free_station, new_filter, noisy, run
 
 
-@pytest.mark.parametrize("state", [LOST, CONFIRMING, DOUBTED])
+@pytest.mark.parametrize("state", [LOST, TENTATIVE, SUSPECT])
 def test_a_station_without_a_confirmed_fix_has_quality_0(state: int) -> None:
-    assert quality(state, 0.001, 12, 0, 0.003) == 0.0
+    assert tracking_quality(state, 0.001, 12, 0, 0.003) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -47,13 +47,13 @@ def test_a_station_without_a_confirmed_fix_has_quality_0(state: int) -> None:
     ],
 )
 def test_quality_falls_with_sigma_and_rejections(sigma_m: float, received: int, rejected: int, expected: float) -> None:
-    assert quality(TRACKING, sigma_m, received, rejected, 0.003) == pytest.approx(expected)
+    assert tracking_quality(TRACKING, sigma_m, received, rejected, 0.003) == pytest.approx(expected)
 
 
 def test_counts_are_summed_over_the_last_slots() -> None:
     ring = np.arange(10)
-    assert sum_last(ring, 12, 3) == 2 + 1 + 0
-    assert sum_last(ring, -9, 3) == 1 + 0 + 9  # slots before the take are negative
+    assert sum_window(ring, 12, 3) == 2 + 1 + 0
+    assert sum_window(ring, -9, 3) == 1 + 0 + 9  # slots before the take are negative
 
 
 def test_an_ankle_that_hears_few_ranges_is_lost_for_moments_only() -> None:
@@ -69,7 +69,7 @@ def test_an_ankle_that_hears_few_ranges_is_lost_for_moments_only() -> None:
     )
     lost = found.quality[:, 0] == 0.0
     assert found.filter is not None
-    assert found.filter.hearing_share[0] > 0.95
+    assert found.filter.coverage_share[0] > 0.95
     assert 0.0 < np.mean(lost) < 0.1
     error_m = np.linalg.norm(found.position_m - true.position_m, axis=-1)[:, 0]
     assert error_m[~lost].max() < 0.05

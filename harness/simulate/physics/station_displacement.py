@@ -28,7 +28,7 @@ from harness.simulate.physics.motion import TrackerMotion, station_chain, statio
 from harness.simulate.trajectory import Trajectory
 
 
-class Worn:
+class StationDisplacement:
     """The worn components of a noise on S stations. It carries state: `apply` takes block after block.
 
     `ends_s` is the last sampling time of the take, by which random slips are timed [s]. UnknownName for a slip of a
@@ -48,7 +48,7 @@ class Worn:
         session: str = "",
     ) -> None:
         self._radius_m = skin.radius_m
-        self._tissue = None if noise.soft_tissue is None else _Tissue(noise.soft_tissue, skin, tick_hz)
+        self._tissue = None if noise.soft_tissue is None else _TissueOscillators(noise.soft_tissue, skin, tick_hz)
         self._mount: tuple[Floats, Floats] | None = None
         if noise.mount is not None:
             keys = (("noise", session or take, "mount", station) for station in stations)
@@ -67,7 +67,7 @@ class Worn:
         self._slips = [(slip, list(stations).index(slip.station)) for slip in (*slips, *noise.mount_slip)]
 
     @property
-    def on_tissue(self) -> bool:
+    def has_tissue(self) -> bool:
         """Whether soft tissue moves, which needs the force on it."""
         return self._tissue is not None
 
@@ -78,13 +78,13 @@ class Worn:
         """
         everyone = slice(None)
         if self._tissue is not None and force_m_s2 is not None:
-            shift_m, speed_m_s = self._tissue.advance(force_m_s2)
-            _shift(motion, everyone, shift_m, speed_m_s)
+            shift_m, speed_m_s = self._tissue.displacement(force_m_s2)
+            _translate(motion, everyone, shift_m, speed_m_s)
             # The bone runs along x, `radius_m` below: a shift of y around it rotates the station about x by -y/radius.
-            _roll(motion, everyone, -shift_m[..., 1] / self._radius_m, -speed_m_s[..., 1] / self._radius_m)
+            _rotate_about_bone(motion, everyone, -shift_m[..., 1] / self._radius_m, -speed_m_s[..., 1] / self._radius_m)
         if self._mount is not None:
             offset_m, turn = self._mount
-            _shift(motion, everyone, offset_m, np.zeros(3))
+            _translate(motion, everyone, offset_m, np.zeros(3))
             motion.tracker_from_station[:] = rotations.multiply(motion.tracker_from_station, turn)
         for slip, row in self._slips:
             share, pace = minimum_jerk_share(motion.time_s - slip.from_s, slip.over_s)
@@ -94,8 +94,8 @@ class Worn:
             offset_m = np.stack([slip.along_m * share, -radius_m * np.sin(angle), radius_m * (np.cos(angle) - 1.0)], 1)
             swing_m_s = -radius_m * rate
             speed_m_s = np.stack([slip.along_m * pace, swing_m_s * np.cos(angle), swing_m_s * np.sin(angle)], 1)
-            _shift(motion, row, offset_m, speed_m_s)
-            _roll(motion, row, angle, rate)
+            _translate(motion, row, offset_m, speed_m_s)
+            _rotate_about_bone(motion, row, angle, rate)
 
 
 def minimum_jerk_share(since_s: Floats, over_s: float) -> tuple[Floats, Floats]:
@@ -104,7 +104,7 @@ def minimum_jerk_share(since_s: Floats, over_s: float) -> tuple[Floats, Floats]:
     return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t), 30.0 * (t * (1.0 - t)) * (t * (1.0 - t)) / over_s
 
 
-class _Tissue:
+class _TissueOscillators:
     """Oscillators of S stations, each with position and velocity; they start in the first push's equilibrium."""
 
     def __init__(self, component: SoftTissueArtefact, skin: Skin, tick_hz: float) -> None:
@@ -114,7 +114,7 @@ class _Tissue:
         self._tissue_m = np.array(skin.tissue_m)
         self._state: Floats | None = None
 
-    def advance(self, force_m_s2: Floats) -> tuple[Floats, Floats]:
+    def displacement(self, force_m_s2: Floats) -> tuple[Floats, Floats]:
         """Displacement [m] and velocity [m/s] (T+1, S, 3) in the station's axes at the ticks of a block."""
         push = -force_m_s2
         if self._state is None:
@@ -172,7 +172,7 @@ def _limit(most_m: Floats, shift_m: Floats, speed_m_s: Floats) -> None:
             speed_m_s[k, s, 2] = ratio * w + change * z
 
 
-def _shift(motion: TrackerMotion, row: int | slice, offset_m: Floats, speed_m_s: Floats) -> None:
+def _translate(motion: TrackerMotion, row: int | slice, offset_m: Floats, speed_m_s: Floats) -> None:
     """Move stations by offsets in their axes [m], which change at a speed [m/s]."""
     turn = motion.tracker_from_station[:, row]
     arm_m = rotations.rotate(turn, offset_m)
@@ -180,7 +180,7 @@ def _shift(motion: TrackerMotion, row: int | slice, offset_m: Floats, speed_m_s:
     motion.velocity_m_s[:, row] += rotations.cross(motion.turn_rad_s[:, row], arm_m) + rotations.rotate(turn, speed_m_s)
 
 
-def _roll(motion: TrackerMotion, row: int | slice, angle_rad: Floats, rate_rad_s: Floats) -> None:
+def _rotate_about_bone(motion: TrackerMotion, row: int | slice, angle_rad: Floats, rate_rad_s: Floats) -> None:
     """Rotate stations about their x axis by angles [rad], which change at a rate [rad/s]."""
     axis, turn = np.array([1.0, 0.0, 0.0]), motion.tracker_from_station[:, row]
     motion.turn_rad_s[:, row] += rotations.rotate(turn, rate_rad_s[..., None] * axis)
@@ -190,23 +190,23 @@ def _roll(motion: TrackerMotion, row: int | slice, angle_rad: Floats, rate_rad_s
 class BodyMotionSource:
     """A `TrackerMotionSource`: the stations of a calibration on a trajectory, with what `worn` does to them."""
 
-    def __init__(self, trajectory: Trajectory, calibration: Calibration, worn: Worn) -> None:
+    def __init__(self, trajectory: Trajectory, calibration: Calibration, displacement: StationDisplacement) -> None:
         self.stations = calibration.stations
-        self._trajectory, self._calibration, self._worn = trajectory, calibration, worn
+        self._trajectory, self._calibration, self._displacement = trajectory, calibration, displacement
         self._chain = station_chain(trajectory.body.skeleton, calibration)
         self._pieces: Floats = np.ascontiguousarray(trajectory.spline.c)
         self._knots_s: Floats = np.ascontiguousarray(trajectory.spline.x)
 
-    def advance(self, time_s: Floats) -> TrackerMotion:
+    def sample_motion(self, time_s: Floats) -> TrackerMotion:
         """Motion at the ticks (T+1,) of the next block [s]; BadInput outside the trajectory."""
         self._trajectory.require_inside(time_s)
         motion, acceleration_m_s2 = station_states(self._chain, self._pieces, self._knots_s, time_s)
         force_m_s2 = None
-        if self._worn.on_tissue:
+        if self._displacement.has_tissue:
             force_m_s2 = tissue_force_m_s2(
                 motion.tracker_from_station, acceleration_m_s2, self._calibration, self._chain.tracker_from_world
             )
-        self._worn.apply(motion, force_m_s2)
+        self._displacement.apply(motion, force_m_s2)
         return motion
 
     def qpos(self, time_s: Floats) -> Floats:
