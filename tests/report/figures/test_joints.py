@@ -14,9 +14,7 @@ from harness.report.figures.mean_figures import joints_figure
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.run.joint_errors import BONE_ROWS
 from harness.score.pair import hinged_bones
-from tests.planted import Plan, planted_run
-from tests.report.drawing import texts_apart
-from tests.report.figures.made_up import drawn
+from tests.report.drawing import drawn, texts_apart
 
 BONES = [standard_skeleton().names[bone] for bone in hinged_bones(standard_skeleton())]
 
@@ -57,13 +55,11 @@ def test_one_clip_has_no_interval(framed: Path) -> None:
         assert not shown.axes[0].collections
 
 
-def test_a_clip_on_which_the_leader_was_not_measured_is_refused(tmp_path: Path) -> None:
-    plan = Plan(("walking", "boxing"), {"ik": 2.0, "best_match": 1.0}, duration_s=2.0)
-    out = planted_run(tmp_path / "run", plan)
-    run = read_conditions(out)
+def test_a_clip_on_which_the_leader_was_not_measured_is_refused(viewed: Path) -> None:
+    run = read_conditions(viewed)
     (condition,) = run.conditions
     clip = condition.clips[0]
-    cells = tuple(row for row in condition.cells if (row["method"], row["clip"]) != ("best_match", clip))
+    cells = tuple(row for row in condition.cells if (row["method"], row["clip"]) != ("map", clip))
     less = replace(run, conditions=(replace(condition, cells=cells),))
-    with pytest.raises(BadInput, match=f"best_match was not measured on {clip}"):
+    with pytest.raises(BadInput, match=f"map was not measured on {clip}"):
         joints_figure(less, FigureSelection(clip=clip))

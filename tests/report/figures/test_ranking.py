@@ -16,8 +16,8 @@ from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.ranking import RankingPanel, explain_marks, wrap_name
 from harness.report.kit.style import COLOURS, FAINT
 from tests.compare.sides import cell, side, write_run
-from tests.report.drawing import texts_apart
-from tests.report.figures.made_up import drawn, ranked_run, spans
+from tests.planted import MeansPlan, planted_means_run
+from tests.report.drawing import drawn, spans, texts_apart
 
 
 @pytest.mark.parametrize("width_mm", [85, 170])
@@ -78,12 +78,12 @@ def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None
         assert figure.axes[0].get_xlabel().split() == ["joint", "angle", "error", "[deg]"]
 
 
-def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
-    figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
+def test_few_clips_cannot_show_a_difference(framed: Path) -> None:
+    figure = ranking_figure(read_conditions(framed).select("noise=clean"), FigureSelection())
     assert "Fewer than 6 units cannot show a difference." in figure.caption
     with drawn(figure) as shown:
         *_, heading = shown.axes[0].texts  # after the values at the edge
-        assert heading.get_text() == "4 takes: differences cannot be shown"
+        assert "(2 performers): differences cannot be shown" in " ".join(heading.get_text().split())
         assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o", ">"}
 
 
@@ -91,10 +91,10 @@ def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
     figure = ranking_figure(read_conditions(conditions), FigureSelection())
     with drawn(figure) as shown:
         assert [" ".join(text.get_text().split()) for axes in shown.axes for text in axes.texts] == [
-            "noise=clean, known performers (8 takes)",
-            "noise=clean, new performers (3 takes): differences cannot be shown",
-            "noise=default, known performers (8 takes)",
-            "noise=default, new performers (3 takes): differences cannot be shown",
+            "noise=clean, known performers (6 performers)",
+            "noise=clean, new performers (2 performers): differences cannot be shown",
+            "noise=default, known performers (6 performers)",
+            "noise=default, new performers (2 performers): differences cannot be shown",
         ]
         assert len({axes.get_xlim() for axes in shown.axes[::2]}) == 1
         texts_apart(shown)
@@ -146,8 +146,9 @@ def test_methods_that_were_not_measured_and_clips_that_not_all_share_are_named(t
 
 
 def test_one_clip_has_no_interval(tmp_path: Path) -> None:
-    caption = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=1)), FigureSelection()).caption
-    assert caption.startswith("Mean joint angle error on 1 clip. Right:")
+    out = planted_means_run(tmp_path / "run", MeansPlan(("jumping",), 1, {"ik": 2.0, "late": 3.0}))
+    caption = ranking_figure(read_conditions(out), FigureSelection()).caption
+    assert caption.startswith("Mean joint angle error on 1 clip of 1 performer. Right:")
 
 
 def test_methods_without_a_common_clip_are_not_ranked(tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ from tests.compare.sides import cell, manifest, side, write_run
 def test_the_last_values_and_known_performers_are_shown_unless_a_clip_is_named(conditions: Path) -> None:
     run = read_conditions(conditions)
     assert choose_condition(run, FigureSelection()).name == "noise=default, known performers"
-    assert choose_condition(run, FigureSelection(clip="new_01")).name == "noise=default, new performers"
+    assert choose_condition(run, FigureSelection(clip="jumping_p7_01")).name == "noise=default, new performers"
     assert choose_condition(run.select("noise=clean"), FigureSelection()).name == "noise=clean, known performers"
-    with pytest.raises(UnknownName, match=r"no clip of the run called 'new_1'\. Did you mean 'new_01'"):
-        choose_condition(run, FigureSelection(clip="new_1"))
+    with pytest.raises(UnknownName, match=r"no clip of the run called 'jumping_p7'\. Did you mean 'jumping_p7_01'"):
+        choose_condition(run, FigureSelection(clip="jumping_p7"))
 
 
 def test_the_leader_is_shown_against_ik_or_the_named_control(ranked: Path) -> None:
