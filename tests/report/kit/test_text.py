@@ -1,4 +1,4 @@
-"""Labels of metrics name the quantity and the unit."""
+"""Names and labels of metrics on a page."""
 
 from harness.report.kit.text import metric_label, metric_name
 from harness.score.metrics import DEFINITIONS

@@ -1,4 +1,4 @@
-"""The ranking figure: every method is named, leader and ties are marked, and few clips are called few."""
+"""Figures of means: every method is named, leader and ties are marked; bars of bones are means over clips."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,15 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.patches import Rectangle
 
 from harness.compare.paired_statistics import mean_interval
-from harness.compare.ranking import MethodRanking
+from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
-from harness.report.figures.conditions import read_conditions
-from harness.report.figures.mean_figures import ranking_figure
+from harness.report.figures.conditions import read_conditions, read_series
+from harness.report.figures.mean_figures import joints_figure, ranking_figure
 from harness.report.figures.print_figure import FigureSelection
-from harness.report.kit.ranking import RankingPanel, explain_marks, wrap_name
 from harness.report.kit.style import COLOURS, FAINT
+from harness.report.run.joint_errors import BONE_ROWS
+from harness.score.pair import hinged_bones
 from tests.compare.sides import cell, side, write_run
 from tests.planted import MeansPlan, planted_means_run
 from tests.report.drawing import drawn, spans, texts_apart
@@ -44,28 +46,6 @@ def test_rows_have_the_means_intervals_and_differences_of_the_ranking(ranked: Pa
         assert written == [[f"{ranking.means[control]:.2f}"], [f"+{ranking.differences[control]:.2f}"]]
         assert means.get_xlim()[1] < 0.5 * ranking.means[control]
         texts_apart(figure)
-
-
-@pytest.mark.parametrize(
-    ("means", "inside"),
-    [
-        ([1.0, 1.1, 1.2, 7.9], 3),
-        ([1.0, 1.1, 1.2, 2.1], 4),
-        ([1.0, 1.1, 8.0, 9.0], 2),
-        ([1.0, 8.0], 2),
-        ([1.0, 8.0, 9.0], 3),
-        ([1.0, 1.1, 2.9, 3.5, 100.0, 200.0], 4),
-        ([2.0], 1),
-        ([0.0, 0.0, 1.0], 2),
-    ],
-)
-def test_a_method_that_errs_several_times_as_much_does_not_squeeze_the_others(means: list[float], inside: int) -> None:
-    values = {f"m{n}": np.full(8, mean) for n, mean in enumerate(means)}
-    panel = RankingPanel(
-        "", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), tuple("abcdefgh"), values, {}, {})
-    )
-    assert panel.largest_drawn == means[inside - 1]
-    assert ("beyond the axis" in explain_marks([panel])) == (inside < len(means))
 
 
 def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None:
@@ -111,23 +91,6 @@ def test_long_names_stay_on_the_figure(tmp_path: Path) -> None:
         assert right.get_window_extent().width > 0.2 * figure.bbox.width
 
 
-@pytest.mark.parametrize(
-    ("name", "lines"),
-    [
-        ("ik", 1),
-        ("dynamic_map:literal", 1),
-        ("dynamic_map[widening=200,gate.reach_m=0.5]+ik", 3),
-        ("x" * 100, 3),
-    ],
-)
-def test_names_are_broken_where_they_have_parts(name: str, lines: int) -> None:
-    wrapped = wrap_name(name, 24)
-    assert wrapped.count("\n") == lines - 1
-    assert max(map(len, wrapped.splitlines())) <= 25
-    if len(name) < 60:
-        assert wrapped.replace("\n", "") == name
-
-
 def test_one_method_has_no_difference(ranked: Path) -> None:
     figure = ranking_figure(read_conditions(ranked).select(methods=["ik"]), FigureSelection())
     assert "difference" not in figure.caption
@@ -157,3 +120,52 @@ def test_methods_without_a_common_clip_are_not_ranked(tmp_path: Path) -> None:
     out = write_run(tmp_path / "run", replace(results, cells=cells, planned=2))
     with pytest.raises(BadInput, match="No clip of"):
         ranking_figure(read_conditions(out), FigureSelection())
+
+
+BONES = [standard_skeleton().names[bone] for bone in hinged_bones(standard_skeleton())]
+
+
+def test_every_bone_with_hinges_has_a_row() -> None:
+    assert sorted(BONE_ROWS) == sorted(BONES)
+    assert BONE_ROWS["lfemur"] == "left femur"
+
+
+@pytest.mark.parametrize(("width_mm", "panels"), [(85, 1), (170, 2)])
+def test_bars_are_means_over_clips(framed: Path, width_mm: int, panels: int) -> None:
+    run = read_conditions(framed)
+    traces = read_series(framed, run.conditions[-1], lambda name, _: name == "best_match+ik")["best_match+ik"]
+    rotation = np.mean([trace.rotation_deg.mean(axis=0) for trace in traces], axis=0)
+    position = np.mean([trace.position_mm.mean(axis=0) for trace in traces], axis=0)
+    points = ["root", *standard_skeleton().names]
+    with drawn(joints_figure(run, FigureSelection()), width_mm) as figure:
+        assert len(figure.axes) == panels
+        assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(BONE_ROWS.values())
+        expected = [[rotation[BONES.index(bone)] for bone in BONE_ROWS], [position[points.index(b)] for b in BONE_ROWS]]
+        for axes, values in zip(figure.axes, expected, strict=False):
+            bars = [patch.get_width() for patch in axes.patches if isinstance(patch, Rectangle)]
+            np.testing.assert_allclose(bars, values, rtol=1e-5)
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == ["best_match+ik (lowest mean)", "ik (control)"]
+        assert "[deg]" in figure.axes[0].get_xlabel()
+        texts_apart(figure)
+
+
+def test_bars_of_one_clip_have_no_interval(framed: Path) -> None:
+    run = read_conditions(framed)
+    clip = run.conditions[0].clips[0]
+    assert "Whiskers: 95 % interval over units." in joints_figure(run, FigureSelection()).caption
+    figure = joints_figure(run, FigureSelection(clip=clip))
+    assert "Whiskers" not in figure.caption
+    assert clip in figure.caption
+    with drawn(figure) as shown:
+        assert not shown.axes[0].collections
+
+
+def test_a_clip_on_which_the_leader_was_not_measured_is_refused(viewed: Path) -> None:
+    run = read_conditions(viewed)
+    (condition,) = run.conditions
+    clip = condition.clips[0]
+    cells = tuple(row for row in condition.cells if (row["method"], row["clip"]) != ("map", clip))
+    less = replace(run, conditions=(replace(condition, cells=cells),))
+    with pytest.raises(BadInput, match=f"map was not measured on {clip}"):
+        joints_figure(less, FigureSelection(clip=clip))

@@ -33,7 +33,7 @@ def _draw(figure: Figure) -> None:
 FIGURE = PrintFigure("lines", "Three lines.", _draw, 50.0)
 PROGRAM = """
 import hashlib
-from tests.report.kit.test_print_figure import FIGURE, FORMATS, draw_figure
+from tests.report.figures.test_print_figure import FIGURE, FORMATS, draw_figure
 for fmt in FORMATS:
     print(hashlib.sha256(draw_figure(FIGURE, fmt, 85)[0]).hexdigest())
 """
