@@ -91,9 +91,9 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
+    from harness.commands import live_summary
     from harness.experiment.isolation import DEFAULT_ISOLATION
     from harness.experiment.remote_method import resolve_method
-    from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
     from harness.stream.line_events import EventCounter
@@ -141,7 +141,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
             "scenario": playback.scenario.name,
             "stations": list(playback.scenario.stations),
             "rate_hz": rate_hz,
-            **summary.as_dict(done, beside),
+            **live_summary.as_dict(done, beside),
             "line": device.counts,
             "events": [asdict(event) for event in events.events],
         }
@@ -149,7 +149,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
     if done.stopped and not done.poses and not done.failed:
         outcome = Outcome.INTERRUPTED
-    lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
+    lines = (*live_summary.lines(done, beside), f"line: {', '.join(line)}")
     stations = args.stations if "=" in (args.stations or "") else ",".join(playback.scenario.stations)
     following = ["record", args.port, "take.rec", "--stations", stations, *repeat_flags(args, "rate", *LINE_FLAGS)]
     return print_result(args, content, *lines, outcome=outcome, following=following)
