@@ -40,9 +40,9 @@ from harness.score.loops import COVERAGE_FLOOR
 from harness.score.score import score_estimate
 from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.room import check_emitters
-from harness.stream.codec.items import record_size
-from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
+from harness.stream.is900.codec.items import record_size
+from harness.stream.is900.codec.reader import WireFormat
 
 VariedValues = Mapping[str, Any]
 _ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")

@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from harness.compare.run_statistics import run_statistics
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
@@ -182,18 +183,18 @@ def _run_folder(
             outcomes = _run_tasks(index, [only] if only else names, tasks, out, executor, progress)
         finally:
             close_methods()
+            orders, trained = scenarios[0].expected_order, manifest.training_data
             summary = storage.write_summary(
                 index,
                 out,
+                run_statistics(index, out, orders, trained) if kind == "run" else {},
                 kind=kind,
                 name=name,
                 command=command,
                 performers=manifest.performers,
                 unit=manifest.unit,
-                training_data=manifest.training_data,
                 scenarios=[scenario_label(scenario) for scenario in scenarios],
                 vary=dict(pair for scenario in scenarios for pair in dotted_keys(scenario.vary)),
-                orders=scenarios[0].expected_order if kind == "run" else None,
             )
         if outcomes and all(cell.refused for cell in outcomes.values()):
             raise BadInput(f"Nothing could be run. {next(iter(outcomes.values())).failure}", "")
