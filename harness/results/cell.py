@@ -22,14 +22,14 @@ from harness.core.files import flush_together, move_into_place, temporary_path, 
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
-from harness.results.content_types import (
+from harness.results.files.content_types import (
     check_cell_types,
     find_cell_fault,
     find_impossible_errors,
     find_impossible_metric,
     find_impossible_sigma,
 )
-from harness.results.digests import check_file, check_key, insert_digest, read_result_json
+from harness.results.files.digests import check_file, check_key, insert_digest, read_result_json
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 

@@ -28,13 +28,14 @@ from harness.bench.accuracy.conditions import (
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.bench.common import fresh_methods, run_benchmark_cells
+from harness.bench.limits import outcome_of
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment.isolation import DEFAULT_ISOLATION
 from harness.experiment.remote_method import resolve_method
 from harness.experiment.scenario import Scenario
-from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.manifest import current_circumstances
 
 _QUICK = "the quick form has one seed and few clips"

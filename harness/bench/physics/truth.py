@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from harness.bench.limits import state_verdict
 from harness.bench.physics.scenes import (
     BOARD,
     BYSTANDER,
@@ -30,7 +31,7 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sound import speed_of_sound_m_s
 from harness.simulate.readings import GRAVITY_M_S2

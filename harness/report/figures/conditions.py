@@ -16,7 +16,7 @@ from harness.report.kit.text import list_first
 from harness.report.run.data import Row, RunData, Trace, lag_of, last_varied, read_traces, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
 from harness.results.cell import varied_text
-from harness.results.integrity import check_cells, check_folder
+from harness.results.files.integrity import check_cells, check_folder
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary

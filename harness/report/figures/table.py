@@ -14,7 +14,7 @@ from harness.core.number_format import format_number
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
 from harness.results.cell import varied_text
-from harness.results.folder_kind import require_kind
+from harness.results.files.folder_kind import require_kind
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 

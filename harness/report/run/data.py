@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.run_statistics import GROUP_KEYS
+from harness.compare.run_summary.run_statistics import GROUP_KEYS
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import training_note
 from harness.report.kit.style import STYLES
 from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, varied_text
-from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row
+from harness.results.files.integrity import SUMMARY, check_cells, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.score.angles import hinge_errors_deg, local_errors_deg

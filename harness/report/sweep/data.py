@@ -17,8 +17,8 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import name_with_lag
 from harness.core.split import training_note
 from harness.results.cell import varied_text
+from harness.results.files.integrity import check_folder
 from harness.results.index import CellIndex
-from harness.results.integrity import check_folder
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.bench.physics import scenes, truth
-from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.physics.settings import Physics
 
 SEEDS = tuple(range(101, 115))

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from harness.compare.expected_orders import ExpectedOrder, evaluate_orders
+from harness.compare.run_summary.expected_orders import ExpectedOrder, evaluate_orders
 
 METHODS = ExpectedOrder("a paper", methods=("new", "old", "ik"), why_not={"old > ik": "because"})
 INPUTS = ExpectedOrder("a paper", inputs=("pos+ori", "pos"), method="new")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from harness.compare.recovery import RecoveryCollector, tabulate_recovery
+from harness.compare.run_summary.recovery import RecoveryCollector, tabulate_recovery
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.files import to_json_types

@@ -8,9 +8,9 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
-from harness.measure.departures import Departure
 from harness.measure.registration import Registration
-from harness.measure.unit_report import CaptureSummary
+from harness.measure.reports.departures import Departure
+from harness.measure.reports.unit_report import CaptureSummary
 
 ROOM = "room"
 """Name of the pose of the tracker's frame in the reference's; other poses are mounts of stations."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.expected_orders import ExpectedOrder, evaluate_orders
-from harness.compare.recovery import RecoveryCollector
+from harness.compare.run_summary.expected_orders import ExpectedOrder, evaluate_orders
+from harness.compare.run_summary.recovery import RecoveryCollector
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
 from harness.results.cell import Cell, as_row, cell_folder, read_cell, varied_text

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from harness.core.number_format import Interval
-from harness.measure.departures import compare_with_expected
+from harness.measure.reports.departures import compare_with_expected
 
 
 def test_a_difference_of_196_deviations_has_p_of_5_percent() -> None:

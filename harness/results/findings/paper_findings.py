@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import check_study, read_record, write_record
+from harness.results.files.digests import check_study, read_record, write_record
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 SCHEMA = 1
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.compare.claims import (
+from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
+from harness.study.papers.claims import (
     claim_all,
     claim_decreasing,
     claim_lower_error,
@@ -13,7 +14,6 @@ from harness.compare.claims import (
     claim_published_value,
     correct_claims,
 )
-from harness.results.benchmark_statement import BenchmarkStatement, Verdict
 
 
 def by_clip(values: np.ndarray) -> dict[str, float]:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.errors import BadFile
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import check_study, read_record, write_record
+from harness.results.files.digests import check_study, read_record, write_record
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 SCHEMA = 1
 _RENAMED_KEYS = {"stays": "selection_stability", "crossed": "cross_validated_error", "worth": "contributions"}

@@ -11,7 +11,7 @@ from filelock import FileLock, Timeout
 
 from harness.core.files import read_json
 from harness.errors import BadFile, BadInput
-from harness.results.digests import STUDY_FILE
+from harness.results.files.digests import STUDY_FILE
 from harness.results.index import INDEX_FILE, CellIndex
 
 CELLS_FILE = "cells.json"

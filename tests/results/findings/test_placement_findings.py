@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile
-from harness.results.placement_findings import PlacementFindings, read_placement, write_placement
+from harness.results.findings.placement_findings import PlacementFindings, read_placement, write_placement
 from tests.results.rewrite import read_json, write_json
 
 Damage = Callable[[dict[str, Any]], Any]

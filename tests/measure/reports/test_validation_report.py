@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from harness.core.arrays import Floats
-from harness.measure.validation_report import error_quantiles
+from harness.measure.reports.validation_report import error_quantiles
 
 PERIOD_S = 1.0 / 40.0
 

@@ -9,7 +9,6 @@ import numpy as np
 from harness.core.arrays import Floats, freeze
 from harness.core.number_format import Interval
 from harness.errors import BadInput
-from harness.measure.departures import Departure
 from harness.measure.episode_distributions import events_for_precision, recording_minutes
 from harness.measure.episode_fit import EXCURSION_RATE, SeriesEpisodes
 from harness.measure.gauss_markov import NOISE_KEYS
@@ -22,6 +21,7 @@ from harness.measure.noise_spectra import (
     pool_spectra,
 )
 from harness.measure.profile import QualityClass, StretchLength, UnitProfile
+from harness.measure.reports.departures import Departure
 from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.static_series import StaticSeries

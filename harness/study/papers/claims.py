@@ -9,7 +9,12 @@ import numpy as np
 from harness.compare.margins import margin_of
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
-from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind, Verdict
+from harness.results.findings.benchmark_statement import (
+    BenchmarkStatement,
+    Reading,
+    StatementKind,
+    Verdict,
+)
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 Errors = Mapping[str, float]

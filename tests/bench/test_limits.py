@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from harness.bench.limits import hold_to_limit, state_verdict
 from harness.core.fields import build
-from harness.results.benchmark_statement import BenchmarkStatement, Verdict, hold_to_limit, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.digests import write_result_json
-from harness.results.findings import (
+from harness.results.files.digests import write_result_json
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.paper_findings import (
     BarChart,
     FindingsTable,
     LineChart,

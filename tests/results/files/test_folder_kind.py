@@ -7,9 +7,9 @@ import pytest
 
 from harness.commands.report import run_report
 from harness.errors import BadFile
-from harness.results.folder_kind import folder_kind, require_kind
+from harness.results.files.folder_kind import folder_kind, require_kind
+from harness.results.files.integrity import check_folder
 from harness.results.index import CellIndex
-from harness.results.integrity import check_folder
 from tests.results.rewrite import write_json
 
 FILES: dict[str, dict[str, dict[str, object]]] = {

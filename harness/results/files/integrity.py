@@ -11,8 +11,8 @@ from typing import Any
 from harness.core.files import MAX_JSON_BYTES
 from harness.errors import BadFile
 from harness.results.cell import OPTIONAL_COLUMNS, cell_folder, read_content, row_of_content
-from harness.results.digests import check_file, file_digest, read_result_json
-from harness.results.folder_kind import require_kind
+from harness.results.files.digests import check_file, file_digest, read_result_json
+from harness.results.files.folder_kind import require_kind
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest
 
