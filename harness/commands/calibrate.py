@@ -152,7 +152,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
             opened.callback(view.close)
             print_status(view.description)
             displays.append(view)
-        config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+        config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.port))
         device = opened.enter_context(
             open_tracker(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )

@@ -136,13 +136,13 @@ def refuse_flags_of_others(args: argparse.Namespace, flags_by_use: Mapping[str, 
         refuse_flags(args, [name], f"with {use}", f"It applies to {users}: leave it out.")
 
 
-def line_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The driver options that those flags and `--stations head=3` give; BadInput for --baud without a serial port."""
-    if args.baud is not None and "://" in args.port:
-        raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    if args.port.startswith("udp:"):
+def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
+    """The driver options that those flags and `--stations head=3` give; BadInput for flags that no such port takes."""
+    if args.baud is not None and "://" in port:
+        raise BadInput(f"--baud with {port}.", "It is for a serial port: leave it out.")
+    if port.startswith("udp:"):
         advice = "It needs commands, and UDP carries none: leave it out."
-        refuse_flags(args, sorted(LINE_FLAGS), f"with {args.port}", advice)
+        refuse_flags(args, sorted(LINE_FLAGS), f"with {port}", advice)
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
     if characters := parse_characters(args.stations):
         options["characters"] = characters

@@ -24,10 +24,7 @@ from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
     from harness.calibrate.calibration_file import CalibrationFile
-    from harness.calibrate.guided_calibration import Calibrator
-    from harness.core.calibration import Calibration
     from harness.experiment.playback import Playback
-    from harness.live.outputs import SessionSetup
     from harness.stream.is900.driver import DriverConfig, Tracker
     from harness.stream.line_events import EventCounter
     from harness.stream.recording.recorder import RecordingSwitch
@@ -87,10 +84,12 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
+    from harness.calibrate.guided_calibration import TPoseCalibrator
     from harness.commands import live_summary
     from harness.experiment.isolation import DEFAULT_ISOLATION
     from harness.experiment.remote_method import resolve_method
     from harness.live.outputs import OutputOptions, open_outputs
+    from harness.live.pose import SessionSetup
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
     from harness.stream.line_events import EventCounter
@@ -114,12 +113,20 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":
-        calibration = _calibrate_by_poses(args.port, config, playback, events, playback_options)
-        playback = playback.with_calibration(calibration)
+        stored = _calibrate_by_poses(args.port, config, playback, events, playback_options)
+        playback = playback.with_calibration(stored)
     elif args.calibration not in _CALIBRATION_KINDS:
-        calibration = _read_calibration(args.calibration)
-        playback = playback.with_calibration(calibration, named=isinstance(stations, list), say=print_status)
-    setup = _describe_session(playback, f"{args.method} on {args.port}", in_room=args.calibration != "tpose")
+        stored = _read_calibration(args.calibration)
+        playback = playback.with_calibration(stored, named=isinstance(stations, list), say=print_status)
+    body, calibration = playback.performer_calibration.body, playback.calibration
+    tpose = args.calibration == "tpose"  # the first seconds of the session calibrate
+    setup = SessionSetup(
+        body.skeleton,
+        tuple(playback.scenario.stations),
+        playback.tracker.rate_hz,
+        None if tpose else (calibration.world_from_tracker, calibration.tracker_origin_m),
+        f"{args.method} on {args.port}",
+    )
     with ExitStack() as opened:
         recorder = RecordingSwitch()
         outputs = open_outputs(output_options, setup, recorder, opened, print_status)
@@ -128,16 +135,16 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
             reconstructor = playback.clip_evaluation.fit_method(method, args.method)
-            warm_up(reconstructor, playback.calibration, playback.simulation.frames[:_WARM_UP_FRAMES])
+            warm_up(reconstructor, calibration, playback.simulation.frames[:_WARM_UP_FRAMES])
             with defer_interrupts():
                 probe = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
             options = LiveOptions(setup.rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
             result = run_session(
                 device,
-                playback.performer_calibration.body,
+                body,
                 reconstructor,
-                _initial_calibration(args.calibration, playback),
+                TPoseCalibrator(playback.body, playback.mounts) if tpose else calibration,
                 outputs,
                 options,
                 say=print_status,
@@ -168,7 +175,7 @@ def _driver_config(args: argparse.Namespace, playback: "Playback") -> "DriverCon
     from harness.stream.is900.codec.items import position_range_m
     from harness.stream.is900.driver import DriverConfig
 
-    options = {"items": playback.tracker.items, **line_options(args)}
+    options = {"items": playback.tracker.items, **line_options(args, args.port)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
     stations = tuple(playback.scenario.stations)
     return DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
@@ -197,20 +204,6 @@ def _open_device(
         print_status(f"{where}; stations {device.station_list}")
         print_status(device.setup_note)
         yield device
-
-
-def _describe_session(playback: "Playback", title: str, *, in_room: bool) -> "SessionSetup":
-    """What outputs show of the session; the room is left out where its first seconds calibrate it."""
-    from harness.live.outputs import SessionSetup
-
-    calibration = playback.calibration
-    return SessionSetup(
-        playback.performer_calibration.body.skeleton,
-        tuple(playback.scenario.stations),
-        playback.tracker.rate_hz,
-        (calibration.world_from_tracker, calibration.tracker_origin_m) if in_room else None,
-        title,
-    )
 
 
 def _read_calibration(name: str) -> "CalibrationFile":
@@ -242,11 +235,3 @@ def _calibrate_by_poses(
     for line in found.lines:
         print_status(line)
     return found.file
-
-
-def _initial_calibration(kind: str, playback: "Playback") -> "Calibration | Calibrator":
-    from harness.calibrate.guided_calibration import TPoseCalibrator
-
-    if kind == "tpose":
-        return TPoseCalibrator(playback.body, playback.mounts)
-    return playback.calibration

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from harness.core.arrays import Floats
 from harness.core.interrupts import defer_interrupts
-from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.live.browser_view import BrowserOutput
 from harness.live.file_outputs import BvhOutput, PoseTableOutput
 from harness.live.lsl import LslOutput
-from harness.live.pose import Output
+from harness.live.pose import Output, SessionSetup
 from harness.live.viewer import ViewerOutput
 from harness.live.vmc import VmcOutput
 from harness.stream.recording.recorder import RecordingSwitch
@@ -48,19 +46,6 @@ class OutputOptions:
             raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
         if self.anywhere and self.lsl is None:
             raise BadInput("--anywhere without --lsl.", "Name the streams with --lsl.")
-
-
-@dataclass(frozen=True, eq=False)
-class SessionSetup:
-    """What outputs show of a live session beside its poses."""
-
-    skeleton: Skeleton
-    stations: tuple[str, ...]
-    rate_hz: float
-    """Expected frame rate of the tracker [Hz]."""
-    room: tuple[Floats, Floats] | None
-    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
-    title: str
 
 
 def open_outputs(
@@ -99,8 +84,7 @@ def _requested_outputs(
     if options.poses is not None:
         yield PoseTableOutput(options.poses, setup.skeleton, setup.stations, force=options.force)
     if options.view == "browser":
-        folder = options.out or Path()
-        page = BrowserOutput(setup.skeleton, setup.stations, setup.room, recorder, folder, setup.title)
+        page = BrowserOutput(setup, recorder, options.out or Path())
         if not options.no_browser and not webbrowser.open(page.url):
             say("No browser was found: open the address in one.")
         yield page

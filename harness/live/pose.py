@@ -1,4 +1,4 @@
-"""The input of outputs: an estimate with its posed body and its times."""
+"""The input of outputs: what a session is of, and each estimate with its posed body and its times."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,21 @@ from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate
+from harness.core.skeleton import Skeleton
 from harness.stream.frame import TrackerFrame
+
+
+@dataclass(frozen=True, eq=False)
+class SessionSetup:
+    """What outputs show of a live session beside its poses."""
+
+    skeleton: Skeleton
+    stations: tuple[str, ...]
+    rate_hz: float
+    """Expected frame rate of the tracker [Hz]."""
+    room: tuple[Floats, Floats] | None
+    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
+    title: str
 
 
 @dataclass(frozen=True, eq=False)
