@@ -25,7 +25,6 @@ from harness.experiment.calibration_session import CalibrationSession
 from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.reconstruct.methods.ik import PREVIOUS
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.emulator.server import serve_emulator
 from harness.stream.recording.replay import RecordingStream
@@ -204,7 +203,7 @@ class Witness:
 
     def begin(self, calibration: Calibration) -> "Noted":
         self.sessions.append((calibration, []))
-        inner = PREVIOUS.fit(self.bodies[-1], [], np.random.default_rng(1)).begin(calibration)
+        inner = registry.resolve("ik:previous").fit(self.bodies[-1], [], np.random.default_rng(1)).begin(calibration)
         return Noted(inner, self.sessions[-1][1])
 
 
@@ -234,7 +233,8 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     assert told.stations == STATIONS
     np.testing.assert_array_equal(told.mount_m, kept.calibration.mount_m)
     np.testing.assert_array_equal(told.bone_from_station, kept.calibration.bone_from_station)
-    session = PREVIOUS.fit(build_body(kept.skeleton), [], np.random.default_rng(1)).begin(kept.calibration)
+    fitted = registry.resolve("ik:previous").fit(build_body(kept.skeleton), [], np.random.default_rng(1))
+    session = fitted.begin(kept.calibration)
     with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(frames) > 10
