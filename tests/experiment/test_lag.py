@@ -23,8 +23,8 @@ from harness.report.run.data import read_run
 from harness.report.run.ranking import describe_rankings
 from harness.report.run.text import run_table
 from harness.results.cell import Cell
-from harness.results.reader import load_results, select_cells
-from harness.results.storage import read_summary
+from harness.results.reader import load_results
+from harness.results.storage import read_cells, read_summary
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.experiment.late_methods import NAMES, SIGMA_RAD, Late, spoilt
@@ -48,7 +48,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def cells(run: Path) -> dict[str, Cell]:
-    return {cell.method: cell for cell in select_cells(run)}
+    return {cell.method: cell for cell in read_cells(run)}
 
 
 def test_each_answer_is_scored_at_its_frame(cells: dict[str, Cell]) -> None:

@@ -23,8 +23,7 @@ from harness.experiment.remote_method import (
     hash_method,
     resolve_method,
 )
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
+from harness.results.storage import read_cells, read_summary
 from tests.experiment.test_isolation import ONE_CLIP
 
 UPRIGHT = Path(__file__).parents[1] / "testing" / "upright.py"
@@ -93,7 +92,7 @@ def test_an_edit_never_meets_cells_of_before(folder: Path, tmp_path: Path) -> No
         files = {"tools/gains.py": f"ANGLE = {helper}", "weights.json": str(weight)}
         write_method(folder, training, READS_WEIGHTS[1], files)
         engine.run(replace(ONE_CLIP, methods=("mine:Mine",)), tmp_path / "run")
-        poses = {cell.key: float(cell.estimate_qpos[0, 10]) for cell in select_cells(tmp_path / "run")}
+        poses = {cell.key: float(cell.estimate_qpos[0, 10]) for cell in read_cells(tmp_path / "run")}
         (row,) = read_summary(tmp_path / "run")["cells"]
         errors.append((row["joint_angle_mean_deg"], poses[row["key"]]))
     assert len({error for error, _ in errors}) == 3

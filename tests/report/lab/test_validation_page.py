@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.number_format import Interval, format_fixed
 from harness.errors import ShapeError
-from harness.measure.validation_report import ResidualSeries, ValidationReport
+from harness.measure.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import page_text
 from harness.report.lab.quantities import find_quantity
@@ -102,11 +102,10 @@ def test_reasons_stand_below_the_accuracy(late_capture: ValidationReport) -> Non
     """Stations with one reason share its line, and the answer is over the others."""
     short = Interval.missing("The capture is too short.")
     first, second, *others = late_capture.accuracy
-    rows = {}
-    for station in (first, second):
-        row = late_capture.accuracy[station]
-        missing = replace(row.position, rms=short, median=short, quantile95=short)
-        rows[station] = replace(row, position=missing)
+    rows = {
+        station: replace(late_capture.accuracy[station], position=ErrorQuantiles(short, short, short))
+        for station in (first, second)
+    }
     report = replace(late_capture, accuracy={**late_capture.accuracy, **rows})
     assert f"not measured: {first}, {second}: {short.reason}" in printed(report)
     assert "not measured: " not in printed(late_capture)
