@@ -15,11 +15,11 @@ from harness.stream.is900.codec.readings import Readings, concatenate_readings
 from harness.stream.is900.codec.records import RecordValues, encode_records
 
 RATE_HZ = 40.0
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
 
 def make_readings(rounds: int = 40, stations: int = 3, seed: int = 1) -> Readings:
     """Readings of stations that move at up to 10 m/s and 1000 deg/s."""
+    rng = np.random.default_rng(seed)
     station = np.tile(np.arange(stations), rounds)
     time_s = np.repeat(np.arange(rounds), stations) / RATE_HZ + 0.003 * station
     sway = np.sin(2.0 * np.pi * 2.0 * time_s + station)
