@@ -31,6 +31,7 @@ from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
+PREVIOUS = registry.resolve("ik:previous")
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 
@@ -203,7 +204,7 @@ class Witness:
 
     def begin(self, calibration: Calibration) -> "Noted":
         self.sessions.append((calibration, []))
-        inner = registry.resolve("ik:previous").fit(self.bodies[-1], [], np.random.default_rng(1)).begin(calibration)
+        inner = PREVIOUS.fit(self.bodies[-1], [], np.random.default_rng(1)).begin(calibration)
         return Noted(inner, self.sessions[-1][1])
 
 
@@ -233,7 +234,7 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     assert told.stations == STATIONS
     np.testing.assert_array_equal(told.mount_m, kept.calibration.mount_m)
     np.testing.assert_array_equal(told.bone_from_station, kept.calibration.bone_from_station)
-    fitted = registry.resolve("ik:previous").fit(build_body(kept.skeleton), [], np.random.default_rng(1))
+    fitted = PREVIOUS.fit(build_body(kept.skeleton), [], np.random.default_rng(1))
     session = fitted.begin(kept.calibration)
     with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
