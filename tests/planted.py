@@ -26,7 +26,7 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.results.cell import Cell
-from harness.results.storage import read_cells
+from harness.results.reader import select_cells
 from tests.products import Make, run_verb
 
 METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}
@@ -182,7 +182,7 @@ def measured_cell() -> Cell:
     """A cell of the verb `run`."""
     with TemporaryDirectory() as folder:
         plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
-        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
+        (cell,) = select_cells(planted_run(Path(folder) / "run", plan))
         return cell
 
 

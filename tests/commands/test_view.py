@@ -11,10 +11,9 @@ import pytest
 from harness.commands.viewed_motion import open_motion, view_clip
 from harness.core import rotations
 from harness.experiment.playback import prepare_playback
-from harness.mocap.sources import MOCAP_VARIABLE
-from harness.mocap.synthetic import generate
+from harness.mocap.sources import MOCAP_VARIABLE, SyntheticSource
 from harness.report.kit.motion_player import NO_ESTIMATE
-from harness.results.storage import read_cells
+from harness.results.reader import select_cells
 from harness.score.pair import compute_poses
 from harness.view.page import ViewedMotion
 from tests.command import Command
@@ -31,7 +30,7 @@ def opened(what: Path | str, methods: list[str] | None = None, **playback: str |
 
 def test_a_built_in_take_is_shown_on_its_own_skeleton() -> None:
     clip = opened("walking_p1_01").clip(0)
-    made = generate("walking", "p1", 1, seed=1)
+    made = SyntheticSource(1).load("walking_p1_01")
     assert clip.truth is not None
     np.testing.assert_array_equal(clip.truth.joints_m[:, 0], made.root_m)
     assert clip.time_s[-1] == pytest.approx(made.duration_s)
@@ -39,7 +38,7 @@ def test_a_built_in_take_is_shown_on_its_own_skeleton() -> None:
 
 
 def test_a_clip_faces_where_its_root_does() -> None:
-    made = generate("walking", "p1", 1, seed=1, duration_s=1.0)
+    made = SyntheticSource(1).load("walking_p1_01")
     ahead = rotations.mean_heading_rad(made.world_from_root)
     assert view_clip(made).clip(0).heading_rad == ahead
     turned = rotations.multiply(rotations.about_z(1.0), made.world_from_root)
@@ -55,7 +54,7 @@ def test_a_run_has_its_methods_the_best_first_or_the_chosen_ones(viewed: Path) -
     assert chosen.shown == ("far", "map")
     clip = chosen.clip(0)
     assert [track.name for track in clip.estimates] == ["far", "map"]
-    (cell,) = [cell for cell in read_cells(viewed) if (cell.clip, cell.method) == (clip.name, "far")]
+    (cell,) = [cell for cell in select_cells(viewed) if (cell.clip, cell.method) == (clip.name, "far")]
     poses = compute_poses(chosen.skeleton.with_bones(cell.estimate_bone_m), cell.estimate_qpos)
     answered = clip.estimates[0].states != NO_ESTIMATE
     assert not answered.all()
