@@ -14,7 +14,7 @@ for number in (signal.SIGINT, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") els
     if signal.getsignal(number) is signal.SIG_IGN:  # started in the background: tests that send signals need them
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
-pytest_plugins = ["tests.command", "tests.products", "tests.scored_run"]
+pytest_plugins = ["tests.command", "tests.products", "tests.planted", "tests.scored_run"]
 
 settings.register_profile("fixed", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("fixed")

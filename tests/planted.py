@@ -1,6 +1,7 @@
 """Runs of the verb `run` whose methods err by a known size: everything but the answers of the methods is the verb's."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -25,8 +26,8 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.results.cell import Cell
-from harness.results.storage import read_cells
-from tests.products import run_verb
+from harness.results.reader import select_cells
+from tests.products import Make, run_verb
 
 METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}
 """Method -> size of its errors [deg]. A plan may have other names too."""
@@ -144,19 +145,21 @@ def _worse_by(take: ObservedTake, plan: Plan) -> int:
 
 
 @dataclass(frozen=True)
-class SweepPlan:
-    """What the sweep contains."""
+class MeansPlan:
+    """What a run or a sweep contains whose errors are planted clip by clip."""
 
-    scenarios: Sequence[str] = ("walking", "boxing")
-    """Behaviours, each a scenario."""
+    behaviours: tuple[str, ...] = ("walking", "boxing")
+    """Each of them a scenario of a sweep."""
     clips: int = 7
+    """Performers of each behaviour, with one take each."""
     methods: Mapping[str, float] = field(default_factory=lambda: {"ik": 3.0, "local_pca": 1.6, "dynamic_map": 1.4})
     """Method -> its error [deg]."""
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Key -> values; the n-th makes errors larger by n tenths."""
     seeds: Sequence[int] = (1,)
+    """Of a sweep."""
     known: int = 0
-    """Number of performers of each scenario that methods know from other takes."""
+    """Number of performers that methods know from other takes."""
     failing: tuple[str, ...] = ()
     """Methods whose cells fail."""
     unmeasured: tuple[str, ...] = ()
@@ -164,33 +167,60 @@ class SweepPlan:
     lags: Mapping[str, int] = field(default_factory=dict)
     """Method -> its lag [frames]."""
 
+    @property
+    def exit_code(self) -> int:
+        """Of the verb that runs it."""
+        return 4 if self.failing else 3 if set(self.methods) <= set(self.unmeasured) else 0
+
+    def scenario(self, *behaviours: str) -> dict[str, Any]:
+        """The scenario of these behaviours, without what is varied."""
+        return _scenario(Plan(behaviours, self.methods, takes=self.clips, duration_s=1.5, known=self.known))
+
 
 @cache
 def measured_cell() -> Cell:
     """A cell of the verb `run`."""
     with TemporaryDirectory() as folder:
         plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=1.5)
-        (cell,) = read_cells(planted_run(Path(folder) / "run", plan))
+        (cell,) = select_cells(planted_run(Path(folder) / "run", plan))
         return cell
 
 
-def planted_sweep(out: Path, plan: SweepPlan = SweepPlan()) -> Path:
+def planted_sweep(out: Path, plan: MeansPlan = MeansPlan()) -> Path:
     """The folder of a sweep, without its page, by the verb `sweep`; only the errors of its cells are planted."""
-    template = measured_cell()
     folder = out.with_name(f"{out.name}_scenarios")
     folder.mkdir(parents=True)
-    for behaviour in plan.scenarios:
-        like = Plan((behaviour,), plan.methods, takes=plan.clips, duration_s=1.5, known=plan.known)
-        (folder / f"{behaviour}.toml").write_text(tomli_w.dumps(_scenario(like)), encoding="utf-8")
+    for behaviour in plan.behaviours:
+        (folder / f"{behaviour}.toml").write_text(tomli_w.dumps(plan.scenario(behaviour)), encoding="utf-8")
     content = {
         "schema": 1,
         "name": "planted",
-        "scenarios": [f"./{behaviour}.toml" for behaviour in plan.scenarios],
+        "scenarios": [f"./{behaviour}.toml" for behaviour in plan.behaviours],
         "methods": list(plan.methods),
         "seeds": list(plan.seeds),
         **({"vary": dict(plan.vary)} if plan.vary else {}),
     }
     (folder / "sweep.toml").write_text(tomli_w.dumps(content), encoding="utf-8")
+    with planted_means(plan), pytest.MonkeyPatch.context() as patch:
+        patch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
+        run_verb("sweep", folder / "sweep.toml", "--out", out, "--jobs", "1", code=plan.exit_code)
+    return out
+
+
+def planted_means_run(out: Path, plan: MeansPlan) -> Path:
+    """The folder of a run, without its page, by the verb `run`; only the errors of its cells are planted."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    scenario, vary = out.with_name(f"{out.name}.toml"), {"vary": dict(plan.vary)} if plan.vary else {}
+    scenario.write_text(tomli_w.dumps(plan.scenario(*plan.behaviours) | vary), encoding="utf-8")
+    with planted_means(plan):
+        run_verb("run", scenario, "--out", out, "--no-report", "--jobs", "1", code=plan.exit_code)
+    return out
+
+
+@contextmanager
+def planted_means(plan: MeansPlan) -> Iterator[None]:
+    """Cells are that of `measured_cell`, with the errors of the plan."""
+    template = measured_cell()
 
     def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
         name, clip, seed = planned.method, str(setting.part), planned.scenario.seed
@@ -201,7 +231,7 @@ def planted_sweep(out: Path, plan: SweepPlan = SweepPlan()) -> Path:
         error = plan.methods[name] * worse * float(np.exp(0.2 * draw))
         metrics = {**template.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 6.0 * error, "mpjre_deg": 1.7 * error}
         if name in plan.unmeasured:
-            metrics = dict.fromkeys(metrics)
+            metrics = {metric: value if metric.startswith("frames_") else None for metric, value in metrics.items()}
         lag = {"lag": plan.lags[name]} if name in plan.lags else {}
         return replace(
             template,
@@ -223,7 +253,30 @@ def planted_sweep(out: Path, plan: SweepPlan = SweepPlan()) -> Path:
         for name in set(plan.methods) - set(registry.methods()):
             patch.setitem(registry._BUILT_IN, name, MeanPose)
         patch.setattr(cells, "evaluate_cell", judge)
-        patch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
-        code = 4 if plan.failing else 3 if set(plan.methods) <= set(plan.unmeasured) else 0
-        run_verb("sweep", folder / "sweep.toml", "--out", out, "--jobs", "1", code=code)
-    return out
+        yield
+
+
+RANKED = {"expert_map": 1.0, "twin_map": 1.15, "ik": 2.0, "mean_pose": 8.0}
+"""Method -> its error [deg]: `twin_map` is tied with `expert_map`, the others are worse."""
+
+
+@pytest.fixture(scope="session")
+def ranked(made_once: Make) -> Path:
+    """A run of one condition in which methods are tied and worse, on one take of each of eight performers."""
+    plan = MeansPlan(("jumping",), 8, RANKED)
+    return made_once("ranked", lambda folder: planted_means_run(folder / "run", plan)) / "run"
+
+
+@pytest.fixture(scope="session")
+def conditions(made_once: Make) -> Path:
+    """A run of two noise presets and eight performers, of whom six are known."""
+    methods, vary = {"ik:previous": 2.0, "ik:previous[jump_m=1.0]": 1.0}, {"noise": ("clean", "default")}
+    plan = MeansPlan(("jumping",), 8, methods, vary, known=6)
+    return made_once("conditions", lambda folder: planted_means_run(folder / "run", plan)) / "run"
+
+
+@pytest.fixture(scope="session")
+def viewed(made_once: Make) -> Path:
+    """A run of two clips whose methods are near, nearer and far from the truth, with frames that lack an estimate."""
+    plan = Plan(methods={"ik": 2.0, "map": 1.0, "far": 30.0}, duration_s=2.0, covered=0.9)
+    return made_once("viewed", lambda folder: planted_run(folder / "run", plan)) / "run"

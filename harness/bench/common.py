@@ -19,9 +19,9 @@ from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.remote_method import close_methods
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
+from harness.results.storage import open_study
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import exact_calibration
-from harness.study.papers.paper_study import open_study
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 """Stations of the first paper (Liu et al. 2011)."""

@@ -17,13 +17,13 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
+from harness.bench.limits import hold_to_limit
 from harness.body.retargeting import retarget_to_common_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.benchmark_clips import load_clean_scenario
 from harness.experiment.cells import ClipTask, evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import ScenarioMotion
@@ -36,7 +36,8 @@ from harness.mocap.sources import (
     open_motion_source,
 )
 from harness.reconstruct import registry
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.study.speed.benchmark_clips import load_clean_scenario
 
 METHOD = "local_pca"
 BLOCK_S, MOST_BLOCKS, MOST_TAKES = 2.0, 6, 3

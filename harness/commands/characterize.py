@@ -105,8 +105,7 @@ def _record_stretches(args: argparse.Namespace) -> Path:
         f"event a minute each. This capture rests for {minutes:g} minutes. Stop with Ctrl-C; the same command goes on."
     )
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    args.port = args.source
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.source))
     with recording_note(path, ", and the same command resumes."):
         capture_stretches(
             args.source,

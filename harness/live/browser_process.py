@@ -3,7 +3,6 @@
 import secrets
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from threading import Event, Lock
 from typing import Any
 
@@ -12,9 +11,10 @@ import numpy as np
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
-from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.core.skeleton import forward_kinematics
 from harness.errors import BadInput
 from harness.live.live_statistics import LiveStatistics
+from harness.live.pose import SessionSetup
 from harness.live.shared_memory import PoseRing
 from harness.view.live_page import LiveContent
 from harness.view.server import ViewServer
@@ -23,18 +23,6 @@ _RATE_HZ = 30.0
 """Most frames per second that are sent to the page."""
 _STATUS_PERIOD_S = 0.5
 _ANSWER_TIMEOUT_S = 10.0
-
-
-@dataclass(frozen=True)
-class BrowserConfig:
-    """What the process shows."""
-
-    bone_m: Floats
-    """(B, 3) bone vectors of the body [m]."""
-    stations: tuple[str, ...]
-    room: tuple[Floats, Floats] | None
-    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
-    title: str
 
 
 class RecordingCommands:
@@ -65,12 +53,11 @@ class RecordingCommands:
             self._answered.set()
 
 
-def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
+def run_browser(setup: SessionSetup, ring: PoseRing, pipe: Any) -> None:
     """Serve until the pipe closes. The first message to the session is the address of the page."""
-    skeleton = humanoid24.standard_skeleton().with_bones(config.bone_m)
     token, commands = secrets.token_urlsafe(24), RecordingCommands(pipe)
-    content = LiveContent(config.title, skeleton, config.stations, token)
-    statistics, seen, status_s = LiveStatistics(config.stations, time.monotonic), 0, 0.0
+    content = LiveContent(setup.title, setup.skeleton, setup.stations, token)
+    statistics, seen, status_s = LiveStatistics(setup.stations, time.monotonic), 0, 0.0
     with ViewServer(content.find, {"record": commands.record}, token=token) as server:
         pipe.send(server.url)
         try:
@@ -82,7 +69,7 @@ def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
                 for head, columns in zip(records[:, :4], stations, strict=True):
                     statistics.add(PoseRing.frame(head, columns), Status(int(head[3])), float(head[2]))
                 if len(records):
-                    server.publish("frame", _frame(config, skeleton, records[-1:], stations[-1]))
+                    server.publish("frame", _frame(setup, records[-1:], stations[-1]))
                 statistics.update()
                 if (now_s := time.monotonic()) - status_s >= _STATUS_PERIOD_S:
                     status_s = now_s
@@ -91,17 +78,17 @@ def run_browser(config: BrowserConfig, ring: PoseRing, pipe: Any) -> None:
             return
 
 
-def _frame(config: BrowserConfig, skeleton: Skeleton, record: Floats, stations: Floats) -> dict[str, Any]:
+def _frame(setup: SessionSetup, record: Floats, stations: Floats) -> dict[str, Any]:
     """A frame for the page: joints [mm], status, and of each station its pose, quality and state."""
     root_m, quaternion, angles_rad = humanoid24.unpack(PoseRing.qpos(record))
-    pose = forward_kinematics(skeleton, root_m, quaternion, angles_rad)
+    pose = forward_kinematics(setup.skeleton, root_m, quaternion, angles_rad)
     joints_m = np.concatenate([root_m, pose.end_m[0]])
     worn: list[dict[str, Any]] = []
     for columns in stations:
         valid = columns[8:10] > 0.0
         station = {"quality": round(float(columns[7]), 3), "state": 2 - int(valid.sum()), "pose": None}
-        if config.room is not None and valid.all():
-            world_from_tracker, origin_m = config.room
+        if setup.room is not None and valid.all():
+            world_from_tracker, origin_m = setup.room
             at_m = rotations.rotate(world_from_tracker, columns[:3]) + origin_m
             turn = rotations.multiply(world_from_tracker, columns[3:7])
             station["pose"] = np.rint(1e3 * np.concatenate([at_m, turn])).astype(int).tolist()

@@ -10,13 +10,10 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from harness.core.arrays import Floats
 from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
-from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, HarnessError
-from harness.live.browser_process import BrowserConfig
-from harness.live.pose import LivePose
+from harness.live.pose import LivePose, SessionSetup
 from harness.live.shared_memory import PoseRing, first_message
 from harness.stream.recording.recorder import RecordingSwitch
 
@@ -28,27 +25,18 @@ class BrowserOutput:
 
     name = "--view browser"
 
-    def __init__(
-        self,
-        skeleton: Skeleton,
-        stations: tuple[str, ...],
-        room: tuple[Floats, Floats] | None,
-        recorder: RecordingSwitch,
-        folder: Path,
-        title: str,
-    ) -> None:
+    def __init__(self, setup: SessionSetup, recorder: RecordingSwitch, folder: Path) -> None:
         """Start the process and wait until it serves the page.
 
-        `room` is `world_from_tracker` (4,) and the tracker's origin [m]; `recorder` records into new files of `folder`.
-        BadFile when that is no folder, BadInput when the page cannot be served.
+        `recorder` records into new files of `folder`. BadFile when that is no folder, BadInput when the page cannot be
+        served.
         """
         if not folder.is_dir():
             raise BadFile(folder, "no folder", "a folder for recordings", "Name another with --out.")
         self._recorder, self._folder = recorder, folder
-        config = BrowserConfig(skeleton.bone_m, stations, room, title)
         with shield_children():  # a signal ends the session, and the session ends the viewer
-            self._ring = PoseRing(SPAWN, len(stations))
-            self._process = FunctionProcess(_run_process, config, self._ring)
+            self._ring = PoseRing(SPAWN, len(setup.stations))
+            self._process = FunctionProcess(_run_process, setup, self._ring)
         try:
             message = first_message(self._process)
             if isinstance(message, OSError):
@@ -93,14 +81,14 @@ class BrowserOutput:
         self._process.close(_END_TIMEOUT_S)
 
 
-def _run_process(pipe: Any, config: BrowserConfig, ring: PoseRing) -> None:
+def _run_process(pipe: Any, setup: SessionSetup, ring: PoseRing) -> None:
     """Entry point of the viewer's process, which runs at low priority. It reports its errors through the pipe."""
     if hasattr(os, "nice"):
         os.nice(10)
     try:
         from harness.live.browser_process import run_browser
 
-        run_browser(config, ring, pipe)
+        run_browser(setup, ring, pipe)
     except OSError as error:
         with suppress(OSError):  # the session has been killed
             pipe.send(OSError(str(error)))

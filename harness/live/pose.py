@@ -1,4 +1,4 @@
-"""The input of outputs: an estimate with its posed body and its times."""
+"""The input of outputs: what a session is of, and each estimate with its posed body and its times."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,18 +11,34 @@ from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate
+from harness.core.skeleton import Skeleton
 from harness.stream.frame import TrackerFrame
 
 
 @dataclass(frozen=True, eq=False)
+class SessionSetup:
+    """What outputs show of a live session beside its poses."""
+
+    skeleton: Skeleton
+    stations: tuple[str, ...]
+    rate_hz: float
+    """Expected frame rate of the tracker [Hz]."""
+    room: tuple[Floats, Floats] | None
+    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
+    title: str
+
+
+@dataclass(frozen=True, eq=False)
 class LivePose:
-    """One solved frame of a live session: the frame that the estimate answers, which a lag makes an earlier one."""
+    """One solved frame of a live session: the frame that the estimate answers, which may be earlier than that of the
+    step.
+    """
 
     number: int
     """Number of the pose, from 0; dropped frames are not counted."""
     frame: TrackerFrame
     taken_s: float
-    """Host monotonic clock when the frame of the step was taken from the queue, `estimate.lag` frames later [s]."""
+    """Host monotonic clock when the frame of the step was taken from the queue, when the estimate was made [s]."""
     ready_s: float
     """Host monotonic clock when the pose was ready [s]."""
     measured_s: float

@@ -15,9 +15,8 @@ from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import Pose, Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap.clip_file import find_skeleton_file
+from harness.mocap.clip_file import read_clip
 from harness.mocap.library import MotionLibrary
-from harness.mocap.read.amc import read_amc_clip
 from tests.body.conftest import clip_on, random_qpos
 
 STANDARD = humanoid24.standard_skeleton()
@@ -27,8 +26,8 @@ def amcs(mocap: Path) -> list[Path]:
     return [entry.path for entry in MotionLibrary(mocap).entries() if entry.format == "amc"]
 
 
-def as_recorded(path: Path, mocap: Path) -> Clip:
-    return read_amc_clip(find_skeleton_file(path, mocap.resolve()), path, rate_hz=120.0)
+def as_recorded(path: Path) -> Clip:
+    return read_clip(path, 120.0)
 
 
 def unwrapped(clip: Clip) -> Clip:
@@ -58,7 +57,7 @@ def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
 def test_staged_clips_are_exact_on_their_own_bodies(mocap: Path) -> None:
     """Every third clip; `make test-slow` checks every frame of all clips."""
     for path in amcs(mocap)[::3]:
-        clip = as_recorded(path, mocap)
+        clip = as_recorded(path)
         metres, radians = own_body_errors(clip, range(0, len(clip), max(1, len(clip) // 8)))
         assert metres < 1e-3, path.stem
         assert radians < np.deg2rad(0.1), path.stem
@@ -70,7 +69,7 @@ def test_every_frame_of_every_staged_clip_is_exact_on_its_own_body(
 ) -> None:
     errors = {}
     for path in amcs(mocap):
-        clip = as_recorded(path, mocap)
+        clip = as_recorded(path)
         errors[path.stem] = own_body_errors(clip, range(len(clip)))
     metres, radians = np.max(list(errors.values()), axis=0)
     with capsys.disabled():
@@ -176,7 +175,7 @@ def test_the_root_s_path_grows_with_the_legs_and_soles_stand_on_the_floor(lanky:
 def test_angles_of_files_are_kept_on_the_common_body(mocap: Path) -> None:
     """Angles are equal to the bit; unwrapping them before does not change the rotation of any bone."""
     for path in amcs(mocap)[::20]:
-        clip = as_recorded(path, mocap)
+        clip = as_recorded(path)
         own, dofs = clip.skeleton.subset(humanoid24.BONES)
         np.testing.assert_allclose(own.axes, STANDARD.axes, atol=1e-9)
         kept = humanoid24.unpack(retargeting.retarget_with_same_angles(clip, STANDARD)[0].qpos)[2]
@@ -198,7 +197,7 @@ def test_feet_that_never_stand_are_not_measured() -> None:
 
 def onto_standard(paths: list[Path], mocap: Path) -> Iterator[RetargetReport]:
     for path in paths:
-        yield retargeting.retarget_to_common_body(unwrapped(as_recorded(path, mocap)), STANDARD)[1]
+        yield retargeting.retarget_to_common_body(unwrapped(as_recorded(path)), STANDARD)[1]
 
 
 def hold(reports: list[RetargetReport]) -> None:

@@ -25,13 +25,13 @@ from harness.experiment.calibration_session import CalibrationSession
 from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.reconstruct.methods.ik import PREVIOUS
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.emulator.server import serve_emulator
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
+PREVIOUS = registry.resolve("ik:previous")
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 
@@ -234,7 +234,8 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     assert told.stations == STATIONS
     np.testing.assert_array_equal(told.mount_m, kept.calibration.mount_m)
     np.testing.assert_array_equal(told.bone_from_station, kept.calibration.bone_from_station)
-    session = PREVIOUS.fit(build_body(kept.skeleton), [], np.random.default_rng(1)).begin(kept.calibration)
+    fitted = PREVIOUS.fit(build_body(kept.skeleton), [], np.random.default_rng(1))
+    session = fitted.begin(kept.calibration)
     with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(frames) > 10

@@ -14,7 +14,7 @@ from harness.errors import BadInput, HarnessError
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario, find_scenario, load_scenario, variants
 from harness.mocap.sources import open_motion_source
-from harness.reconstruct.methods.ik import PREVIOUS
+from harness.reconstruct import registry
 from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.is900.driver.transport import open_transport
 from harness.stream.is900.emulator import server
@@ -57,7 +57,8 @@ def test_runs_know_nothing_of_faults() -> None:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
 
     def inputs(of: Scenario) -> dict[str, object]:
-        return ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking").conditions_of(PREVIOUS, "pos+ori")
+        evaluation = ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking")
+        return evaluation.conditions_of(registry.resolve("ik:previous"), "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))

@@ -10,7 +10,7 @@ from harness.cli import main
 from harness.commands import export
 from harness.core.humanoid24 import standard_skeleton
 from harness.mocap.write.export import FORMATS
-from harness.results.storage import read_cells
+from harness.results.reader import select_cells
 from tests.command import Command
 from tests.mocap.write.glb_file import read_glb
 from tests.short_demo import short_demo
@@ -61,7 +61,7 @@ def test_stations_are_at_their_nominal_mounts(run: Path, tmp_path: Path) -> None
     words = ["--clip", "walking_p1_01", "--method", "ik"]
     assert main(["export", str(run), "--format", "glb", "--out", str(tmp_path), *words]) == 0
     glb = read_glb(next(tmp_path.glob("*.glb")))
-    cell = next(cell for cell in read_cells(run) if cell.method == "ik" and cell.clip == "walking_p1_01")
+    cell = next(cell for cell in select_cells(run) if cell.method == "ik" and cell.clip == "walking_p1_01")
     stations = [node["name"] for node in glb.content["nodes"] if node["name"].startswith("truth station ")]
     assert sorted(stations) == sorted(f"truth station {name}" for name in cell.stations)
     skeleton = standard_skeleton().with_bones(cell.bone_m)

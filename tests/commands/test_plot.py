@@ -5,26 +5,22 @@ from pathlib import Path
 import pytest
 
 from tests.command import Command
-from tests.compare.sides import side, write_run
-from tests.report.figures.made_up import ranked_run
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return ranked_run(tmp_path_factory.mktemp("plot") / "run")
+from tests.planted import MeansPlan, planted_means_run
 
 
 def test_it_names_the_file_its_size_and_a_caption(
-    run: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+    ranked: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    lines = command("plot", run, "--out", "r.svg", "--methods", "ik,expert_map", "--width", "170").lines
+    lines = command("plot", ranked, "--out", "r.svg", "--methods", "ik,expert_map", "--width", "170").lines
     assert lines[0].startswith("figure: r.svg (170 x ")
-    assert lines[1].startswith("caption: Mean joint angle error on 15 clips. Lines: 95 % intervals over units.")
+    assert lines[1].startswith(
+        "caption: Mean joint angle error on 8 clips of 8 performers. Lines: 95 % intervals over units."
+    )
     assert lines[-1] == "pass"
     assert Path("r.svg").is_file()
-    assert "r.svg exists." in command("plot", run, "--out", "r.svg", code=2).err
-    said = command("plot", run, "--out", "r.svg", "--force", "--json").content
+    assert "r.svg exists." in command("plot", ranked, "--out", "r.svg", code=2).err
+    said = command("plot", ranked, "--out", "r.svg", "--force", "--json").content
     assert (said["path"], said["kind"], said["width_mm"], said["outcome"]) == ("r.svg", "ranking", 85.0, "pass")
 
 
@@ -34,25 +30,27 @@ def test_it_names_the_file_its_size_and_a_caption(
         ("--kind rankin", "Did you mean 'ranking'?"),
         ("--metric mpjpe_m", "Did you mean 'mpjpe_mm'?"),
         ("--methods ikk", "Did you mean 'ik'?"),
-        ("--kind time --clip walk_1", "Did you mean 'walk_"),
+        ("--kind time --clip jumping_p1", "Did you mean 'jumping_p"),
         ("--kind time --control ikk", "Did you mean 'ik'?"),
         ("--kind placement", "It is for a placement study."),
         ("--width 100", "Choose 85 or 170 mm."),
         ("--condition noise=clean", "no condition of the run called 'noise=clean'. Known: none."),
     ],
 )
-def test_what_is_refused_says_why(words: str, said: str, run: Path, tmp_path: Path, command: Command) -> None:
-    ended = command("plot", run, "--out", tmp_path / "x", *words.split(), code=2)
+def test_what_is_refused_says_why(words: str, said: str, ranked: Path, tmp_path: Path, command: Command) -> None:
+    ended = command("plot", ranked, "--out", tmp_path / "x", *words.split(), code=2)
     assert ended.out == "refused\n"
     assert said in ended.err.splitlines()[0]
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("failed", "code", "word"), [((), 3, "not comparable"), (("ik on walk_1",), 4, "incomplete")])
+@pytest.mark.parametrize(("failing", "code", "word"), [((), 3, "not comparable"), (("late",), 4, "incomplete")])
 def test_a_run_without_a_measured_cell_ends_as_the_run_did(
-    failed: tuple[str, ...], code: int, word: str, tmp_path: Path, command: Command
+    failing: tuple[str, ...], code: int, word: str, tmp_path: Path, command: Command
 ) -> None:
-    out = write_run(tmp_path / "run", side(metrics={"joint_angle_mean_deg": None}, failed=failed))
+    methods = dict.fromkeys(("ik", *failing), 1.0)
+    plan = MeansPlan(("jumping",), 1, methods, failing=failing, unmeasured=("ik",))
+    out = planted_means_run(tmp_path / "run", plan)
     for verb in ("plot", "table"):
         ended = command(verb, out, code=code)
         assert word in ended.out + ended.err

@@ -18,10 +18,11 @@ from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
-from harness.reconstruct.methods.ik import PREVIOUS
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
 from harness.simulate.components.stationary import WhiteNoise
+
+PREVIOUS = registry.resolve("ik:previous")
 
 SCENARIO = Scenario(
     name="small",

@@ -16,7 +16,7 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.compare.comparison import compare_runs
-from harness.compare.expected_orders import ExpectedOrder
+from harness.compare.run_summary.expected_orders import ExpectedOrder
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY
@@ -28,7 +28,8 @@ from harness.reconstruct.contract import Reconstructor, Session
 from harness.report.comparison.wording import comparison_sentence
 from harness.report.run.text import run_table
 from harness.results.manifest import Manifest
-from harness.results.storage import read_cells, read_summary
+from harness.results.reader import select_cells
+from harness.results.storage import read_summary
 from harness.stream.frame import TrackerFrame
 from tests.interrupts import heeding_interrupts
 from tests.short_demo import short_demo
@@ -122,7 +123,7 @@ def test_another_run_is_never_written_over(tmp_path: Path) -> None:
 def test_one_worker_or_two_give_the_same_results(tmp_path: Path) -> None:
     engine.run(SMALL, tmp_path / "one", jobs=1)
     engine.run(SMALL, tmp_path / "two", jobs=2)
-    one, two = ({cell.key: cell for cell in read_cells(tmp_path / name)} for name in ("one", "two"))
+    one, two = ({cell.key: cell for cell in select_cells(tmp_path / name)} for name in ("one", "two"))
     assert set(one) == set(two)
     for key, cell in one.items():
         np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
@@ -217,8 +218,8 @@ def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone
     varied = replace(VARIED, vary={"components.echo.share": [0.0, 0.2]})
     engine.run(varied, tmp_path / "varied")
     engine.run(replace(VARIED, vary={}, components={"echo": {"share": 0.2}}), tmp_path / "alone")
-    alone = {cell.clip: cell for cell in read_cells(tmp_path / "alone")}
-    both = list(read_cells(tmp_path / "varied"))
+    alone = {cell.clip: cell for cell in select_cells(tmp_path / "alone")}
+    both = list(select_cells(tmp_path / "varied"))
     for cell in both[2:]:
         np.testing.assert_array_equal(cell.estimate_qpos, alone[cell.clip].estimate_qpos)
         assert cell.defined_by == alone[cell.clip].defined_by
@@ -236,7 +237,7 @@ def test_a_stream_has_the_stations_that_are_worn_and_no_others(tmp_path: Path) -
     engine.run(replace(worn, stations=hung), tmp_path / "one")
     engine.run(replace(worn, stations=hung), tmp_path / "two", jobs=2)
     engine.run(replace(worn, stations={"pelvis": hung["pelvis"]}, vary={}), tmp_path / "alone")
-    one, two, alone = (list(read_cells(tmp_path / name)) for name in ("one", "two", "alone"))
+    one, two, alone = (list(select_cells(tmp_path / name)) for name in ("one", "two", "alone"))
     assert [cell.stations for cell in one] == 2 * [("pelvis",)] + 2 * [("pelvis", "left_hand")]
     assert [cell.key for cell in one] == [cell.key for cell in two]
     for cell, other in zip(one, two, strict=True):
@@ -305,7 +306,7 @@ def test_values_of_components_are_checked(tmp_path: Path, wrong: dict[str, objec
 def test_noise_components_change_what_is_seen(tmp_path: Path) -> None:
     echoes = replace(SMALL, methods=("mean_pose",), components={"echo": {"share": 0.3}})
     engine.run(echoes, tmp_path / "run")
-    cell = next(iter(read_cells(tmp_path / "run")))
+    cell = next(iter(select_cells(tmp_path / "run")))
     assert 0.15 < cell.health["echo_share"] < 0.45
     assert cell.noise == "default*"
 

@@ -16,7 +16,8 @@ from harness.experiment import engine
 from harness.experiment.isolation import Isolation
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
 from harness.results.cell import Cell
-from harness.results.storage import read_cells, read_summary
+from harness.results.reader import select_cells
+from harness.results.storage import read_summary
 from tests.experiment.evil_methods import FAILING, HANGING, HARMLESS, MARK, Honest, method_name
 
 HONEST = method_name(Honest)
@@ -38,7 +39,7 @@ def run(out: Path, *methods: str, jobs: int = 1, isolation: Isolation | None = N
     outcome = engine.run(
         replace(ONE_CLIP, methods=methods), out, jobs=jobs, isolation=isolation or Isolation(memory_limit_gb=MEMORY_GB)
     )
-    cells = {cell.method: cell for cell in read_cells(out)}
+    cells = {cell.method: cell for cell in select_cells(out)}
     assert outcome is (Outcome.PASS if set(cells) == set(methods) else Outcome.INCOMPLETE)
     return cells
 
@@ -59,7 +60,7 @@ def disturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def cells(disturbed: Path) -> dict[str, Cell]:
-    return {cell.method: cell for cell in read_cells(disturbed)}
+    return {cell.method: cell for cell in select_cells(disturbed)}
 
 
 def assert_same(cell: Cell, expected: Cell) -> None:

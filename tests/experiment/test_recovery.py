@@ -9,7 +9,8 @@ from harness.errors import Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import load_scenario
 from harness.report.run.text import run_table
-from harness.results.storage import read_cells, read_summary
+from harness.results.reader import select_cells
+from harness.results.storage import read_summary
 
 SCENARIO = """
 schema = 1
@@ -39,7 +40,7 @@ def test_recovery_is_measured_by_a_run(tmp_path: Path) -> None:
     (tmp_path / "lost.toml").write_text(SCENARIO)
     out = tmp_path / "out"
     assert engine.run(load_scenario(tmp_path / "lost.toml"), out) is Outcome.PASS
-    cells = {cell.varied["disturbance.kind"]: cell for cell in read_cells(out)}
+    cells = {cell.varied["disturbance.kind"]: cell for cell in select_cells(out)}
     plain, lost = cells["none"], cells["all_lost"]
     before = plain.time_s < 1.5 - 1e-9
     assert 55 < before.sum() < 62

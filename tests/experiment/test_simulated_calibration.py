@@ -27,13 +27,16 @@ from harness.experiment.simulated_calibration import (
 )
 from harness.mocap import synthetic
 from harness.mocap.sources import open_motion_source
-from harness.reconstruct.methods.ik import PREVIOUS
+from harness.reconstruct import registry
 from harness.reconstruct.methods.mean_pose import FittedMeanPose, MeanPose
 from harness.report.run.text import run_table
-from harness.results.storage import read_cells, read_summary
+from harness.results.reader import select_cells
+from harness.results.storage import read_summary
 from harness.simulate.simulation import Simulation, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame
 from tests.joint_centres import joint_centres_m
+
+PREVIOUS = registry.resolve("ik:previous")
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(
@@ -214,7 +217,7 @@ def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
     """And a run goes on where it was."""
     scenario = side_by_side("walking_p1_01", kinds=KINDS)
     assert engine.run(scenario, tmp_path) is Outcome.PASS
-    cells = list(read_cells(tmp_path))
+    cells = list(select_cells(tmp_path))
     assert [cell.calibration for cell in cells] == list(KINDS)
     for cell in cells:
         assert bool(cell.calibration_errors) == (cell.calibration != "exact")

@@ -11,9 +11,9 @@ from harness.cli import main
 from harness.errors import BadFile
 from harness.experiment.status import read_status
 from harness.results.cell import as_row
-from harness.results.folder_kind import folder_lock
+from harness.results.files.folder_kind import folder_lock
 from harness.results.index import CellIndex
-from harness.results.storage import read_cells
+from harness.results.reader import select_cells
 from tests.planted import Plan, planted_run
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
@@ -38,7 +38,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 def index(source: Path, out: Path, count: int, planned: int, **facts: Any) -> None:
     """A folder with some cells of a run, and an index that plans more."""
     out.mkdir(exist_ok=True)
-    rows = [as_row(cell) for cell in read_cells(source)][:count]
+    rows = [as_row(cell) for cell in select_cells(source)][:count]
     for row in rows:
         shutil.copytree(source / "cells" / row["key"], out / "cells" / row["key"])
     with CellIndex(out) as found:

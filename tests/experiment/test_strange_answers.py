@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.commands.replay import format_score_table
 from harness.errors import Outcome
 from harness.experiment import engine
-from harness.experiment.evaluation import evaluate_each, format_score_table
+from harness.experiment.evaluation import evaluate_each
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import recorded_take
-from harness.results.storage import read_cells, read_summary
+from harness.results.reader import select_cells
+from harness.results.storage import read_summary
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.experiment.strange_answers import FAILING, SCORED, Diverges, IsComplex, method_name
@@ -31,7 +33,7 @@ def outcome_and_folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcom
 def test_the_others_are_scored_and_the_run_has_a_summary(outcome_and_folder: tuple[Outcome, Path]) -> None:
     outcome, out = outcome_and_folder
     assert outcome is Outcome.INCOMPLETE
-    cells = {cell.method: cell for cell in read_cells(out)}
+    cells = {cell.method: cell for cell in select_cells(out)}
     assert set(cells) == {*map(method_name, SCORED), HONEST}
     np.testing.assert_allclose(cells[method_name(SCORED[0])].estimate_qpos, cells[HONEST].estimate_qpos, rtol=1e-6)
     undefined = cells[method_name(SCORED[1])]

@@ -40,9 +40,9 @@ from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
 from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.results.findings import read_findings
+from harness.results.findings.paper_findings import read_findings
+from harness.results.findings.placement_findings import read_placement
 from harness.results.index import INDEX_FILE
-from harness.results.placement_findings import read_placement
 from harness.results.reader import load_run
 from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf
@@ -59,7 +59,7 @@ from tests.fuzz.mending import mend_baseline, mend_calibration, mend_findings, m
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip, mvnx_text
 from tests.mocap.test_fuzz import _c3d
-from tests.planted import Plan, SweepPlan, planted_run, planted_sweep
+from tests.planted import MeansPlan, Plan, planted_run, planted_sweep
 from tests.reconstruct.database.test_motion_database import make_take
 from tests.report.paper import findings as paper_findings
 
@@ -240,7 +240,7 @@ def _read_baseline(folder: Path) -> object:
 
 
 def _make_sweep(folder: Path) -> None:
-    planted_sweep(folder / "x", SweepPlan(clips=2, failing=("dynamic_map",)))
+    planted_sweep(folder / "x", MeansPlan(clips=2, failing=("dynamic_map",)))
 
 
 def _make_paper(folder: Path) -> None:

@@ -18,8 +18,8 @@ from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.errors import BadFile
-from harness.live.browser_process import BrowserConfig
 from harness.live.browser_view import BrowserOutput, _run_process
+from harness.live.pose import SessionSetup
 from harness.live.shared_memory import PoseRing
 from harness.live.viewer import _run_viewer_process
 from harness.stream.is900.codec.reader import WireFormat
@@ -31,6 +31,7 @@ from tests.live.posing import configuration, live_pose
 pytestmark = pytest.mark.long
 BODY = humanoid.build_body()
 ROOM = rotations.IDENTITY, np.array([0.0, 0.0, 2.5])
+SETUP = SessionSetup(BODY.skeleton, ("head", "torso"), 90.0, ROOM, "a session")
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def switch() -> RecordingSwitch:
 
 @pytest.fixture
 def shown(tmp_path: Path, switch: RecordingSwitch) -> Iterator[BrowserOutput]:
-    output = BrowserOutput(BODY.skeleton, ("head", "torso"), ROOM, switch, tmp_path, "a session")
+    output = BrowserOutput(SETUP, switch, tmp_path)
     try:
         yield output
     finally:
@@ -132,7 +133,7 @@ def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: R
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
     with pytest.raises(BadFile, match="no folder"):
-        BrowserOutput(BODY.skeleton, ("head",), None, switch, tmp_path / "none", "a session")
+        BrowserOutput(SETUP, switch, tmp_path / "none")
 
 
 @pytest.mark.parametrize("unread", [False, True])
@@ -142,8 +143,7 @@ def test_the_page_of_a_killed_session_ends_without_a_word(unread: bool, monkeypa
     context = multiprocessing.get_context("spawn")
     session, pipe = context.Pipe()
     ring = PoseRing(context, 2)
-    config = BrowserConfig(BODY.skeleton.bone_m, ("head", "torso"), None, "a session")
-    ended = Thread(target=_run_process, kwargs={"config": config, "ring": ring, "pipe": pipe}, daemon=True)
+    ended = Thread(target=_run_process, kwargs={"setup": SETUP, "ring": ring, "pipe": pipe}, daemon=True)
     if unread:
         ended.start()
         assert session.poll(20.0)  # the address, which the session never reads
@@ -170,7 +170,7 @@ def test_a_viewer_that_fails_after_its_session_was_killed_is_silent(
 
     if module.endswith("browser_view"):
         monkeypatch.setattr("harness.live.browser_process.run_browser", fail)
-        _run_process(config=None, ring=None, pipe=pipe)  # type: ignore[arg-type]  # `fail` takes anything
+        _run_process(setup=None, ring=None, pipe=pipe)  # type: ignore[arg-type]  # `fail` takes anything
     else:
         pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
         monkeypatch.setattr("harness.live.viewer_process.run_viewer", fail)

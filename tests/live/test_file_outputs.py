@@ -17,7 +17,7 @@ from harness.core.humanoid24 import unpack
 from harness.errors import BadFile
 from harness.live.file_outputs import BvhOutput, PoseTableOutput
 from harness.live.pose import LivePose
-from harness.mocap.read.bvh import read_bvh_clip
+from harness.mocap.clip_file import read_clip
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.posed_motion import PosedMotion
 from tests.live.posing import configuration, frame, live_pose
@@ -96,7 +96,7 @@ def test_a_bvh_of_a_killed_process_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "live.bvh"
     done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, capture_output=True)
     assert done.returncode == -9, done.stderr
-    clip = read_bvh_clip(path)
+    clip = read_clip(path)
     assert len(clip) > 90 - RATE_HZ - 2  # it is saved every second
     assert not any("killed" in note for note in clip.notes)
     lines = path.read_text().split("\n")
@@ -116,9 +116,9 @@ def test_a_bvh_whose_count_was_not_written_any_more_keeps_its_whole_frames(
     whole = text[: len(text) - cut].count("\n") - text[: text.index("MOTION")].count("\n") - 3
     if whole < announced:
         with pytest.raises(BadFile):
-            read_bvh_clip(path)
+            read_clip(path)
         return
-    clip = read_bvh_clip(path)
+    clip = read_clip(path)
     assert len(clip) == whole
     assert any(f"{announced} frames are announced, {whole} are whole" in note for note in clip.notes) == (
         whole > announced or (cut > 0 and whole == announced)
@@ -129,7 +129,7 @@ def test_frames_beyond_the_count_of_any_other_bvh_are_refused(tmp_path: Path, rn
     path = tmp_path / "export.bvh"
     path.write_text(exported(walked(rng, 3), [0, 1, 2]).replace("Frames: 3", "Frames: 2"))
     with pytest.raises(BadFile, match="3 frames"):
-        read_bvh_clip(path)
+        read_clip(path)
 
 
 def test_a_file_ends_with_a_whole_line_between_two_saves(tmp_path: Path, rng: np.random.Generator) -> None:

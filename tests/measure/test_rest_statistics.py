@@ -1,19 +1,44 @@
-"""The slope of the mean against dense generalised least squares, and the coverage of its interval."""
+"""The spread at rest by hand; the slope of the mean against dense generalised least squares, and its coverage."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
-from harness.measure.rest_statistics import drift_speed, mean_drift
+from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
+from harness.measure.static_series import StaticSeries
 from harness.simulate.noise import Noise
 from tests.measure.test_gauss_markov import dense_covariance
 from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth
 
 KNOWN = NoiseFit({key: Interval(value, value, value) for key, value in truth(PRESET).items()}, {})
+
+
+def at_distances(distance: Floats, valid: Bools) -> StaticSeries:
+    """A station at these distances [m] and twice these angles [rad] from its resting pose, 4 readings a second."""
+    rows = len(distance)
+    place = distance[:, None] * [0.6, 0.0, -0.8]
+    return StaticSeries("head", 4.0, 0.0, 0.0, place, -2.0 * place, np.ones(rows), valid)
+
+
+def test_the_spread_is_the_root_mean_square_with_the_interval_of_its_blocks() -> None:
+    """Blocks of 10 s with mean squares 1, 1, 4 and 4: 2.5 with a standard error of sqrt(4/3 x 4 x 1.5^2) / 4."""
+    distance, valid = np.repeat([1.0, 1.0, 2.0, 2.0, 9.0], [40, 40, 40, 40, 39]), np.ones(199, bool)
+    found = rest_spread([at_distances(distance, valid)], "position_m")
+    assert found.value == pytest.approx(2.5**0.5)
+    assert (found.low, found.count) == (0.0, 160)
+    assert found.high == pytest.approx(np.sqrt(2.5 + 3.182446 * 12.0**0.5 / 4.0), rel=1e-6)
+    turned = rest_spread([at_distances(distance, valid)], "rotation_rad")
+    assert (turned.value, turned.high) == pytest.approx((2.0 * found.value, 2.0 * found.high))
+    distance[5:10], valid[5:10] = 50.0, False
+    beside = rest_spread([at_distances(distance, valid)], "position_m")
+    assert beside.value == pytest.approx((395.0 / 155.0) ** 0.5)
+    assert beside.count == 155
+    assert not rest_spread([at_distances(distance[:159], valid[:159])], "position_m").is_measured
 
 
 def test_the_slope_is_that_of_dense_least_squares() -> None:

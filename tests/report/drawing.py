@@ -1,17 +1,21 @@
-"""Checks that every small chart must pass."""
+"""Charts and figures as they are drawn, for looks at their parts, and checks that each must pass."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axis import Axis
+from matplotlib.collections import Collection, LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from harness.core.arrays import Floats
+from harness.report.figures.print_figure import MM_PER_IN, PrintFigure
 from harness.report.kit.page import Drawing, Page
-from harness.report.kit.style import to_svg
+from harness.report.kit.style import PRINT_SETTINGS, to_svg
 
 
 def texts_apart(figure: Figure) -> None:
@@ -59,3 +63,23 @@ def draw_page(page: Page) -> None:
         for block in section.blocks:
             if isinstance(block, Drawing) and callable(block.chart):
                 block.chart()
+
+
+def spans(collections: Iterable[Collection], axis: int) -> list[tuple[float, float]]:
+    """The ends of the first line of each collection, as `hlines` (axis 0) and `vlines` (axis 1) draw them."""
+    found = []
+    for collection in collections:
+        assert isinstance(collection, LineCollection)
+        start, end = collection.get_segments()[0][:, axis]
+        found.append((float(start), float(end)))
+    return found
+
+
+@contextmanager
+def drawn(figure: PrintFigure, width_mm: int = 85) -> Iterator[Figure]:
+    """The figure as it is written to a file, for looks at its parts."""
+    with matplotlib.rc_context(PRINT_SETTINGS):
+        made = Figure(figsize=(width_mm / MM_PER_IN, figure.height_mm / MM_PER_IN), layout="constrained")
+        figure.draw(made)
+        made.draw_without_rendering()
+        yield made

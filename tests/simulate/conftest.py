@@ -5,9 +5,9 @@ from typing import Protocol
 import numpy as np
 import pytest
 
-from harness.body import mounts, retargeting
+from harness.body import retargeting
 from harness.body.humanoid import Body
-from harness.body.mounts import Mount
+from harness.body.mounts import DEFAULT_MOUNTS, Mount
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
@@ -49,7 +49,7 @@ def still() -> Still:
 
 def worn(*stations: str) -> list[Mount]:
     """Default mounts of these stations; the six standard ones by default."""
-    return [mounts.DEFAULT_MOUNTS[station] for station in stations or SIX]
+    return [DEFAULT_MOUNTS[station] for station in stations or SIX]
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from harness.body import retargeting
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.motion import BodyMotion
+from harness.mocap import synthetic
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
@@ -71,3 +73,17 @@ def test_each_does_what_it_says_where_it_says_and_leaves_every_other_draw_alone(
 def test_it_ends_when_it_says() -> None:
     assert (Disturbance("one_off", from_s=3.0, lasts_s=2.0).begins_s, Disturbance("one_off").ends_s) == (3.0, 5.0)
     assert (Disturbance("start_off").begins_s, Disturbance("start_off").ends_s) == (0.0, 2.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
+def test_no_sound_reading_of_a_simulation_is_suspect(behaviour: str, rate_hz: float) -> None:
+    """With every noise preset and disturbance, and with the 16-bit list too."""
+    body, take = retargeting.retarget_to_own_body(synthetic.generate(behaviour, "p1", 1, seed=1))
+    setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
+    for preset, kind in setups:
+        for items in ((40, 2, 11, 21, 1), (40, 18, 19, 21, 1)) if kind == "none" else ((40, 2, 11, 21, 1),):
+            disturbed_noise = Disturbance(kind=kind).add_to(noise_preset(preset), SIX)
+            tracker = TrackerConfig(rate_hz=rate_hz, baud=921600, items=items)
+            result = simulate_tracker(body, take, worn(), tracker, disturbed_noise, seed=3)
+            assert not any(frame.suspect.any() for frame in result.frames), (preset, kind, items)

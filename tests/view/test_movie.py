@@ -11,30 +11,30 @@ from harness.errors import BadInput, MissingExtra, SystemFault, UnknownName
 from harness.report.kit.render_process import start_renderer
 from harness.view import movie
 from harness.view.movie import MoviePart, check_movie, write_movie
-from tests.view.fabricated import make_clip
+from harness.view.page import ViewedMotion
 
 
 @pytest.mark.parametrize(
     ("part", "error", "said"),
     [
-        (MoviePart(("pca",)), UnknownName, "no method called 'pca'.* Known: ik, map"),
+        (MoviePart(("pca",)), UnknownName, "no method called 'pca'.* Known: map, ik, far"),
         (MoviePart(("ik",) * 4), BadInput, "4 methods in a movie. Name at most 3."),
-        (MoviePart((), 2.0, 3.0), BadInput, "from 2 to 3 s has no frames. The clip lasts from 0.00 to 0.97 s."),
-        (MoviePart((), 0.5, 0.4), BadInput, "from 0.5 to 0.4 s has no frames"),
+        (MoviePart((), 3.0, 4.0), BadInput, "from 3 to 4 s has no frames. The clip lasts from 0.01 to 1.98 s."),
+        (MoviePart((), 1.5, 1.4), BadInput, "from 1.5 to 1.4 s has no frames"),
     ],
 )
 def test_parts_that_cannot_be_drawn_are_refused(
-    part: MoviePart, error: type[Exception], said: str, tmp_path: Path
+    part: MoviePart, error: type[Exception], said: str, motion: ViewedMotion, tmp_path: Path
 ) -> None:
     with pytest.raises(error, match=said):
-        write_movie(*make_clip(), part, tmp_path / "a.mp4")
+        write_movie(motion.skeleton, motion.clip(0), part, tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
 
 
-def test_too_long_a_movie_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_long_a_movie_is_refused(motion: ViewedMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(movie, "_MOST_FRAMES", 20)
-    with pytest.raises(BadInput, match=r"A movie of 25 frames\. Choose a part of at most 1 s."):
-        write_movie(*make_clip(), MoviePart(), tmp_path / "a.mp4")
+    with pytest.raises(BadInput, match=r"A movie of 50 frames\. Choose a part of at most 1 s."):
+        write_movie(motion.skeleton, motion.clip(0), MoviePart(), tmp_path / "a.mp4")
 
 
 def test_other_suffixes_and_missing_packages_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,11 +49,13 @@ def test_other_suffixes_and_missing_packages_are_refused(monkeypatch: pytest.Mon
         check_movie(Path("a.gif"))
 
 
-def test_a_renderer_that_fails_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_renderer_that_fails_leaves_no_file(
+    motion: ViewedMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     none = [str(tmp_path / "none.npz")]
     monkeypatch.setattr(movie, "start_renderer", lambda module, _: start_renderer(module, none))
     with pytest.raises(SystemFault, match="The movie was not made: the renderer failed"):
-        write_movie(*make_clip(), MoviePart(), tmp_path / "a.gif")
+        write_movie(motion.skeleton, motion.clip(0), MoviePart(), tmp_path / "a.gif")
     assert not (tmp_path / "a.gif").exists()
 
 
@@ -63,11 +65,13 @@ def reddish(picture: Any) -> int:
 
 
 @pytest.mark.long
-def test_two_methods_stand_side_by_side_in_real_time(tmp_path: Path, renders: None) -> None:
-    """The second method errs by 200 mm and is red, but for the frame without an estimate."""
+def test_two_methods_stand_side_by_side_in_real_time(motion: ViewedMotion, tmp_path: Path, renders: None) -> None:
+    """The second method errs by 300 mm and is red, but for the frames without an estimate."""
     told: list[tuple[int, int]] = []
-    part = MoviePart(("ik", "map"), 0.0, 0.5, True)
-    frames = write_movie(*make_clip(), part, tmp_path / "a.gif", lambda _, done, planned: told.append((done, planned)))
+    part = MoviePart(("map", "far"), 1.0, 1.5, True)
+    frames = write_movie(
+        motion.skeleton, motion.clip(0), part, tmp_path / "a.gif", lambda _, done, planned: told.append((done, planned))
+    )
     assert told[0] == (0, 7)
     assert told == sorted(told)
     with Image.open(tmp_path / "a.gif") as picture:
@@ -80,10 +84,10 @@ def test_two_methods_stand_side_by_side_in_real_time(tmp_path: Path, renders: No
 
 
 @pytest.mark.long
-def test_a_motion_alone_fills_the_picture(tmp_path: Path, renders: None) -> None:
+def test_a_motion_alone_fills_the_picture(motion: ViewedMotion, tmp_path: Path, renders: None) -> None:
     import imageio_ffmpeg
 
-    assert write_movie(*make_clip(), MoviePart(), tmp_path / "a.mp4") == 25
+    assert write_movie(motion.skeleton, motion.clip(0), MoviePart((), 0.0, 1.0), tmp_path / "a.mp4") == 25
     reader = imageio_ffmpeg.read_frames(str(tmp_path / "a.mp4"))
     facts = next(reader)
     assert (facts["size"], facts["fps"]) == ((640, 640), 25.0)

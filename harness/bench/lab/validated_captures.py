@@ -16,14 +16,14 @@ from harness.bench.lab.captures import (
     planted_scenario,
     station_offset_m,
 )
+from harness.bench.limits import state_verdict
 from harness.body.kinematics import bone_poses
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.humanoid24 import BONES
 from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.measure.pose_series import TruthPoses
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.components.stationary import Clock, SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.stream.recording.station_readings import CaptureReader
@@ -61,7 +61,7 @@ def planted_truth(kind: str, seed: int) -> TruthMotion:
     body, take = retarget_to_own_body(clip)
     calibration = exact_calibration(body, mounts_of(scenario), tracker_of(scenario))
     position_m, world_from_bone = bone_poses(body.skeleton, take.qpos)
-    time_s, rows = np.arange(len(take)) / take.rate_hz, {bone: BONES.index(bone) for bone in calibration.bones}
+    time_s, rows = np.arange(len(take)) / take.rate_hz, {bone: body.skeleton.index(bone) for bone in calibration.bones}
     return TruthMotion(
         f"clip {clip.name}, {time_s[-1]:.1f} s",
         {bone: TruthPoses(time_s, position_m[:, row], world_from_bone[:, row]) for bone, row in rows.items()},

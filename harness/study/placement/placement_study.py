@@ -22,9 +22,9 @@ from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.folder_kind import FINDINGS
-from harness.results.placement_findings import (
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.placement_findings import (
     BestSet,
     PlacementFindings,
     PlacementSearch,
@@ -32,8 +32,8 @@ from harness.results.placement_findings import (
     StatisticalPower,
     write_placement,
 )
+from harness.results.storage import open_study
 from harness.score.metrics import DEFINITIONS
-from harness.study.papers.paper_study import open_study
 from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim

@@ -15,7 +15,7 @@ from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (

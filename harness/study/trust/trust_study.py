@@ -24,9 +24,9 @@ from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
-from harness.results.digests import write_result_json
-from harness.results.folder_kind import FINDINGS
-from harness.results.trust_findings import (
+from harness.results.files.digests import write_result_json
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.trust_findings import (
     Equivalence,
     ErrorDistance,
     PairAgreement,
@@ -34,8 +34,8 @@ from harness.results.trust_findings import (
     TrustCapture,
     TrustFindings,
 )
+from harness.results.storage import open_study
 from harness.stream.recording.recording import PLAN, read_recording
-from harness.study.papers.paper_study import open_study
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
     ArmErrors,
@@ -324,10 +324,10 @@ def _compare_station(results: Sequence[ArmResults], k: int, station: str, featur
 def _carried_plans(path: Path) -> tuple[str, ...]:
     """Digests of the plans that a capture's notes carry; BadFile for notes of different clips."""
     capture = read_recording(path)
-    if len(clips := capture.noted_values("clip")) > 1:
+    if len(clips := capture.note_values("clip")) > 1:
         found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
         raise BadFile(path, found, "one clip", "Record each clip into a file of its own.")
-    return capture.noted_values(PLAN)
+    return capture.note_values(PLAN)
 
 
 def _unit_keys(unit: UnitFile) -> dict[str, Any]:

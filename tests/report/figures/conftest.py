@@ -1,21 +1,10 @@
-"""Runs that several tests draw."""
+"""A run with frames that several tests draw."""
 
 from pathlib import Path
 
 import pytest
 
 from tests.planted import Plan, planted_run
-from tests.report.figures.made_up import conditions_run, ranked_run
-
-
-@pytest.fixture(scope="session")
-def ranked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return ranked_run(tmp_path_factory.mktemp("ranked") / "run")
-
-
-@pytest.fixture(scope="session")
-def conditions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return conditions_run(tmp_path_factory.mktemp("conditions") / "run")
 
 
 @pytest.fixture(scope="session")

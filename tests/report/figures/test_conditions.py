@@ -1,5 +1,6 @@
 """Conditions of a run: which there are, how they are chosen and ranked; which condition and methods a figure shows."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -18,22 +19,21 @@ from harness.report.run.ranking import describe_rankings
 from harness.results.reader import ResultSet
 from harness.results.storage import read_summary
 from tests.compare.sides import cell, manifest, side, write_run
-from tests.planted import Plan, planted_run
-from tests.report.figures.made_up import ranked_run
+from tests.planted import MeansPlan, Plan, planted_means_run, planted_run
 
 
 def test_a_run_of_one_condition_needs_no_name(ranked: Path) -> None:
     (only,) = read_conditions(ranked).conditions
     assert only.name == ""
     assert only.series == ("expert_map", "twin_map", "ik", "mean_pose")
-    assert len(only.clips) == 15
+    assert len(only.clips) == 8
 
 
 def test_varied_values_and_performers_are_conditions(conditions: Path) -> None:
     run = read_conditions(conditions)
     names = [f"noise={noise}, {who} performers" for noise in ("clean", "default") for who in ("known", "new")]
     assert [each.name for each in run.conditions] == names
-    assert [len(each.clips) for each in run.conditions] == [8, 3, 8, 3]
+    assert [len(each.clips) for each in run.conditions] == [6, 2, 6, 2]
     for each in run.conditions:
         assert {row["performer"] for row in each.cells} == {each.group.performer}
         assert {row["noise"] for row in each.cells} == {each.varied["noise"]}
@@ -70,24 +70,26 @@ def test_the_ranking_is_that_of_the_terminal(ranked: Path) -> None:
     assert "Cannot tell whether it is better than twin_map" in text
 
 
-@pytest.mark.parametrize(("failed", "outcome"), [((), Outcome.NOT_COMPARABLE), (("ik on walk_1",), Outcome.INCOMPLETE)])
+@pytest.mark.parametrize(("failing", "outcome"), [((), Outcome.NOT_COMPARABLE), (("late",), Outcome.INCOMPLETE)])
 def test_a_run_without_a_measured_cell_has_the_outcome_of_the_run(
-    failed: tuple[str, ...], outcome: Outcome, tmp_path: Path
+    failing: tuple[str, ...], outcome: Outcome, tmp_path: Path
 ) -> None:
-    write_run(tmp_path / "run", side(metrics={"joint_angle_mean_deg": None}, failed=failed))
+    methods = dict.fromkeys(("ik", *failing), 1.0)
+    planted_means_run(tmp_path / "run", MeansPlan(("jumping",), 1, methods, failing=failing, unmeasured=("ik",)))
     with pytest.raises(NothingMeasured, match="no cell was measured") as refused:
         read_conditions(tmp_path / "run")
     assert refused.value.outcome is outcome
 
 
-def test_cells_that_failed_are_counted(tmp_path: Path) -> None:
-    run = read_conditions(write_run(tmp_path / "run", side(failed=("ik on walk_99",))))
-    assert run.missing_note == " 1 of 9 planned cells were not measured."
-    assert read_conditions(ranked_run(tmp_path / "whole")).missing_note == ""
+def test_cells_that_failed_are_counted(ranked: Path, tmp_path: Path) -> None:
+    plan = MeansPlan(("jumping",), 2, {"ik": 1.0, "late": 2.0}, failing=("late",))
+    run = read_conditions(planted_means_run(tmp_path / "run", plan))
+    assert run.missing_note == " 2 of 4 planned cells were not measured."
+    assert read_conditions(ranked).missing_note == ""
 
 
-def test_a_damaged_summary_is_refused(tmp_path: Path) -> None:
-    out = ranked_run(tmp_path / "run")
+def test_a_damaged_summary_is_refused(ranked: Path, tmp_path: Path) -> None:
+    out = shutil.copytree(ranked, tmp_path / "run")
     (out / "summary.json").write_text("{}")
     with pytest.raises(BadFile):
         read_conditions(out)
@@ -109,10 +111,10 @@ def test_a_metric_that_does_not_fit_is_told_from_one_that_does_not_exist() -> No
 def test_the_last_values_and_known_performers_are_shown_unless_a_clip_is_named(conditions: Path) -> None:
     run = read_conditions(conditions)
     assert choose_condition(run, FigureSelection()).name == "noise=default, known performers"
-    assert choose_condition(run, FigureSelection(clip="new_01")).name == "noise=default, new performers"
+    assert choose_condition(run, FigureSelection(clip="jumping_p7_01")).name == "noise=default, new performers"
     assert choose_condition(run.select("noise=clean"), FigureSelection()).name == "noise=clean, known performers"
-    with pytest.raises(UnknownName, match=r"no clip of the run called 'new_1'\. Did you mean 'new_01'"):
-        choose_condition(run, FigureSelection(clip="new_1"))
+    with pytest.raises(UnknownName, match=r"no clip of the run called 'jumping_p7'\. Did you mean 'jumping_p7_01'"):
+        choose_condition(run, FigureSelection(clip="jumping_p7"))
 
 
 def test_the_leader_is_shown_against_ik_or_the_named_control(ranked: Path) -> None:

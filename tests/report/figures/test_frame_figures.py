@@ -11,8 +11,7 @@ from harness.report.figures.conditions import read_conditions, read_series
 from harness.report.figures.frame_figures import distribution_figure, over_time_figure
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.style import COLOURS, MUTED
-from tests.report.drawing import texts_apart
-from tests.report.figures.made_up import drawn
+from tests.report.drawing import drawn, texts_apart
 
 
 @pytest.mark.parametrize("width_mm", [85, 170])

@@ -18,9 +18,8 @@ from harness.report.kit.style import COLOURS, FAINT
 from harness.report.run.joint_errors import BONE_ROWS
 from harness.score.pair import hinged_bones
 from tests.compare.sides import cell, side, write_run
-from tests.planted import Plan, planted_run
-from tests.report.drawing import texts_apart
-from tests.report.figures.made_up import drawn, ranked_run, spans
+from tests.planted import MeansPlan, planted_means_run
+from tests.report.drawing import drawn, spans, texts_apart
 
 
 @pytest.mark.parametrize("width_mm", [85, 170])
@@ -59,12 +58,12 @@ def test_leader_ties_and_others_differ_in_shape_and_colour(ranked: Path) -> None
         assert figure.axes[0].get_xlabel().split() == ["joint", "angle", "error", "[deg]"]
 
 
-def test_few_clips_cannot_show_a_difference(tmp_path: Path) -> None:
-    figure = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=4)), FigureSelection())
+def test_few_clips_cannot_show_a_difference(framed: Path) -> None:
+    figure = ranking_figure(read_conditions(framed).select("noise=clean"), FigureSelection())
     assert "Fewer than 6 units cannot show a difference." in figure.caption
     with drawn(figure) as shown:
         *_, heading = shown.axes[0].texts  # after the values at the edge
-        assert heading.get_text() == "4 takes: differences cannot be shown"
+        assert "(2 performers): differences cannot be shown" in " ".join(heading.get_text().split())
         assert {line.get_marker() for line in shown.axes[0].lines} == {"D", "o", ">"}
 
 
@@ -72,10 +71,10 @@ def test_conditions_have_panels_on_one_scale(conditions: Path) -> None:
     figure = ranking_figure(read_conditions(conditions), FigureSelection())
     with drawn(figure) as shown:
         assert [" ".join(text.get_text().split()) for axes in shown.axes for text in axes.texts] == [
-            "noise=clean, known performers (8 takes)",
-            "noise=clean, new performers (3 takes): differences cannot be shown",
-            "noise=default, known performers (8 takes)",
-            "noise=default, new performers (3 takes): differences cannot be shown",
+            "noise=clean, known performers (6 performers)",
+            "noise=clean, new performers (2 performers): differences cannot be shown",
+            "noise=default, known performers (6 performers)",
+            "noise=default, new performers (2 performers): differences cannot be shown",
         ]
         assert len({axes.get_xlim() for axes in shown.axes[::2]}) == 1
         texts_apart(shown)
@@ -110,8 +109,9 @@ def test_methods_that_were_not_measured_and_clips_that_not_all_share_are_named(t
 
 
 def test_one_clip_has_no_interval(tmp_path: Path) -> None:
-    caption = ranking_figure(read_conditions(ranked_run(tmp_path / "run", clips=1)), FigureSelection()).caption
-    assert caption.startswith("Mean joint angle error on 1 clip. Right:")
+    out = planted_means_run(tmp_path / "run", MeansPlan(("jumping",), 1, {"ik": 2.0, "late": 3.0}))
+    caption = ranking_figure(read_conditions(out), FigureSelection()).caption
+    assert caption.startswith("Mean joint angle error on 1 clip of 1 performer. Right:")
 
 
 def test_methods_without_a_common_clip_are_not_ranked(tmp_path: Path) -> None:
@@ -161,13 +161,11 @@ def test_bars_of_one_clip_have_no_interval(framed: Path) -> None:
         assert not shown.axes[0].collections
 
 
-def test_a_clip_on_which_the_leader_was_not_measured_is_refused(tmp_path: Path) -> None:
-    plan = Plan(("walking", "boxing"), {"ik": 2.0, "best_match": 1.0}, duration_s=2.0)
-    out = planted_run(tmp_path / "run", plan)
-    run = read_conditions(out)
+def test_a_clip_on_which_the_leader_was_not_measured_is_refused(viewed: Path) -> None:
+    run = read_conditions(viewed)
     (condition,) = run.conditions
     clip = condition.clips[0]
-    cells = tuple(row for row in condition.cells if (row["method"], row["clip"]) != ("best_match", clip))
+    cells = tuple(row for row in condition.cells if (row["method"], row["clip"]) != ("map", clip))
     less = replace(run, conditions=(replace(condition, cells=cells),))
-    with pytest.raises(BadInput, match=f"best_match was not measured on {clip}"):
+    with pytest.raises(BadInput, match=f"map was not measured on {clip}"):
         joints_figure(less, FigureSelection(clip=clip))

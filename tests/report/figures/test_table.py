@@ -11,7 +11,6 @@ from harness.report.figures.conditions import read_conditions
 from harness.report.figures.table import MetricValue, build_table
 from harness.results.storage import read_summary
 from tests.compare.sides import side, write_run
-from tests.report.figures.made_up import ranked_run
 
 ANGLE = "joint_angle_mean_deg"
 
@@ -32,7 +31,7 @@ def test_intervals_are_over_clips(ranked: Path) -> None:
     for row in build_table(ranked).rows:
         by_clip = np.array(list(values[row.method][ANGLE].values()))
         assert (row.values[0].low, row.values[0].high) == mean_interval(by_clip)
-        assert row.values[0].clips == 15
+        assert row.values[0].clips == 8
 
 
 def test_the_lowest_and_what_is_tied_with_it_are_bold(ranked: Path) -> None:
@@ -49,14 +48,13 @@ def test_the_lowest_and_what_is_tied_with_it_are_bold(ranked: Path) -> None:
     assert "Fewer than" not in table.note
 
 
-def test_few_clips_make_nothing_bold(tmp_path: Path) -> None:
-    table = build_table(ranked_run(tmp_path / "run", clips=4))
+def test_few_clips_make_nothing_bold(framed: Path) -> None:
+    table = build_table(framed)
     assert {value.standing for row in table.rows for value in row.values} == {"lowest", "tied"}
     assert not any(value.bold for row in table.rows for value in row.values)
-    assert table.note == (
-        "Mean over units and its 95 % interval: 4 clips. "
-        "Fewer than 6 units cannot show a difference, so nothing is bold there."
-    )
+    assert "2 clips of 2 performers." in table.note
+    assert "Fewer than 6 units" in table.note
+    assert "Bold" not in table.note
 
 
 def test_nothing_is_bold_where_all_are_tied(tmp_path: Path) -> None:
@@ -64,15 +62,18 @@ def test_nothing_is_bold_where_all_are_tied(tmp_path: Path) -> None:
     assert not any(value.bold for row in build_table(out).rows for value in row.values)
 
 
-def test_conditions_and_behaviours_have_columns(conditions: Path) -> None:
+def test_conditions_and_behaviours_have_columns(conditions: Path, viewed: Path) -> None:
     table = build_table(conditions)
     assert table.condition_names == ("noise", "performers")
     found = [("clean", "known"), ("clean", "new"), ("default", "known"), ("default", "new")]
     assert list(dict.fromkeys(row.condition for row in table.rows)) == found
     by_behaviour = build_table(conditions, condition="noise=clean, known performers", by_behaviour=True)
     assert by_behaviour.condition_names == ("noise", "behaviour")
-    assert [row.condition for row in by_behaviour.rows] == [("clean", "boxing")] * 2 + [("clean", "walking")] * 2
-    assert {row.clips for row in by_behaviour.rows} == {4}
+    assert [row.condition for row in by_behaviour.rows] == [("clean", "jumping")] * 2
+    assert {row.clips for row in by_behaviour.rows} == {6}
+    several = build_table(viewed, by_behaviour=True).rows
+    assert [row.condition for row in several] == [("walking",)] * 3 + [("boxing",)] * 3
+    assert {row.clips for row in several} == {1}
 
 
 def test_methods_stand_in_the_order_of_their_names(ranked: Path) -> None:

@@ -1,5 +1,6 @@
 """Figures and tables as files: kinds and folders that fit, formats, what is refused, nothing written over."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,6 @@ from harness.errors import BadFile, BadInput, HarnessError, UnknownName
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.figures.writer import KINDS, write_figure, write_results_table
 from harness.results.index import CellIndex
-from tests.report.figures.made_up import ranked_run
 
 
 def test_a_figure_lies_below_its_run_in_pdf_unless_told_otherwise(ranked: Path, tmp_path: Path) -> None:
@@ -89,14 +89,13 @@ def test_nothing_is_written_over(ranked: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.pdf", "x.tex"]
 
 
-def test_folders_without_a_run_are_refused_by_what_they_are(tmp_path: Path) -> None:
+def test_folders_without_a_run_are_refused_by_what_they_are(ranked: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "paper").mkdir()
     (tmp_path / "paper" / "findings.json").write_text("{}")
     (tmp_path / "baseline").mkdir()
     (tmp_path / "baseline" / "cells.json").write_text("{}")
-    sweep = ranked_run(tmp_path / "sweep")
-    with CellIndex(sweep) as index:
+    with CellIndex(shutil.copytree(ranked, tmp_path / "sweep")) as index:
         index.note(kind="sweep")
     for name, kind, said in (
         ("nowhere", BadFile, "no such folder"),

@@ -29,10 +29,10 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
 from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
+from harness.results.files.integrity import compute_digests
 from harness.results.index import CellIndex
-from harness.results.integrity import compute_digests
 from harness.results.reported_metrics import PRIMARY_METRIC
-from tests.planted import SweepPlan, planted_sweep
+from tests.planted import MeansPlan, planted_sweep
 from tests.report.drawing import texts_apart
 from tests.report.reading import read, text_of
 from tests.report.watching import is_whole_and_quiet
@@ -40,7 +40,7 @@ from tests.report.watching import is_whole_and_quiet
 pytestmark = pytest.mark.long
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- -->"
 RATE, NOISE = "tracker.rate_hz", "noise"
-VARIED = SweepPlan(vary={RATE: (120.0, 20.0, 60.0), NOISE: ("clean", "default")}, failing=("local_pca",))
+VARIED = MeansPlan(vary={RATE: (120.0, 20.0, 60.0), NOISE: ("clean", "default")}, failing=("local_pca",))
 
 
 @pytest.fixture(scope="module")
@@ -151,17 +151,17 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("plan", "said"),
     [
-        (SweepPlan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
+        (MeansPlan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
         (
-            SweepPlan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")),
+            MeansPlan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")),
             "6 of 6 cells finished. Nothing was measured.",
         ),
-        (SweepPlan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
-        (SweepPlan(known=4), "dynamic_map (known) has the lowest mean joint-angle error, "),
-        (SweepPlan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
+        (MeansPlan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
+        (MeansPlan(known=4), "dynamic_map (known) has the lowest mean joint-angle error, "),
+        (MeansPlan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
     ],
 )
-def test_nothing_is_too_little_to_be_told(plan: SweepPlan, said: str, tmp_path: Path) -> None:
+def test_nothing_is_too_little_to_be_told(plan: MeansPlan, said: str, tmp_path: Path) -> None:
     page = write_sweep_page(planted_sweep(tmp_path / "out", plan))
     shown = text_of(page)
     assert said in shown
@@ -170,14 +170,14 @@ def test_nothing_is_too_little_to_be_told(plan: SweepPlan, said: str, tmp_path: 
 
 
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
-    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(known=4)))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", MeansPlan(known=4)))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
     assert sweep_sentence(sweep).count("has the lowest mean joint-angle error") == 2
 
 
 def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
     sweep = read_sweep(
-        planted_sweep(tmp_path / "out", SweepPlan(scenarios=("walking",), vary={NOISE: ("clean", "default")}))
+        planted_sweep(tmp_path / "out", MeansPlan(behaviours=("walking",), vary={NOISE: ("clean", "default")}))
     )
     first, *others = sweep.clips
     takes = [name.rpartition(": ")[2].partition("@")[0] for name in sweep.clips]
@@ -197,15 +197,15 @@ def test_a_mean_with_an_interval_is_over_units(tmp_path: Path) -> None:
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
-    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(scenarios=("walking",), seeds=(1, 2, 3))))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", MeansPlan(behaviours=("walking",), seeds=(1, 2, 3))))
     assert len(sweep) == 63
     assert sweep.statistic(PRIMARY_METRIC, sweep.select(0, 0)).clips == 7
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
-    few = planted_sweep(tmp_path / "few", SweepPlan(scenarios=("walking",), clips=5))
-    alike = planted_sweep(tmp_path / "alike", SweepPlan(methods={"ik": 1.5, "local_pca": 1.5}))
+    few = planted_sweep(tmp_path / "few", MeansPlan(behaviours=("walking",), clips=5))
+    alike = planted_sweep(tmp_path / "alike", MeansPlan(methods={"ik": 1.5, "local_pca": 1.5}))
     assert sweep_sentence(read_sweep(few)).endswith(
         "but cannot be called better than any of the other 2 (too few units: 5, of at least 6)."
     )
@@ -218,7 +218,7 @@ def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
 def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Path) -> None:
     """Six performers are too few for 4 lines, as 4 * 2 / 2^6 is above 0.05, however many clips they have."""
     for clips, columns in ((6, 0), (10, 3)):
-        plan = SweepPlan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=clips)
+        plan = MeansPlan(methods={"ik": 3.0, "local_pca": 2.0, "dynamic_map": 1.0}, clips=clips)
         out = tmp_path / str(clips)
         page = write_sweep_page(planted_sweep(out, plan)).read_text(encoding="utf-8")
         sweep = read_sweep(out)
@@ -230,7 +230,7 @@ def test_a_cell_is_bold_where_its_method_is_better_than_all_others(tmp_path: Pat
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
-    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=5, vary={NOISE: ("clean", "default")})))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", MeansPlan(clips=5, vary={NOISE: ("clean", "default")})))
     points = [point for curve in curves(sweep, sweep.keys[0], 0).values() for point in curve]
     assert len(points) == 6
     assert all(point.mean is not None and point.low is None for point in points)
@@ -248,7 +248,7 @@ def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
 def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     """The late method has the lowest error of all; without its lag it would be the only best one."""
     methods = {"ik": 6.0, "good": 2.0, "late": 0.1}
-    sweep = read_sweep(planted_sweep(tmp_path / "out", SweepPlan(clips=10, methods=methods, lags={"late": 2})))
+    sweep = read_sweep(planted_sweep(tmp_path / "out", MeansPlan(clips=10, methods=methods, lags={"late": 2})))
     assert sweep.series == ("ik", "good", "late (lag 2)")
     causal, late, note = re.split(r"(?<=\.) (?=late \(lag 2\): |Methods that wait)", sweep_sentence(sweep))
     assert "good is best: " in causal
@@ -257,7 +257,7 @@ def test_methods_with_a_lag_are_named_and_ranked_apart(tmp_path: Path) -> None:
     assert note == "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
     table = str(page_table(scenario_table(sweep, PRIMARY_METRIC)))
     assert re.findall(r'<th scope="row">([^<]*)</th><td><strong>', table) == ["good"]
-    plain = read_sweep(planted_sweep(tmp_path / "plain", SweepPlan(clips=10, methods=methods)))
+    plain = read_sweep(planted_sweep(tmp_path / "plain", MeansPlan(clips=10, methods=methods)))
     assert "late is best: " in sweep_sentence(plain)
     assert "lag" not in sweep_sentence(plain)
 
@@ -329,7 +329,7 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The verb reads the cells too: a sweep with a damaged one is refused."""
-    out = planted_sweep(tmp_path / "out", SweepPlan(("walking",), clips=2, methods={"ik": 3.0, "mean_pose": 9.0}))
+    out = planted_sweep(tmp_path / "out", MeansPlan(("walking",), clips=2, methods={"ik": 3.0, "mean_pose": 9.0}))
     page = write_sweep_page(out)
     before = page.read_bytes()
     assert main(["report", str(out)]) == 0

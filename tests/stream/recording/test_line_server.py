@@ -104,6 +104,14 @@ def test_bytes_that_no_program_reads_are_bounded_and_counted(tmp_path: Path) -> 
     pty.close()
 
 
+def test_bytes_that_wait_take_room_from_later_ones(tmp_path: Path) -> None:
+    pty = ClientPty(tmp_path / "link", None)
+    pty.write(bytes(MAX_WAITING_BYTES))  # of which the terminal takes 3800
+    pty.write(bytes(10_000))
+    pty.close()
+    assert pty.unread == 10_000 - 3_800
+
+
 def test_a_slow_program_gets_every_byte_in_sequence(tmp_path: Path) -> None:
     pty, sent, received = ClientPty(tmp_path / "link", None), bytes(range(256)) * 100, b""
     end = os.open(tmp_path / "link", os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)

@@ -10,9 +10,10 @@ from harness.core.split import ClipPart, allowed_frames
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import load_scenario, variants
-from harness.results.findings import PaperFindings, read_findings, write_findings
+from harness.results.findings.paper_findings import PaperFindings, read_findings, write_findings
+from harness.results.storage import open_study
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
-from harness.study.papers.paper_study import PaperStudy, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, run_scenarios
 from harness.study.papers.station_sets import format_station_set
 from harness.study.papers.tables import HINGE_GROUPS
 

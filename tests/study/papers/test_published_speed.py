@@ -8,12 +8,10 @@ import pytest
 
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment import benchmark_clips
-from harness.experiment.round_robin_timing import MethodSpeed
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
-from harness.results.findings import BarChart
+from harness.results.findings.paper_findings import BarChart
 from harness.study.papers import published_speed as module
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import (
@@ -29,6 +27,8 @@ from harness.study.papers.published_speed import (
     missing_clips,
     truncate_motions,
 )
+from harness.study.speed import benchmark_clips
+from harness.study.speed.round_robin_timing import MethodSpeed
 from tests.mocap.sample_files import clip, write_clip
 
 TINY = PublishedSpeed(

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body import mounts
+from harness.body.mounts import locate_mount
 from harness.core import rotations
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGrid,
@@ -58,8 +58,8 @@ def test_a_mirrored_place_is_the_mirror_image_of_its_place(body: Skeleton, rng: 
             assert placement_fault(there, image)
             continue
         (point_m, turn), (image_m, image_turn) = (
-            mounts.locate_mount(body, to_mount(here)),
-            mounts.locate_mount(image, to_mount(there)),
+            locate_mount(body, to_mount(here)),
+            locate_mount(image, to_mount(there)),
         )
         np.testing.assert_allclose(image_m, MIRROR * point_m, atol=1e-9)
         for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):

@@ -6,13 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from harness.body import mounts, retargeting
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.mocap import synthetic
-from harness.simulate import noise
-from harness.simulate.disturbance import KINDS, Disturbance, Kind
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.is900.codec.items import STATION_CHARACTERS
 from harness.stream.is900.codec.plausibility import PlausibilityCheck
 from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
@@ -20,7 +15,6 @@ from harness.stream.is900.codec.readings import Readings, concatenate_readings
 from harness.stream.is900.codec.records import RecordValues, encode_records
 
 RATE_HZ = 40.0
-STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
 
 def make_readings(rounds: int = 40, stations: int = 3, seed: int = 1) -> Readings:
@@ -126,23 +120,6 @@ def test_orientation_or_position_alone_is_checked() -> None:
 def test_readings_are_concatenated_unchanged() -> None:
     readings = make_readings()
     np.testing.assert_array_equal(concatenate_readings([readings[:7], readings[7:]]).position_m, readings.position_m)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
-def test_no_sound_reading_of_a_simulation_is_marked(behaviour: str, rate_hz: float) -> None:
-    """With every noise preset and disturbance, and with the 16-bit list too."""
-    body, take = retargeting.retarget_to_own_body(
-        synthetic.generate(behaviour, synthetic.performer_names()[0], 1, seed=1)
-    )
-    station_mounts = [mounts.DEFAULT_MOUNTS[station] for station in STATIONS]
-    setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
-    for preset, kind in setups:
-        for items in ((40, 2, 11, 21, 1), (40, 18, 19, 21, 1)) if kind == "none" else ((40, 2, 11, 21, 1),):
-            disturbed_noise = Disturbance(kind=kind).add_to(noise.noise_preset(preset), STATIONS)
-            tracker = TrackerConfig(rate_hz=rate_hz, baud=921600, items=items)
-            result = simulate_tracker(body, take, station_mounts, tracker, disturbed_noise, seed=3)
-            assert not any(frame.suspect.any() for frame in result.frames), (preset, kind, items)
 
 
 def test_a_damaged_position_is_suspect_only_in_its_frame() -> None:

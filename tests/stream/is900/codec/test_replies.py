@@ -65,6 +65,10 @@ EXAMPLES: list[tuple[bytes, int, ParsedReply]] = [
 ]
 
 
+def test_a_device_after_power_on_has_the_flags_of_the_manual() -> None:
+    assert StatusRecord().text_line().rstrip() == "21S3F0         4.2301 IS900VET"
+
+
 @pytest.mark.parametrize(
     ("line", "length", "event"), EXAMPLES, ids=lambda x: x[:4].decode() if isinstance(x, bytes) else ""
 )

@@ -14,6 +14,8 @@ from harness.stream.is900.codec.items import record_type
 from harness.stream.is900.codec.reader import FrameReader, WireFormat
 from harness.stream.is900.driver.transport import Transport, open_transport
 from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900.emulator.device_state import Message, SentMessage
+from harness.stream.is900.emulator.server import ServerCounts
 from tests.stream.is900.emulator.played import DeviceSession
 
 TIMEOUT_S = 120.0
@@ -43,6 +45,17 @@ def read_frames(client: Transport, wire: WireFormat, count: int) -> list[Tracker
 def values_equal(first: TrackerFrame, second: TrackerFrame) -> bool:
     names = [name for name in TrackerFrame.__slots__ if name != "received_s"]
     return all(np.array_equal(getattr(first, n).astype(float), getattr(second, n).astype(float), True) for n in names)
+
+
+def test_messages_are_counted_with_their_delays() -> None:
+    counts, record, reply = ServerCounts(), Message(0.0, b"01P", "1"), Message(0.0, b"21S")
+    for late_s in (0.1, 0.4, 0.2):
+        counts.add(SentMessage(record, 1.0, b"01P", written_s=1.0 + late_s))
+    counts.add(SentMessage(reply, 2.0, b"2?S", ("flip",), written_s=2.0))
+    counts.add(SentMessage(record, 3.0, b"01P", unread=True))
+    assert (counts.records, counts.replies, counts.damaged, counts.unread, counts.bytes) == (3, 1, 1, 1, 12)
+    assert list(counts.late_s) == pytest.approx([0.1, 0.4, 0.2, 0.0])
+    assert counts.max_late_s == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("port_kind", ["pty", "tcp"])
