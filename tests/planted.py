@@ -19,7 +19,7 @@ from harness.experiment import cells
 from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import Evaluation
-from harness.experiment.method_run import MethodAnswers
+from harness.experiment.methods.method_run import MethodAnswers
 from harness.experiment.observed_take import ObservedTake
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method

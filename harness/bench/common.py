@@ -16,7 +16,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.experiment.cells import check_names, clear_caches
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.remote_method import close_methods
+from harness.experiment.methods.remote_method import close_methods
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.simulate.link import TrackerConfig

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.experiment.method_run import ReferenceWorkload
+from harness.experiment.methods.method_run import ReferenceWorkload
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 
 REFERENCE_RUNS = 1000

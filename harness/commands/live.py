@@ -91,8 +91,8 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
-    from harness.experiment.isolation import DEFAULT_ISOLATION
-    from harness.experiment.remote_method import resolve_method
+    from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+    from harness.experiment.methods.remote_method import resolve_method
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up

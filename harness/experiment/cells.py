@@ -25,11 +25,11 @@ from harness.core.stream_health import BAUD, RECORD_BYTES, excess_loss
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.evaluation import evaluate
-from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.method_run import describe_failure
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.method_run import describe_failure
+from harness.experiment.methods.remote_method import close_methods, resolve_method, start_methods
 from harness.experiment.observed_take import simulated_take
-from harness.experiment.remote_method import close_methods, resolve_method, start_methods
 from harness.experiment.scenario import Scenario, ScenarioMotion, count_variants, variants
 from harness.mocap.library import LibraryFolders, absolute_folders
 from harness.mocap.sources import MotionSource, open_motion_source

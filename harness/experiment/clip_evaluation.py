@@ -23,7 +23,7 @@ from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_
 from harness.core.stream_health import poor_hearing
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
-from harness.experiment.remote_method import method_identity
+from harness.experiment.methods.remote_method import method_identity
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,

@@ -21,7 +21,6 @@ from harness.core.files import TEMPORARY, content_key
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart, declared_training_data
 from harness.errors import BadInput, HarnessError, Outcome
-from harness.experiment.cell_watcher import ProgressCount, graceful_stop
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
@@ -34,12 +33,13 @@ from harness.experiment.cells import (
     scenario_label,
     split_task,
 )
-from harness.experiment.executors import TaskExecutor, process_executor, run_in_process
-from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.remote_method import close_methods, describe_options, hash_method, resolve_method
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.remote_method import close_methods, describe_options, hash_method, resolve_method
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
+from harness.experiment.workers.cell_watcher import ProgressCount, graceful_stop
+from harness.experiment.workers.executors import TaskExecutor, process_executor, run_in_process
 from harness.mocap.library import LibraryFolders
 from harness.results import storage
 from harness.results.index import CellIndex

@@ -18,11 +18,11 @@ from harness.core.progress import ProgressCallback
 from harness.core.text_table import Table
 from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_failure
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.method_run import NO_ANSWERS, MethodAnswers, describe_failure
+from harness.experiment.methods.remote_method import resolve_method, run_over_frames
 from harness.experiment.observed_take import ObservedTake
-from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.reconstruct.contract import Method
 from harness.results.reported_metrics import TABLE_COLUMNS, sigma_lines
 from harness.score.loops import COVERAGE_FLOOR, LoopScores, score_loops

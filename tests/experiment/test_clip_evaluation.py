@@ -13,7 +13,7 @@ from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.method_run import run_method
+from harness.experiment.methods.method_run import run_method
 from harness.experiment.scenario import Scenario, ScenarioMotion, Station
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry

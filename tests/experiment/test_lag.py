@@ -13,8 +13,8 @@ from harness.core.messages import MessageError
 from harness.errors import Outcome, ShapeError
 from harness.experiment import engine
 from harness.experiment.evaluation import evaluate_each, format_score_table
-from harness.experiment.method_messages import decode_answers, encode_answers
-from harness.experiment.method_run import MethodAnswers, run_method
+from harness.experiment.methods.method_messages import decode_answers, encode_answers
+from harness.experiment.methods.method_run import MethodAnswers, run_method
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_take import recorded_take
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario

@@ -13,10 +13,11 @@ import pytest
 from harness.body.humanoid import build_body
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
-from harness.experiment import engine, remote_method
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.remote_method import (
+from harness.experiment import engine
+from harness.experiment.methods import remote_method
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.remote_method import (
     RemoteMethod,
     close_methods,
     describe_options,

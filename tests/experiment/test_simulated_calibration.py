@@ -16,7 +16,7 @@ from harness.core.split import ClipPart
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
-from harness.experiment.method_run import run_method
+from harness.experiment.methods.method_run import run_method
 from harness.experiment.scenario import CalibrationSettings, Scenario, ScenarioMotion, load_scenario
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,

@@ -25,8 +25,8 @@ from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import ClipTask, run_task
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from harness.experiment.scenario import Scenario
+from harness.experiment.workers.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from tests.study.papers.tiny import WALKS
 
 R = TypeVar("R")

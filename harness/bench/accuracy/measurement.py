@@ -30,8 +30,8 @@ from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evalu
 from harness.bench.common import fresh_methods, run_benchmark_cells
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.remote_method import resolve_method
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.remote_method import resolve_method
 from harness.experiment.scenario import Scenario
 from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell

@@ -21,7 +21,7 @@ from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, collect_outc
 from harness.bench.lab.planted_worlds import trust_rows
 from harness.bench.lab.validated_captures import registration_rows
 from harness.core.progress import ProgressCallback
-from harness.experiment.executors import TaskExecutor
+from harness.experiment.workers.executors import TaskExecutor
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.study.trust.characterization import preset_values
 

@@ -18,8 +18,8 @@ from harness.compare.units import count_units
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
-from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
+from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.benchmark_statement import BenchmarkStatement

@@ -21,8 +21,8 @@ from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
 from harness.experiment.cells import cell_names, open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.executors import TaskExecutor
 from harness.experiment.scenario import Scenario, variants
+from harness.experiment.workers.executors import TaskExecutor
 from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
 

@@ -19,11 +19,11 @@ from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
 from harness.experiment.evaluation import evaluate
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_run import describe_failure
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.method_run import describe_failure
+from harness.experiment.methods.remote_method import method_identity, resolve_method
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.recorded_take import checked_note, find_playback, recorded_take, registered_take
-from harness.experiment.remote_method import method_identity, resolve_method
 from harness.experiment.scenario import Scenario, change_scenario, variants
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import check_key, read_result_json, write_result_json

@@ -7,7 +7,7 @@ from harness.core.arrays import Floats
 from harness.core.estimate import LOST_AFTER_S, Origin, Status, session_lag
 from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
-from harness.experiment.method_run import HINGES
+from harness.experiment.methods.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE
 from harness.score.angles import wrap_difference

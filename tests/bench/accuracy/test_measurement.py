@@ -17,7 +17,7 @@ from harness.bench.accuracy.statements import compare_methods, find_worse_clips,
 from harness.bench.accuracy.targets import evaluate_targets
 from harness.bench.accuracy.text import format_report, report_content
 from harness.errors import BadInput, Outcome
-from harness.experiment.executors import run_in_process
+from harness.experiment.workers.executors import run_in_process
 from harness.results.benchmark_statement import outcome_of
 from harness.results.cell import as_row, write_cell
 from harness.results.storage import Cell

@@ -22,8 +22,8 @@ from harness.core.motion import BodyMotion
 from harness.core.object_state import describe_state
 from harness.core.working_folder import served_folders
 from harness.errors import HarnessError
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_messages import (
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_messages import (
     MAX_TEXT,
     Arrays,
     Header,
@@ -33,9 +33,9 @@ from harness.experiment.method_messages import (
     encode_take,
     encode_training,
 )
-from harness.experiment.method_process import MethodFailure, MethodProcess
-from harness.experiment.method_run import MethodAnswers, run_method
-from harness.experiment.worker_process import close_fork_server
+from harness.experiment.methods.method_process import MethodFailure, MethodProcess
+from harness.experiment.methods.method_run import MethodAnswers, run_method
+from harness.experiment.methods.worker_process import close_fork_server
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.source_files import source_hash

@@ -16,7 +16,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
-from harness.experiment.method_run import HINGES, MethodAnswers
+from harness.experiment.methods.method_run import HINGES, MethodAnswers
 from harness.stream.frame import TrackerFrame
 
 Message = tuple[dict[str, Any], dict[str, NDArray[Any]]]
