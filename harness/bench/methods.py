@@ -25,7 +25,6 @@ from harness.core.calibration import Calibration
 from harness.core.progress import ProgressBar, ProgressCallback
 from harness.experiment import benchmark_clips
 from harness.experiment.benchmark_clips import BenchmarkClip
-from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.round_robin_timing import (
     REFERENCE_METHOD,
     MethodSpeed,
@@ -34,7 +33,7 @@ from harness.experiment.round_robin_timing import (
     time_method,
     time_round_robin,
 )
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
@@ -218,7 +217,7 @@ def _mink_contender(clip: BenchmarkClip) -> TimedStep:
     from harness.bench.ik import mink_solver
 
     calibration = clip.simulation.calibration
-    body = humanoid.build_body(trackers=mounts_of(load_scenario(benchmark_clips.DEFAULT_SCENARIO)))
+    body = humanoid.build_body(trackers=load_scenario(benchmark_clips.DEFAULT_SCENARIO).nominal_mounts)
     solve = mink_solver(body, in_world(calibration))
 
     def timed_step(frame: TrackerFrame, previous_truth: Floats) -> tuple[Floats, float]:

@@ -21,9 +21,12 @@ from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, process_times
 from harness.core.arrays import Floats
 from harness.core.child_process import run_python
 from harness.core.split import ClipPart
-from harness.experiment.cells import ClipTask, evaluate_cell, open_scenario_motion
+from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.motion import open_scenario_motion
+from harness.experiment.scenario import Scenario
+from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.tasks import ClipTask
 from harness.reconstruct import registry
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.results.index import CellIndex

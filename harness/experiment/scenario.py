@@ -1,30 +1,23 @@
-"""Scenarios: TOML files read into frozen dataclasses. Keys name their units, and unknown keys are refused."""
+"""Scenarios: frozen records of what a TOML file says, and what follows from them (`scenario_reader` reads the file)."""
 
-import fnmatch
 import itertools
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache
-from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from harness.core.fields import NONE, build, replace_fields
-from harness.core.files import MAX_TOML_BYTES, read_toml
-from harness.core.input_file import check_input_file, names_input_file
-from harness.core.options import expand_alternatives
-from harness.core.package_data import data_folder
-from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields, check_words
-from harness.core.split import ClipPart, StatisticalUnit
-from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.fitted_unit import merge_fitted_unit
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import open_motion_source
-from harness.results.cell import varied_text
+import numpy as np
+
+from harness.body.mounts import Mount
+from harness.core.fields import replace_fields
+from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields
+from harness.core.split import StatisticalUnit
+from harness.errors import BadInput
+from harness.experiment.scenario_motion import ScenarioMotion
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
+from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
 from harness.stream.emulator.faults import Fault
@@ -32,57 +25,7 @@ from harness.stream.emulator.faults import Fault
 SCHEMA = 1
 MOST_VARIANTS = 1_000_000
 """Most combinations of varied values [choice]."""
-_STATION_SETS_FILE = "stations.toml"
 _NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault", "fitted", "unit")
-
-
-@dataclass(frozen=True)
-class ScenarioMotion:
-    """The test clips of a scenario, and the clips that methods may learn from.
-
-    Clip lists take patterns: "13_*" stands for every clip that matches (see `expand_clips`).
-    """
-
-    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"protocol": "split"}
-
-    source: Literal["builtin", "cmu"]
-    """`builtin` is the motion generator; `cmu` is the library that --mocap or HARNESS_MOCAP names."""
-    test: tuple[Name, ...]
-    """Test clips by name; "13_17@0.20-0.40" is that part of the take (for split `block`)."""
-    behaviours: tuple[Name, ...]
-    """Behaviour of the test clips: one word for all of them, or one word for each."""
-    examples: tuple[Name, ...] = ()
-    """Clips that methods may learn from, except those that the split forbids for a test clip."""
-    withheld: tuple[Name, ...] = ()
-    """Clips and parts of clips that are no examples under any split, with 1 s around them: for example the test clips
-    of the tables, while constants are chosen on other clips."""
-    thin_to: Annotated[int, Range(0, 100_000_000)] = 0
-    """Number of frames that all examples together keep, evenly spaced, for a sparse database (Kim et al. 2012); 0 keeps
-    all."""
-    example_share: Annotated[float, Range(1e-06, 1.0)] = 1.0
-    """Share of the frames of all examples that is kept, in pieces of 0.5 s drawn by the scenario's seed; smaller
-    shares are subsets of larger ones (see `harness.experiment.example_subset`)."""
-    database: Literal["all", "behaviour"] = "all"
-    """Learn from all examples, or only from those of the test clip's behaviour (Liu et al. 2011)."""
-    split: Literal["block", "sequence", "subject"] = "sequence"
-    """Frames that are no examples: those of the test block, of the test take, or of the test subject."""
-    body: Literal["own", "standard", "common"] = "own"
-    """Body of the test: `own` has the performer's proportions, the others are the mean skeleton. On `standard` the
-    bones point as the performer's do; on `common` the recorded angles are kept and the root's path is scaled by the
-    legs."""
-    longest_s: Annotated[float, Range(0.0, 1e5)] = 0.0
-    """Length of each test clip that is used, from its start [s]; 0 is all of it."""
-    rate_hz: Annotated[float, Range(0.0, 1e4)] = 0.0
-    """Frame rate of files that record none and that no index lists [Hz]; 0 refuses such files."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    @property
-    def tested(self) -> list[tuple[str, str]]:
-        """Each test clip with its behaviour."""
-        repeated = self.behaviours * (len(self.test) if len(self.behaviours) == 1 else 1)
-        return list(zip(self.test, repeated, strict=True))
 
 
 @dataclass(frozen=True)
@@ -100,6 +43,10 @@ class Station:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def nominal_mount(self, name: str) -> Mount:
+        """The mount of the station of that name."""
+        return Mount(name, self.bone, self.along, float(np.deg2rad(self.around_deg)), self.stand_off_m)
 
 
 @dataclass(frozen=True)
@@ -202,167 +149,110 @@ class Scenario:
         """The stations that are worn, in the order of the table."""
         return {name: self.stations[name] for name in self.stations if not self.worn or name in self.worn}
 
+    @property
+    def nominal_mounts(self) -> tuple[Mount, ...]:
+        """Nominal mounts of the stations that are worn."""
+        return tuple(station.nominal_mount(name) for name, station in self.worn_stations.items())
 
-def load_scenario(path: Path | str) -> Scenario:
-    """Load the scenario in a TOML file, or the shipped scenario of that name.
+    @property
+    def device(self) -> TrackerConfig:
+        """The tracker with the clock that the noise preset gives it.
 
-    Raises BadFile, UnknownName and RenamedKey, which name the place. Patterns in clip lists stay (see `expand_clips`).
-    """
-    path = find_scenario(path)
-    content = read_toml(path, "a scenario", "`harness list` names the shipped ones.")
-    if content.get("kind") == "placement":
-        raise BadFile(path, "a placement study", "a scenario", "Run it with `harness placement`.")
-    content.setdefault("name", path.stem)
-    with name_file(path):
+        Sampling in turn is an error of the clock. With the preset `clean` all stations are therefore sampled at one
+        moment, unless the scenario sets `tracker.slot_s` (docs/is900.md 13.5).
+        """
+        simultaneous = self.noise == "clean" and self.tracker.slot_s is None
+        return replace(self.tracker, slot_s=0.0) if simultaneous else self.tracker
+
+    @property
+    def noise_model(self) -> Noise:
+        """The noise preset with the scenario's changes to single components; UnknownName, BadInput.
+
+        With a table [physics] the preset selects causes of errors, and of the statistical components the clock remains.
+        """
+        if "physics" in self.components:
+            raise BadInput("components.physics is no component.", "Write the table [physics] beside [components].")
+        preset = noise_preset(self.noise)
+        if self.physics is not None:
+            preset = Noise(clock=preset.clock, physics=self.physics.with_preset(self.noise))
         try:
-            if "stations" in content:
-                content["stations"] = expand_station_set(content["stations"])
-            if "fitted" in content:
-                content = merge_fitted_unit(content, path.parent)
-            scenario = build(Scenario, content, "scenario")
-            methods = tuple(name for text in scenario.methods for name in expand_alternatives(text))
-            scenario = _read_constellation(replace(scenario, methods=methods), path.parent)
+            return replace_fields(preset, self.components, "components")
         except (TypeError, ValueError) as error:
-            raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
-        check_scenario(path, scenario)
-        check_expected_orders(path, scenario)
-    return scenario
+            raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
+    @property
+    def disturbed_noise(self) -> Noise:
+        """The noise model with the disturbance of the stations that are worn."""
+        return self.disturbance.add_to(self.noise_model, tuple(self.worn_stations))
 
-def _read_constellation(scenario: Scenario, folder: Path) -> Scenario:
-    """The scenario with the emitters of its file, if it names one; BadFile."""
-    if scenario.physics is None:
-        return scenario
-    constellation = scenario.physics.constellation.with_file_read(folder)
-    return replace(scenario, physics=replace(scenario.physics, constellation=constellation))
+    @property
+    def label(self) -> str:
+        """Name in a folder of several scenarios; it precedes the names of the scenario's cells."""
+        return f"{self.name} seed {self.seed}"
 
+    @property
+    def varied_keys(self) -> dict[str, list[Any]]:
+        """Dotted key -> the values of `vary`."""
+        return dict(dotted_keys(self.vary))
 
-def expand_station_set(stations: Any) -> Any:
-    """The table of stations that a scenario means by `stations`: the name of a set, or a table.
+    def count_variants(self) -> int:
+        """Number of combinations of varied values, as `variants` lists them; BadInput for more than `MOST_VARIANTS`."""
+        count = math.prod(len(values) for values in self.varied_keys.values())
+        if count > MOST_VARIANTS:
+            raise BadInput(f"vary: {count:,} combinations.", f"At most {MOST_VARIANTS:,}: vary fewer keys at a time.")
+        return count
 
-    A table whose key `set` names a set starts from that set: a table of a station changes the values it names, or adds
-    the station after the others; "none" leaves the station out. UnknownName for a set or a station that is not there.
-    """
-    if isinstance(stations, str):
-        stations = {"set": stations}
-    if not isinstance(stations, Mapping) or not isinstance(stations.get("set"), str):
-        return stations
-    sets = read_station_sets()
-    if stations["set"] not in sets:
-        raise UnknownName("set of stations", stations["set"], sets)
-    expanded = {name: dict(station) for name, station in sets[stations["set"]].items()}
-    for name, change in stations.items():
-        if change == NONE and name not in expanded:
-            raise UnknownName(f"station of {stations['set']}", name, expanded)
-        if change == NONE:
-            del expanded[name]
-        elif name != "set":
-            expanded[name] = {**expanded.get(name, {}), **change} if isinstance(change, Mapping) else change
-    return expanded
+    def variants(self, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], "Scenario"]]:
+        """Every combination of varied values with the scenario that it gives; one empty combination if nothing varies.
 
+        `chosen` selects combinations by index. UnknownName for a key that does not exist, BadInput for a key that
+        cannot be varied and for a value that does not fit.
+        """
+        choices = self.varied_keys
+        for key, values in choices.items():
+            if key.split(".")[0] in _NOT_VARIABLE or key in ("motion.test", "motion.behaviours"):
+                raise BadInput(
+                    f"vary: {key} cannot be varied.", "Name several methods, inputs or clips in their own lists."
+                )
+            if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
+                raise BadInput(
+                    f"vary: {key} = {values!r} is not a list of different values.", "Write it as [0.0, 0.05]."
+                )
+        self.count_variants()
+        found = []
+        for place, combination in enumerate(itertools.product(*choices.values())):
+            if chosen and place not in chosen:
+                continue
+            values_by_key = dict(zip(choices, combination, strict=True))
+            variant = replace(self, vary={})
+            try:
+                for key, value in values_by_key.items():
+                    content: Any = value
+                    for name in reversed(key.split(".")):
+                        content = {name: content}
+                    variant = variant.change(content, "scenario")
+            except (TypeError, ValueError) as error:
+                raise BadInput(
+                    f"vary: {error}.", "A value must be one that the scenario's own key may have."
+                ) from error
+            found.append((values_by_key, variant))
+        return found
 
-@cache
-def read_station_sets() -> dict[str, dict[str, Any]]:
-    """The shipped sets of stations: set -> station -> its table (see `Station`)."""
-    return read_toml(data_folder("scenarios") / _STATION_SETS_FILE, "sets of stations", "Install the package again.")
+    def change(self, content: Mapping[str, Any], where: str) -> "Scenario":
+        """The scenario with some fields changed, as `core.fields.replace_fields` does it.
 
-
-def expand_clips(scenario: Scenario, folder: LibraryFolders | None) -> Scenario:
-    """The scenario with every pattern in its clip lists, such as "13_*", replaced by the clips that match it.
-
-    Clips are the takes of the motion generator, or those of the library in `folder` (by default HARNESS_MOCAP), sorted
-    by name. "13_*@0.20-0.40" is that part of each. A clip that the list also names itself is not repeated. BadInput for
-    a pattern that matches nothing.
-    """
-    motion = scenario.motion
-    if not any(map(_is_pattern, (*motion.test, *motion.examples, *motion.withheld))):
-        return scenario
-    source = open_motion_source(motion.source, folder, seed=scenario.seed, rate_hz=motion.rate_hz or None)
-    test, examples, withheld = (
-        _match_clips(key, getattr(motion, key), source.names()) for key in ("test", "examples", "withheld")
-    )
-    scenario = replace(scenario, motion=replace(motion, test=test, examples=examples, withheld=withheld))
-    check_scenario(Path(scenario.name), scenario)
-    return scenario
-
-
-def _is_pattern(text: str) -> bool:
-    return any(sign in text.partition("@")[0] for sign in "*?[")
-
-
-def _match_clips(key: str, texts: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
-    """The entries of one clip list with its patterns expanded."""
-    entries: list[str] = []
-    for text in texts:
-        if not _is_pattern(text):
-            entries.append(text)
-            continue
-        pattern, at, part = text.partition("@")
-        matches = sorted(
-            name for name in names if any(fnmatch.fnmatchcase(one, pattern) for one in {name, name.rpartition("/")[2]})
-        )
-        if not matches:
-            raise BadInput(f"motion.{key}: no clip matches {text!r}.", "`harness mocap list` names those of a library.")
-        entries += [f"{name}{at}{part}" for name in matches if f"{name}{at}{part}" not in (*texts, *entries)]
-    return tuple(entries)
-
-
-def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
-    """Every combination of varied values with the scenario that it gives; one empty combination if nothing varies.
-
-    `chosen` selects combinations by index. UnknownName for a key that does not exist, BadInput for a key that cannot be
-    varied and for a value that does not fit.
-    """
-    choices = dict(dotted_keys(scenario.vary))
-    for key, values in choices.items():
-        if key.split(".")[0] in _NOT_VARIABLE or key in ("motion.test", "motion.behaviours"):
-            raise BadInput(
-                f"vary: {key} cannot be varied.", "Name several methods, inputs or clips in their own lists."
-            )
-        if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
-            raise BadInput(f"vary: {key} = {values!r} is not a list of different values.", "Write it as [0.0, 0.05].")
-    count_variants(scenario)
-    found = []
-    for place, combination in enumerate(itertools.product(*choices.values())):
-        if chosen and place not in chosen:
-            continue
-        varied = dict(zip(choices, combination, strict=True))
-        variant = replace(scenario, vary={})
-        try:
-            for key, value in varied.items():
-                content: Any = value
-                for name in reversed(key.split(".")):
-                    content = {name: content}
-                variant = change_scenario(variant, content, "scenario")
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"vary: {error}.", "A value must be one that the scenario's own key may have.") from error
-        found.append((varied, variant))
-    return found
-
-
-def change_scenario(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
-    """The scenario with some fields changed, as `core.fields.replace_fields` does it.
-
-    BadInput for a change of `physics.constellation.file`, which is read with the scenario, and for a change of
-    `physics.constellation.name` beside a file, which would have no effect.
-    """
-    changed = replace_fields(scenario, content, where)
-    before, after = (s.physics.constellation if s.physics else ConstellationSettings() for s in (scenario, changed))
-    if after.file != before.file:
-        found = f"{where}: a change of physics.constellation.file."
-        raise BadInput(found, "Write a scenario for each file; physics.constellation.name can be changed.")
-    if after.file and after.name != before.name:
-        found = f"{where}: physics.constellation.name = {after.name!r} beside physics.constellation.file."
-        raise BadInput(found, "The file replaces the name: start from a scenario without it.")
-    return changed
-
-
-def count_variants(scenario: Scenario) -> int:
-    """Number of combinations of varied values, as `variants` lists them; BadInput for more than `MOST_VARIANTS`."""
-    count = math.prod(len(values) for _, values in dotted_keys(scenario.vary))
-    if count > MOST_VARIANTS:
-        raise BadInput(f"vary: {count:,} combinations.", f"At most {MOST_VARIANTS:,}: vary fewer keys at a time.")
-    return count
+        BadInput for a change of `physics.constellation.file`, which is read with the scenario, and for a change of
+        `physics.constellation.name` beside a file, which would have no effect.
+        """
+        changed = replace_fields(self, content, where)
+        before, after = (s.physics.constellation if s.physics else ConstellationSettings() for s in (self, changed))
+        if after.file != before.file:
+            found = f"{where}: a change of physics.constellation.file."
+            raise BadInput(found, "Write a scenario for each file; physics.constellation.name can be changed.")
+        if after.file and after.name != before.name:
+            found = f"{where}: physics.constellation.name = {after.name!r} beside physics.constellation.file."
+            raise BadInput(found, "The file replaces the name: start from a scenario without it.")
+        return changed
 
 
 def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
@@ -372,122 +262,3 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
             yield from dotted_keys(value, f"{before}{key}.")
         else:
             yield f"{before}{key}", value
-
-
-def find_scenario(path: Path | str, beside: Path | None = None) -> Path:
-    """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile.
-
-    With a folder `beside`, a file there comes first, then one in the folder of shipped scenarios, both with or without
-    `.toml` in their names.
-    """
-    for folder in (beside, data_folder("scenarios")) if beside is not None else ():
-        for file in (folder / path, folder / f"{path}.toml"):
-            if names_input_file(file):
-                return file
-    return find_config(
-        path, "scenario", Path("scenarios"), shipped_scenarios(), "`harness list` names the shipped ones."
-    )
-
-
-def find_config(path: Path | str, kind: str, folder: Path, shipped: Sequence[Path], advice: str) -> Path:
-    """The path of a file in TOML of a kind, such as "sweep": a file, or a shipped one by its bare name.
-
-    A shipped one is also found by its name in the `folder` of the repository. UnknownName, BadFile with this advice.
-    """
-    given = Path(path)
-    check_words(given)
-    if names_input_file(given):
-        return given
-    by_name = {file.stem: file for file in shipped}
-    if given.suffix in ("", ".toml") and given.stem in by_name and given.parent in (Path(), folder):
-        return by_name[given.stem]
-    if given.parent == Path() and not given.suffix:
-        raise UnknownName(kind, str(path), by_name)
-    check_input_file(given, f"a {kind} in TOML", MAX_TOML_BYTES, advice)
-    return given
-
-
-def shipped_scenarios() -> list[Path]:
-    """The files of the shipped scenarios that a bare name finds."""
-    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path.name != _STATION_SETS_FILE)
-
-
-def check_scenario(path: Path, scenario: Scenario) -> None:
-    """Check the rules that types cannot express; BadFile names `path`."""
-
-    def refuse(found: str, expected: str, advice: str) -> None:
-        raise BadFile(path, found, expected, advice)
-
-    if scenario.schema != SCHEMA:
-        refuse(f"schema {scenario.schema}", f"schema {SCHEMA}", "This version of the harness reads no other schema.")
-    if not scenario.motion.test:
-        refuse("no test clips", "names in motion.test", "`harness mocap list` names what a library holds.")
-    if not scenario.stations:
-        refuse("no stations", "a table [stations] with at least one", "For example: head = { bone = 'head' }.")
-    if not scenario.methods:
-        refuse("no methods", "names in methods", "`harness list` names them.")
-    if not scenario.inputs:
-        refuse("no inputs", "names in inputs", "`harness list` names them.")
-    counted = not any(map(_is_pattern, scenario.motion.test))  # else `expand_clips` checks it
-    if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
-        refuse(
-            f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
-            "one word for all, or one for each",
-            "Give motion.behaviours one word.",
-        )
-    for varied, variant in variants(scenario) if scenario.vary else ():
-        try:
-            check_scenario(path, variant)
-        except BadFile as error:
-            refuse(f"{error.found} with {varied_text(varied)}", error.expected, error.advice)
-    for what, repeated in (
-        ("motion.test", scenario.motion.test),
-        ("methods", scenario.methods),
-        ("inputs", scenario.inputs),
-        ("worn", scenario.worn),
-    ):
-        if len(set(repeated)) < len(repeated):
-            refuse(f"{what} names something twice", "each name once", "Remove the second.")
-    parts = sorted(map(ClipPart.parse, scenario.motion.test), key=lambda part: (part.clip, part.start))
-    for one, other in pairwise(parts):
-        if one.clip == other.clip and other.start < one.end:
-            refuse(f"motion.test has {one} and {other}, which overlap", "parts without common frames", "Shorten one.")
-    for name in scenario.worn:
-        if name not in scenario.stations:
-            refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
-    _check_settings_of_stations(scenario)
-
-
-def _check_settings_of_stations(scenario: Scenario) -> None:
-    """UnknownName for prediction or enhancement of a station that is not there."""
-    fusion = scenario.physics.fusion if scenario.physics else None
-    for key in ("prediction_ms", "enhancement"):
-        for name in getattr(fusion, key, ()):
-            if name not in scenario.stations:
-                raise UnknownName(f"station in physics.fusion.{key}", name, scenario.stations)
-
-
-def check_expected_orders(path: Path, scenario: Scenario) -> None:
-    """Check that expected orders name the scenario's methods or inputs; BadFile.
-
-    The command line skips the check where it replaces the methods.
-    """
-    for order in scenario.expected_order:
-        where, what, known = f"the order of {order.source!r}", "methods", scenario.methods
-        if order.inputs:
-            what, known = "inputs", scenario.inputs
-        strange = [name for name in order.names if name not in known]
-        if order.inputs and order.method not in scenario.methods:
-            strange, what, known = [order.method], "methods", scenario.methods
-        faults = {
-            "has no source": not order.source,
-            "names neither or both of methods and inputs": bool(order.methods) == bool(order.inputs),
-            "names a method whose inputs it does not compare": bool(order.method) > bool(order.inputs),
-            "names fewer than two": len(order.names) < 2,
-            "names something twice": len(set(order.names)) < len(order.names),
-            f"names {', '.join(map(repr, strange))}, none of the scenario's {what}": bool(strange),
-            "gives a reason for a step that it does not have": not set(order.why_not) <= set(order.steps),
-        }
-        for fault in (text for text, found in faults.items() if found):
-            advice = f"Known {what}: {', '.join(known)}. Reasons belong to {', '.join(map(repr, order.steps))}."
-            raise BadFile(path, f"{where} {fault}", "two or more methods, or inputs and their method", advice)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from harness.experiment.playback import Playback
-from harness.experiment.scenario import find_scenario
+from harness.experiment.scenario_reader import find_scenario
 from harness.stream.driver import DriverConfig, Is900
 from harness.stream.driver.transport import open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator

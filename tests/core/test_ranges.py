@@ -13,7 +13,8 @@ from harness.compare.baseline import write_baseline
 from harness.core.fields import build, replace_fields
 from harness.core.ranges import Label, Range, check_fields, check_words, constraints_of
 from harness.errors import BadInput, HarnessError
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario
+from harness.experiment.scenario_reader import load_scenario
 from harness.experiment.sweep_config import Sweep, load_sweep
 from harness.reconstruct import registry
 from harness.simulate.noise import Noise

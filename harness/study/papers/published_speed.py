@@ -16,8 +16,8 @@ from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.experiment import benchmark_clips
 from harness.experiment.benchmark_clips import BenchmarkClip
-from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.motion import open_scenario_motion
 from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders, MotionLibrary

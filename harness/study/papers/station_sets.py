@@ -14,7 +14,7 @@ from harness.compare.paired_statistics import (
     mean_interval,
 )
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.cells import open_scenario_motion
+from harness.experiment.motion import open_scenario_motion
 from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart

@@ -13,7 +13,9 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import SCHEMA, Scenario, change_scenario, check_scenario, find_config
+from harness.experiment.scenario import SCHEMA, Scenario
+from harness.experiment.scenario_checks import check_scenario
+from harness.experiment.scenario_reader import find_config
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -277,6 +279,6 @@ def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -
     if fixed := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
         raise BadInput(f"{where}: {', '.join(fixed)}.", "The study defines these keys.")
     try:
-        return change_scenario(scenario, content, where)
+        return scenario.change(content, where)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error

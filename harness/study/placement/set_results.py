@@ -19,9 +19,10 @@ from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
-from harness.experiment.cells import cell_names, open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.motion import open_scenario_motion
+from harness.experiment.scenario import Scenario
+from harness.experiment.tasks import cell_names
 from harness.experiment.workers.executors import TaskExecutor
 from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
@@ -141,7 +142,7 @@ class SetResults:
         for scenario in scenarios:
             planned = [
                 (scenario.name, _variant_key(varied), method, clip)
-                for varied, variant in variants(scenario)
+                for varied, variant in scenario.variants()
                 for clip in variant.motion.test
                 for method in variant.methods
             ]

@@ -20,7 +20,8 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
 from harness.experiment.cells import clear_caches
 from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario
+from harness.experiment.scenario_reader import load_scenario
 from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders

@@ -12,7 +12,8 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import find_playback, registered_take
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario
+from harness.experiment.scenario_reader import load_scenario
 from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
 from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses, TruthSpline

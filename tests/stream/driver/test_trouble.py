@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenario_reader import load_scenario
 from harness.stream.codec.commands import station_command
 from harness.stream.codec.items import SHORT_LIST
 from harness.stream.codec.reader import ContinuousFrameReader
