@@ -86,9 +86,9 @@ def _describe_sweep(path: Path) -> str:
 
 
 def _describe_noise(scenario: Scenario) -> str:
-    """What is varied; without that the noise."""
-    varied = dict.fromkeys(key for combination, _ in scenario.variants() for key in combination)
-    return f"varies {', '.join(varied)}" if varied else f"noise {scenario.noise}"
+    """What varies; without that the noise."""
+    keys = dict.fromkeys(key for combination, _ in scenario.variants() for key in combination)
+    return f"varies {', '.join(keys)}" if keys else f"noise {scenario.noise}"
 
 
 def _describe_takes(names: tuple[str, ...]) -> str:

@@ -70,7 +70,7 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
         start = time.perf_counter()
         try:
             evaluation, method = _clip_evaluation(task, cell.scenario), find_method(cell.method, task.isolation).method
-            key = evaluation.key(method, cell.method, cell.inputs, cell.varied)
+            key = evaluation.key(method, cell.method, cell.inputs, cell.identity)
             if storage.has_cell(out, key):
                 yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
                 continue
@@ -160,8 +160,7 @@ def evaluate_cell(
         noise=scenario.noise_label,
         seed=scenario.seed,
         performer=evaluation.subject.performer,
-        varied=planned.varied,
-        scenario=scenario.name,
+        **planned.identity,
         defined_by=evaluation.conditions_of(method, planned.inputs) | ({"lag": lag} if lag else {}),
         scores=scores,
         health=health,

@@ -405,11 +405,11 @@ class ClipEvaluation:
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
         return (*notes, note + soles)
 
-    def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
-        """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
+    def key(self, method: Method, name: str, inputs: str, identity: Mapping[str, object]) -> str:
+        """Key of a cell; `identity` is what else the cell states, see `PlannedCell`."""
         if name not in self._methods:
             self._methods[name] = NamedMethod(name, method).identity
-        content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
+        content = {**self.conditions_of(method, inputs), **identity}
         return storage.cell_key(content, self._methods[name], manifest.source_hash())
 
 

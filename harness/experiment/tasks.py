@@ -37,6 +37,11 @@ class PlannedCell:
     label: str = ""
     """Name of the scenario in a folder of several scenarios."""
 
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What a cell states of its scenario, and what its key includes for that reason."""
+        return {"varied": self.varied, "scenario": self.scenario.name}
+
     def __str__(self) -> str:
         """Name of the cell."""
         details = [text for text in (self.inputs, varied_text(self.varied)) if text not in ("", "pos+ori")]

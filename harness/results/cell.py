@@ -361,6 +361,11 @@ def varied_text(varied: Mapping[str, Any]) -> str:
     return " ".join(f"{key}={_short(value)}" for key, value in varied.items())
 
 
+def setting_text(row: Mapping[str, Any]) -> str:
+    """Text of the varied values of a row of a cell or of a summary, as `varied_text`."""
+    return varied_text(row["varied"])
+
+
 def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"

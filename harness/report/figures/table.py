@@ -69,7 +69,7 @@ class ResultsTable:
     """A table of a run."""
 
     condition_names: tuple[str, ...]
-    """What distinguishes conditions: varied keys, performers, lag, behaviour; empty if there is one condition."""
+    """What distinguishes conditions: keys that vary, performers, lag, behaviour; empty if there is one condition."""
     metrics: tuple[str, ...]
     rows: tuple[ResultsRow, ...]
     """The rows of a condition follow each other."""
@@ -117,14 +117,14 @@ def build_table(
 
 
 def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
-    varied = dict.fromkeys(key for each in run.conditions for key in each.varied)
+    keys = dict.fromkeys(key for each in run.conditions for key in each.setting)
     groups = {each.group for each in run.conditions}
     further = {
         "performers": len({group.performer for group in groups}) > 1,
         "lag": len({group.lag for group in groups}) > 1,
         "behaviour": by_behaviour,
     }
-    return (*varied, *(name for name, shown in further.items() if shown))
+    return (*keys, *(name for name, shown in further.items() if shown))
 
 
 def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -> str:
@@ -133,7 +133,7 @@ def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -
         "lag": str(condition.group.lag),
         "behaviour": (behaviour or "").replace("_", " "),
     }
-    return texts[name] if name in texts else varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
+    return texts[name] if name in texts else varied_text({name: condition.setting[name]}).removeprefix(f"{name}=")
 
 
 def _value(

@@ -194,16 +194,13 @@ def _run_row(scenario: Scenario) -> tuple[str, ...]:
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
         f"stations {', '.join(scenario.worn_stations)}"
     )
-    varied = [
-        f"{key}: {', '.join(_varied_value_text(key, value) for value in values)}"
-        for key, values in scenario.vary.items()
-    ]
+    vary = [f"{key}: {', '.join(_value_text(key, value) for value in values)}" for key, values in scenario.vary.items()]
     methods, inputs = ", ".join(scenario.methods), ", ".join(scenario.inputs)
-    return scenario.name, setting, methods, inputs, "; ".join(varied) or "nothing"
+    return scenario.name, setting, methods, inputs, "; ".join(vary) or "nothing"
 
 
-def _varied_value_text(key: str, value: Any) -> str:
-    """A varied value without its key."""
+def _value_text(key: str, value: Any) -> str:
+    """The text of a value without its key."""
     return varied_text({key: value}).removeprefix(f"{key}=")
 
 

@@ -51,7 +51,7 @@ class PaperStudy:
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
 
-        `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer, clip, varied.
+        `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer and clip.
         A row also has the `unit` of its clip, and `unit_clips`: how many clips of that unit and behaviour were planned.
         """
         wanted, rows = to_json_types(where), self.summary_rows(run)

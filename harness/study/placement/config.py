@@ -121,7 +121,7 @@ class PlacementStudy:
     title: Text
     scenario: str
     """A file in the folder of the study (without `.toml`), or a shipped scenario. It defines motion, body, calibration,
-    noise, tracker and seed; its stations, methods, inputs and varied values are not used."""
+    noise, tracker and seed; its stations, methods, inputs and `vary` are not used."""
     methods: tuple[MethodName, ...]
     """Methods; the mean of their errors is minimised."""
     schema: int = SCHEMA
@@ -249,7 +249,7 @@ def check_station_count(stations: int, where: str) -> None:
 def base_scenario(
     study: PlacementStudy, load: Callable[[str], Scenario], condition: ConditionOptions | None = None
 ) -> Scenario:
-    """The scenario of the study or of a condition: with its changes, all candidates as stations, and nothing varied.
+    """The scenario of the study or of a condition: with its changes, all candidates as stations, and an empty `vary`.
 
     `load` gives the scenario that the study or the condition names.
     """

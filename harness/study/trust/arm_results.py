@@ -51,12 +51,12 @@ class Arm:
     method: str
     set_name: str
     stations: tuple[str, ...]
-    varied: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Name in tables, such as "ik, six"."""
-        values = [f"{key.rpartition('.')[2]} = {value}" for key, value in self.varied.items()]
-        return ", ".join([self.method, self.set_name, *values])
+        texts = [f"{key.rpartition('.')[2]} = {value}" for key, value in self.values.items()]
+        return ", ".join([self.method, self.set_name, *texts])
 
 
 @dataclass(frozen=True)
@@ -254,8 +254,8 @@ class _TrustTaskRun:
             return [({}, base)]
         scenario = replace(base.scenario, vary=dict(self.task.parameters))
         return [
-            (varied, ClipEvaluation(variant, base.source, base.part, base.behaviour))
-            for varied, variant in scenario.variants()
+            (values, ClipEvaluation(variant, base.source, base.part, base.behaviour))
+            for values, variant in scenario.variants()
         ]
 
     def _cells(
@@ -274,7 +274,7 @@ class _TrustTaskRun:
         self, arm: Arm, side: str, identity: Mapping[str, Any], load: Callable[[], ObservedTake]
     ) -> dict[str, float | None]:
         method = resolve_method(arm.method, DEFAULT_ISOLATION)
-        evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
+        evaluation = next(each for values, each in self._evaluations if values == arm.values)
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
         path = (

@@ -165,8 +165,8 @@ def run_trust_study(
 def plan_arms(plan: Plan, scenario: Scenario) -> tuple[Arm, ...]:
     """Every method with every set of stations and every combination of parameters."""
     return tuple(
-        Arm(method, name, stations, varied)
-        for varied, _ in parameter_variants(plan, scenario)
+        Arm(method, name, stations, values)
+        for values, _ in parameter_variants(plan, scenario)
         for name, stations in plan.stations.items()
         for method in plan.methods
     )
@@ -248,7 +248,7 @@ def comparable_pairs(arms: Sequence[Arm]) -> list[tuple[str, str]]:
     return [
         (str(a), str(b))
         for a, b in combinations(arms, 2)
-        if (a.method != b.method) + (a.set_name != b.set_name) + (a.varied != b.varied) == 1
+        if (a.method != b.method) + (a.set_name != b.set_name) + (a.values != b.values) == 1
     ]
 
 
