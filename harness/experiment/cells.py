@@ -129,7 +129,10 @@ def evaluate_cell(
     if too_slow:
         health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
     shape = len(frames), len(simulation.stations)  # also of no frame at all
-    readings = {n: np.array([getattr(f, n) for f in frames], kind).reshape(shape) for n, kind in _READINGS.items()}
+    readings: dict[str, Any] = {
+        name: np.array([getattr(frame, name) for frame in frames], kind).reshape(shape)
+        for name, kind in _READINGS.items()
+    }
     scores = score_estimate(
         evaluation.body.skeleton,
         scenario.tracker.rate_hz,
