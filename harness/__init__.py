@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from harness.reconstruct.registry import methods
     from harness.results.reader import load_run as load
     from harness.score.score import score_estimate
-    from harness.stream.driver.is900 import Is900
-    from harness.stream.emulator.emulator import Emulator
-    from harness.stream.emulator.server import serve_emulator
+    from harness.stream.is900.driver.is900 import Is900
+    from harness.stream.is900.emulator.emulator import Emulator
+    from harness.stream.is900.emulator.server import serve_emulator
 else:
     _MODULES = {
-        "Emulator": "harness.stream.emulator.emulator",
+        "Emulator": "harness.stream.is900.emulator.emulator",
         "HarnessError": "harness.errors",
-        "Is900": "harness.stream.driver.is900",
+        "Is900": "harness.stream.is900.driver.is900",
         "__version__": "harness.core.package_data",
         "compare_runs": "harness.compare.comparison",
         "load": "harness.results.reader",
@@ -47,7 +47,7 @@ else:
         "read_clip": "harness.mocap.clip_file",
         "run": "harness.experiment.engine",
         "score_estimate": "harness.score.score",
-        "serve_emulator": "harness.stream.emulator.server",
+        "serve_emulator": "harness.stream.is900.emulator.server",
         "simulate_clip": "harness.experiment.clip_simulation",
     }
     """Public name -> module that defines it."""

@@ -29,7 +29,9 @@ from harness.results.benchmark_statement import state_verdict
 from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.results.trust_findings import TrustFindings
 from harness.stream.recording.recording import record_capture
+from harness.stream.recording.station_readings import CaptureReader
 from harness.study.placement.placement_study import run_placement
+from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.characterization import characterize_capture
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
@@ -101,13 +103,13 @@ def rig_capture(made_once: Make) -> Path:
 @pytest.fixture(scope="session")
 def unit_with_faults(rig_capture: Path) -> UnitReport:
     """As `harness characterize --rigid left_hand,torso` finds it."""
-    return characterize_capture(rig_capture, rigid=("left_hand", "torso")).report
+    return characterize_capture(CaptureReader(rig_capture), rigid=("left_hand", "torso")).report
 
 
 def _validated(made_once: Make, kind: str) -> ValidationReport:
     folder = made_once(kind, lambda to: planted_capture(kind, FAULTS_SEED, to, seconds=FAULTS_S))
     path = folder / f"{kind}_{FAULTS_SEED}.rec"
-    return validate_capture(path, planted_truth(kind, FAULTS_SEED)).report
+    return validate_capture(read_capture(CaptureReader(path)), planted_truth(kind, FAULTS_SEED)).report
 
 
 @pytest.fixture(scope="session")

@@ -103,6 +103,15 @@ def test_a_folder_imports_only_what_it_may(folder: str) -> None:
         assert not strange, f"{file.relative_to(PACKAGE)} imports {sorted(strange)}"
 
 
+def test_a_device_family_sees_no_other() -> None:
+    """Nor `recording`, which lies above the families."""
+    folders = {p.name for p in (PACKAGE / "stream").iterdir() if (p / "__init__.py").exists()}
+    for family in folders - {"recording"}:
+        others = {f"stream.{other}" for other in folders - {family}}
+        for file in (PACKAGE / "stream" / family).rglob("*.py"):
+            assert not any(is_below(m, others) for m in imports_of(file)), file.relative_to(PACKAGE)
+
+
 def test_no_modules_import_each_other_in_a_circle() -> None:
     """The public API is left out: it names modules of many folders, and imports each when it is used."""
     left = {

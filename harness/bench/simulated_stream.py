@@ -17,8 +17,8 @@ from harness.mocap import synthetic
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.simulate import noise
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
-from harness.stream.codec.decoder import Decoder
-from harness.stream.codec.reader import CaptureStream
+from harness.stream.is900.codec.decoder import Decoder
+from harness.stream.is900.codec.reader import CaptureStream
 
 MAX_RATIO = 13.0
 """Most CPU time of a frame, relative to MuJoCo's kinematics of one pose: as strict as 20,000 frames/s was."""

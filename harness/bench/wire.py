@@ -22,10 +22,10 @@ from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
 from harness.experiment.playback import prepare_playback
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
-from harness.stream.codec.decoder import Decoder
-from harness.stream.codec.items import STATION_CHARACTERS, record_type
-from harness.stream.codec.reader import FrameReader
-from harness.stream.codec.records import RecordFormat, format_records
+from harness.stream.is900.codec.decoder import Decoder
+from harness.stream.is900.codec.items import STATION_CHARACTERS, record_type
+from harness.stream.is900.codec.reader import FrameReader
+from harness.stream.is900.codec.records import RecordFormat, format_records
 
 METHOD = "expert_map"
 SECONDS, LONG_S = 15.0, 600.0

@@ -15,8 +15,8 @@ from threading import Thread
 import numpy as np
 
 from harness.experiment.playback import prepare_playback
-from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, describe_list
-from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
+from harness.stream.is900.codec.items import SHORT_LIST, STANDARD_LIST, describe_list
+from harness.stream.is900.emulator import EmulatorConfig, SentMessage, serve_emulator
 
 SCENARIO, CLIP = "demo", "boxing_p1_01"
 

@@ -137,7 +137,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
     from harness.experiment.scenario_reader import load_scenario
     from harness.live.pose_terminal import PoseTerminal
     from harness.live.viewer import ViewerOutput
-    from harness.stream.driver import DriverConfig, open_tracker
+    from harness.stream.is900.driver import DriverConfig, open_tracker
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")

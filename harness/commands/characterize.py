@@ -16,7 +16,7 @@ from harness.commands.flags import (
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
-from harness.commands.unit_results import add_unit_flags, departure_content, read_expected, write_unit
+from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.package_data import VERSION
 from harness.core.progress import ProgressBar
 from harness.errors import BadFile, BadInput, Outcome
@@ -46,14 +46,16 @@ def add_characterize(verbs: Verbs) -> None:
 def run_characterize(args: argparse.Namespace) -> Outcome:
     from harness.report.kit.page_text import page_text
     from harness.report.lab.unit_page import unit_page
+    from harness.stream.recording.station_readings import CaptureReader
     from harness.study.trust.characterization import characterize_capture
 
-    expected, pair = read_expected(args), _parse_pair(args.rigid)
-    capture = _capture_of(args)
+    options = UnitOptions(args.out, args.expect, args.force)
+    expected, pair = read_expected(options), _parse_pair(args.rigid)
+    reader = CaptureReader(_capture_of(args))
     with ProgressBar("parts") as progress:
-        found = characterize_capture(capture, expected=expected, rigid=pair, progress=progress)
-    page = unit_page(found.report, this_command(), args.out.name if args.out else "")
-    lines, written = write_unit(args, lambda: found.unit, page)
+        found = characterize_capture(reader, expected=expected, rigid=pair, progress=progress)
+    page = unit_page(found.report, this_command(), options.out.name if options.out else "")
+    lines, written = write_unit(options, found.unit, page)
     content = {
         "unit": found.unit.name,
         "parameters": {key: number.as_dict() for key, number in found.profile.parameters.items()},
@@ -93,7 +95,7 @@ def _capture_of(args: argparse.Namespace) -> Path:
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
     from harness.measure.episode_distributions import events_for_precision
-    from harness.stream.driver import DriverConfig
+    from harness.stream.is900.driver import DriverConfig
     from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
 
     path: Path = args.out.with_suffix(".rec")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from harness.core.calibration import Calibration
     from harness.experiment.playback import Playback
     from harness.live.pose import Output
-    from harness.stream.driver import Tracker
+    from harness.stream.is900.driver import Tracker
     from harness.stream.line_events import EventCounter
     from harness.stream.recording.recorder import RecordingSwitch
 
@@ -163,8 +163,8 @@ def _open_device(
     recorder: "RecordingSwitch | None" = None,
 ) -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream.codec.items import position_range_m
-    from harness.stream.driver import DriverConfig, open_tracker
+    from harness.stream.is900.codec.items import position_range_m
+    from harness.stream.is900.driver import DriverConfig, open_tracker
 
     tracker = playback.tracker
     stations = tuple(playback.scenario.stations)

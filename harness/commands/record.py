@@ -86,7 +86,7 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.mocap.synthetic.takes import stretch_marks
-    from harness.stream.emulator.faults import add_byte_faults, unapplied_kinds
+    from harness.stream.is900.emulator.faults import add_byte_faults, unapplied_kinds
     from harness.stream.recording.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
@@ -129,7 +129,7 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
 
 def _record_line(args: argparse.Namespace) -> Outcome:
     """Record a device that is set up here, that another program uses, or that is sent commands."""
-    from harness.stream.driver import DriverConfig
+    from harness.stream.is900.driver import DriverConfig
     from harness.stream.recording.command_recording import check_commands, format_exchanges, record_commands
     from harness.stream.recording.line_server import serve_line
     from harness.stream.recording.recorder import record_port

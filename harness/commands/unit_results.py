@@ -1,6 +1,7 @@
 """What `characterize` and `validate` share: their unit file with its page, and the departures from another."""
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,47 +9,64 @@ from harness.commands.output import print_caveat
 from harness.core.progress import show_steps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from harness.measure.departures import Departure
     from harness.measure.unit_file import UnitFile
     from harness.report.kit.page import Page
 
 
+@dataclass(frozen=True)
+class UnitOptions:
+    """The unit files that a verb reads and writes, as `add_unit_flags` asks for them."""
+
+    out: Path | None
+    """Unit file to write; None writes nothing."""
+    expect: Path | None
+    """Earlier unit file to compare with; None is the preset."""
+    force: bool
+    """Whether `out` may be replaced."""
+
+    @property
+    def name(self) -> str:
+        """Name of the unit that is written; "" where nothing is."""
+        return self.out.stem if self.out else ""
+
+
 def add_unit_flags(verb: argparse.ArgumentParser, out: str) -> None:
-    """Add `--out` with this help, `--force` and `--expect`; `read_expected` and `write_unit` read them."""
+    """Add `--out` with this help, `--force` and `--expect`, the flags of `UnitOptions`."""
     verb.add_argument("--out", type=Path, metavar="FILE", help=out)
     verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
     text = "earlier unit file to compare with (default: the noise preset `default`)"
     verb.add_argument("--expect", type=Path, metavar="FILE", help=text)
 
 
-def read_expected(args: argparse.Namespace) -> "UnitFile | None":
-    """The unit file of `--expect`; None without one. Also checks that the one of `--out` can be written."""
+def read_expected(options: UnitOptions) -> "UnitFile | None":
+    """The unit file to compare with; None without one. Also checks that the one of `out` can be written."""
     from harness.core.files import require_writable
     from harness.measure.unit_file import UNIT_FILE, read_unit_file
 
-    if args.out is not None:
-        require_writable(args.out, UNIT_FILE, force=args.force)
-    expected = None if args.expect is None else read_unit_file(args.expect)
-    print_caveat(args.expect, expected.caveat if expected else "")
+    if options.out is not None:
+        require_writable(options.out, UNIT_FILE, force=options.force)
+    if options.expect is None:
+        return None
+    expected = read_unit_file(options.expect)
+    print_caveat(options.expect, expected.caveat)
     return expected
 
 
-def write_unit(
-    args: argparse.Namespace, make: "Callable[[], UnitFile]", page: "Page"
-) -> tuple[list[str], dict[str, str]]:
-    """Write the unit file of `--out` and its page: lines that say so, and content; nothing without `--out`."""
+def write_unit(options: UnitOptions, unit: "UnitFile", page: "Page") -> tuple[list[str], dict[str, str]]:
+    """Write a unit file and its page: lines that say so, and content; nothing without `out`."""
     from harness.measure.unit_file import write_unit_file
     from harness.report.kit.page_html import write_page
 
-    if args.out is None:
+    if options.out is None:
         return [], {}
-    write_unit_file(args.out, make(), force=args.force)
+    write_unit_file(options.out, unit, force=options.force)
     with show_steps("parts of the report"):
-        report = write_page(page, args.out.with_suffix(".html"))
-    lines = [f"unit file: {args.out}", f"report: {report}"]
-    return lines, {"unit_file": str(args.out), "page": str(report)}
+        report = write_page(page, options.out.with_suffix(".html"))
+    lines = [f"unit file: {options.out}", f"report: {report}"]
+    return lines, {"unit_file": str(options.out), "page": str(report)}
 
 
 def departure_content(checks: "Iterable[Departure]", *p_values: str) -> list[dict[str, Any]]:

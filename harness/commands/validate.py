@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.commands.flags import Verbs, add_verb, split_list
 from harness.commands.output import print_result, this_command
-from harness.commands.unit_results import add_unit_flags, departure_content, read_expected, write_unit
+from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -32,22 +32,29 @@ def add_validate(verbs: Verbs) -> None:
 def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.kit.page_text import page_text
     from harness.report.lab.validation_page import validation_page
-    from harness.study.trust.validation import evaluate_registered, load_truth, session_unit, validate_capture
+    from harness.stream.recording.station_readings import CaptureReader
+    from harness.study.trust.capture_readings import read_capture
+    from harness.study.trust.truth_source import TruthSource, load_truth
+    from harness.study.trust.validation import evaluate_registered, session_unit, validate_capture
 
-    expected = read_expected(args)
-    truth = load_truth(args.capture, args.truth, scenario=args.scenario, folder=args.mocap)
+    options = UnitOptions(args.out, args.expect, args.force)
+    source = TruthSource(args.truth, args.scenario, args.mocap)
     methods = split_list(args.methods)
-    if methods and truth.playback is None:
-        raise BadInput(
-            f"--methods with {truth.title}.", "Only a clip has a performer's body to score on: leave it out."
-        )
+    expected = read_expected(options)
+    reader = CaptureReader(args.capture)
     with ProgressBar("steps") as progress:
-        found = validate_capture(args.capture, truth, expected=expected, progress=progress)
-        scores = evaluate_registered(args.capture, found, methods, progress) if methods else []
+        progress("reading", 0, 3)
+        capture = read_capture(reader)
+        truth = load_truth(capture, source)
+        if methods and truth.playback is None:
+            advice = "Only a clip has a performer's body to score on: leave it out."
+            raise BadInput(f"--methods with {truth.title}.", advice)
+        found = validate_capture(capture, truth, expected=expected, progress=progress)
+        scores = evaluate_registered(found, methods, progress) if methods else []
     report = found.report
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
     page = validation_page(report, errors, this_command())
-    lines, written = write_unit(args, lambda: session_unit(found, expected, args.out.stem), page)
+    lines, written = write_unit(options, session_unit(found, expected, options.name), page)
     content = {
         "truth": truth.title,
         "matched_share": report.matched_share,
@@ -59,7 +66,7 @@ def run_validate(args: argparse.Namespace) -> Outcome:
             for method, values in errors.items()
             for metric, value in values.items()
         ],
-        "damage": list(found.reader.damage),
+        "damage": list(capture.damage),
         **written,
     }
     failures = {one.method: one.failure for one in scores if one.failure}

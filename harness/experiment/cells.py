@@ -31,7 +31,7 @@ from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row
 from harness.score.loops import COVERAGE_FLOOR
 from harness.score.score import score_estimate
-from harness.stream.codec.items import record_size
+from harness.stream.is900.codec.items import record_size
 
 _ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
 _READINGS = {"quality": float, "position_valid": bool, "orientation_valid": bool, "suspect": bool}

@@ -28,7 +28,7 @@ from harness.experiment.simulated_calibration import PerformerCalibration
 from harness.mocap.library import LibraryFolders
 from harness.simulate.loop import simulate_loop
 from harness.simulate.simulation import Simulation, TrackerConfig
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.is900.codec.samples import DeviceSamples
 
 
 class Playback:

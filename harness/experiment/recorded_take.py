@@ -25,9 +25,9 @@ from harness.measure.registration import Registration
 from harness.mocap.library import LibraryFolders
 from harness.score.loops import WARM_UP_S, LoopFrames
 from harness.simulate.simulation import sampling_times_s
-from harness.stream.codec.items import STATION_CHARACTERS
-from harness.stream.codec.samples import DeviceSamples
 from harness.stream.frame import TrackerFrame
+from harness.stream.is900.codec.items import STATION_CHARACTERS
+from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.stream.recording.replay import RecordingStream
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from harness.compare.run_statistics import run_statistics
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY
 from harness.core.progress import ProgressCallback
@@ -111,17 +112,17 @@ class RunFolder:
             self.outcome = next(outcome for outcome in Outcome if outcome.word == summary["outcome"])
 
     def _write_summary(self, index: CellIndex) -> Mapping[str, Any]:
-        plan = self.plan
+        plan, manifest = self.plan, self.plan.manifest
+        orders = plan.scenarios[0].expected_order
         return storage.write_summary(
             index,
             self.out,
+            run_statistics(index, self.out, orders, manifest.training_data) if plan.kind == "run" else {},
             kind=plan.kind,
             name=plan.name,
             command=plan.command,
-            performers=plan.manifest.performers,
-            unit=plan.manifest.unit,
-            training_data=plan.manifest.training_data,
+            performers=manifest.performers,
+            unit=manifest.unit,
             scenarios=[scenario.label for scenario in plan.scenarios],
             vary={key: values for scenario in plan.scenarios for key, values in scenario.varied_keys.items()},
-            orders=plan.scenarios[0].expected_order if plan.kind == "run" else None,
         )

@@ -9,18 +9,18 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from harness.body.mounts import Mount
+from harness.compare.expected_orders import ExpectedOrder
 from harness.core.fields import replace_fields
 from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields
 from harness.core.split import StatisticalUnit
 from harness.errors import BadInput
 from harness.experiment.scenario_motion import ScenarioMotion
-from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.settings import Physics
-from harness.stream.emulator.faults import Fault
+from harness.stream.is900.emulator.faults import Fault
 
 SCHEMA = 1
 MOST_VARIANTS = 1_000_000
@@ -110,19 +110,19 @@ class Scenario:
     """Errors from their causes instead of the statistical ones (docs/is900.md 16): the table [physics], which may be
     empty. The noise preset then selects the causes."""
     disturbance: Disturbance = field(default_factory=Disturbance)
-    """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.results.recovery`)."""
+    """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.compare.recovery`)."""
     vary: dict[Text, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]. Everything runs with each value,
     or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
-    """Rankings that papers state (see `harness.results.expected_orders`)."""
+    """Rankings that papers state (see `harness.compare.expected_orders`)."""
     unit: StatisticalUnit = "performer"
     """What statistics of the results count. Clips of one performer are not independent. `clip` is for test clips of too
     few performers: every page then says that its statements hold for these performers only."""
     left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
-    """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
+    """Faults of the line when an emulator plays the scenario (see `stream.is900.emulator`); runs ignore them."""
 
     def __post_init__(self) -> None:
         check_fields(self)

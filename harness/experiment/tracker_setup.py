@@ -9,8 +9,8 @@ from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise
 from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.room import check_emitters
-from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import make_inputs
+from harness.stream.is900.codec.reader import WireFormat
 
 
 @dataclass(frozen=True)

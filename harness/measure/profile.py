@@ -8,7 +8,6 @@ constant errors do not show.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -99,17 +98,16 @@ class UnitProfile:
 
 
 def measure_profile(
-    path: Path,
+    reader: CaptureReader,
     *,
     rigid: tuple[str, str] | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> UnitProfile:
     """Measure a unit from a capture.
 
-    BadFile for a file that is no recording, and for one without a rest of at least ten correlation times. BadInput for
-    a station of `rigid` that is not in it.
+    BadFile for a capture without a rest of at least ten correlation times. BadInput for a station of `rigid` that is
+    not in it.
     """
-    reader = CaptureReader(path)
     _check_pair(rigid, reader.wire.stations)
     collected = _Collected(reader, rigid)
     for number, block in enumerate(reader.blocks()):
@@ -117,7 +115,7 @@ def measure_profile(
         collected.add(block)
     if not collected.rest:
         advice = "Let all stations lie still for a minute or more, in sight of the emitters."
-        raise BadFile(path, "no stretch in which a station rests", _CAPTURE, advice)
+        raise BadFile(reader.path, "no stretch in which a station rests", _CAPTURE, advice)
     progress("finding episodes", 0, 3)
     noise, episodes = _fit(collected.rest, progress)
     correlation = noise.all_stations["components.drift.correlation_s"]
@@ -125,7 +123,7 @@ def measure_profile(
     if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
         found = f"a rest of {longest_s:.3g} s, with errors that are correlated over {correlation.value:.3g} s"
         expected = f"a rest of {STATIC_CORRELATIONS * correlation.value:.3g} s or more"
-        raise BadFile(path, found, expected, "Let the stations lie still for longer.")
+        raise BadFile(reader.path, found, expected, "Let the stations lie still for longer.")
     return UnitProfile(
         reader.wire.stations,
         reader.wire.rate_hz,

@@ -5,7 +5,7 @@ inputs, the method and the source of both, so that edited code never reuses stal
 """
 
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,10 @@ from harness.results.content_types import (
     find_impossible_statistic,
 )
 from harness.results.digests import write_result_json
-from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.folder_kind import LOCK_FILE, folder_lock
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.manifest import Manifest
-from harness.results.recovery import RecoveryCollector
-from harness.results.summary import GROUP_KEYS, SummaryStatistics
 from harness.results.table import compute_group_statistics, write_table
 
 __all__ = [
@@ -144,24 +141,14 @@ def _indexed_cells(out: Path, keys: Collection[str] | None) -> Iterator[Cell]:
             yield cell
 
 
-def write_summary(
-    index: CellIndex,
-    out: Path,
-    *,
-    orders: Sequence[ExpectedOrder] | None = None,
-    training_data: Mapping[str, str] | None = None,
-    **facts: Any,
-) -> dict[str, Any]:
+def write_summary(index: CellIndex, out: Path, statistics: Mapping[str, Any], **facts: Any) -> dict[str, Any]:
     """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
     summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason), line_loss
-    (see `core.stream_health`; absent where every line let its cell be measured) and groups (see
-    `table.compute_group_statistics`). The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell
-    was measured. With `orders`, as a run has them, it also has statistics over frames, for
-    which every cell is read: methods (with their declared `training_data`) and behaviours (see
-    `SummaryStatistics.rows`), recovery (see
-    `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
-    and cells (the rows). The index then gets the digests of the files and its own.
+    (see `core.stream_health`; absent where every line let its cell be measured), groups (see
+    `table.compute_group_statistics`) and the given `statistics`: those of `compare.run_statistics` for a run, none for
+    a sweep. The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell was measured. The index
+    then gets the digests of the files and its own.
     """
     counts = index.counts()
     unmeasured = [key for key, value in index.columns("key", "joint_angle_mean_deg") if value is None]
@@ -176,32 +163,12 @@ def write_summary(
         "failures": index.failures(),
         **({"line_loss": slow} if slow else {}),
         "groups": compute_group_statistics(index),
+        **statistics,
     }
-    if orders is not None:
-        content |= _frame_statistics(index, out, orders)
-        for row in content["methods"]:
-            row["training_data"] = (training_data or {}).get(row["method"])
     write_table(index, out / "summary.csv")
     write_result_json(out / SUMMARY, content)
     index.write_digest(compute_digests(out))
     return content
-
-
-def _frame_statistics(index: CellIndex, out: Path, orders: Sequence[ExpectedOrder]) -> dict[str, Any]:
-    rows, recovery = [], RecoveryCollector()
-    methods, behaviours = SummaryStatistics(*GROUP_KEYS), SummaryStatistics(*GROUP_KEYS, "behaviour")
-    for (key,) in index.columns("key"):
-        cell = read_cell(cell_folder(out, key))
-        rows.append(as_row(cell))
-        for statistics in (methods, behaviours, recovery):
-            statistics.add(cell)
-    return {
-        "methods": methods.rows(),
-        "behaviours": behaviours.rows(),
-        "recovery": recovery.rows(),
-        "expected_orders": evaluate_orders(orders, rows),
-        "cells": rows,
-    }
 
 
 def remove_leftovers(out: Path) -> None:

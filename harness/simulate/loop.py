@@ -23,7 +23,7 @@ from harness.simulate.readings import SimulatedReadings
 from harness.simulate.resting_ends import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.samples import DeviceSamples, FilterSamples
+from harness.stream.is900.codec.samples import DeviceSamples, FilterSamples
 
 SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 """Shortest duration of the return [s], and the walking speed and turning rate that may lengthen it."""

@@ -23,7 +23,7 @@ from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.worn import BodyMotionSource, Worn
 from harness.simulate.readings import FilterReadings, SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.samples import FilterSamples
+from harness.stream.is900.codec.samples import FilterSamples
 
 _LEAD_OUT_S = 0.5
 """Motion after the take: the last slot may end later than it [s]."""

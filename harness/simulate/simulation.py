@@ -20,10 +20,10 @@ from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.items import position_range_m
-from harness.stream.codec.reader import ByteCapture, FrameReader, WireFormat
-from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
+from harness.stream.is900.codec.items import position_range_m
+from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
+from harness.stream.is900.codec.records import RecordValues, encode_records
 
 __all__ = ["Simulation", "TrackerConfig", "simulate_readings", "simulate_tracker", "transmit_readings"]
 

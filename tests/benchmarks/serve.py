@@ -23,8 +23,8 @@ from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.live.scheduling_jitter import JitterProbe
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
-from harness.stream.codec import commands
-from harness.stream.codec.items import STANDARD_LIST
+from harness.stream.is900.codec import commands
+from harness.stream.is900.codec.items import STANDARD_LIST
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recording import read_recording
 

@@ -160,6 +160,7 @@ def line(key: str, value: str) -> Callable[[str], str]:
         (line("mount_m", "[0.1, 0.2, 30.0]"), "mount_m is more than 1 m from its bone"),
         (line("mount_m", '[0.1, 0.2, "0"]'), "mount_m[2]: expected float"),
         (line("bone_from_station", "[1.0, 0.1, 0.0, 0.0]"), "not a unit quaternion: its length is 1.00499"),
+        (line("bone_from_station", "[1.0000015, 0.0, 0.0, 0.0]"), "not a unit quaternion: its length is 1"),
         (line("world_from_tracker", "[0.0, 0.0, 0.0, 0.0]"), "room.world_from_tracker is not a unit quaternion"),
         (line("bone", '"nose"'), "'nose' is not one of the bones"),
         (line("kind", "1"), "kind: expected str"),

@@ -99,3 +99,8 @@ def test_every_joint_that_leads_to_a_station_of_the_first_paper_bends() -> None:
             assert spans[f"{bone}.{channel}"] >= 10.0, (bone, channel)
     for limb in ("humerus.rx", "humerus.rz", "radius.rx", "femur.rx", "tibia.rx"):
         assert min(spans[f"l{limb}"], spans[f"r{limb}"]) >= 20.0, limb
+
+
+def test_the_angles_are_those_that_recordings_were_made_with() -> None:
+    """The sum of each pose's angles without their signs [deg]: a changed angle spoils the recordings of the poses."""
+    assert [sum(map(abs, pose.angles_deg.values())) for pose in POSES] == [40, 383, 323, 410, 434, 416, 995, 488]

@@ -26,8 +26,8 @@ from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.reconstruct.methods.ik import PREVIOUS
-from harness.stream.emulator.server import serve_emulator
 from harness.stream.frame import TrackerFrame
+from harness.stream.is900.emulator.server import serve_emulator
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness

@@ -10,7 +10,7 @@ import pytest
 
 from harness.commands.output import progress_note, recording_note
 from harness.experiment import playback
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording import command_recording, line_server, recorder, recording
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream

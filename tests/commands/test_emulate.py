@@ -16,11 +16,11 @@ from harness.experiment.scenario import Scenario
 from harness.experiment.scenario_reader import find_scenario, load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct.methods.ik import PREVIOUS
-from harness.stream.codec.samples import DeviceSamples
-from harness.stream.driver.transport import open_transport
-from harness.stream.emulator import server
-from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.faults import FaultKind
+from harness.stream.is900.codec.samples import DeviceSamples
+from harness.stream.is900.driver.transport import open_transport
+from harness.stream.is900.emulator import server
+from harness.stream.is900.emulator.config import EmulatorConfig
+from harness.stream.is900.emulator.faults import FaultKind
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 

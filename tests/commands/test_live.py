@@ -15,7 +15,7 @@ import pytest
 
 from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
-from harness.stream.emulator.server import serve_emulator
+from harness.stream.is900.emulator.server import serve_emulator
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 

@@ -16,9 +16,9 @@ import pytest
 
 from harness.experiment.playback import Playback
 from harness.experiment.scenario_reader import find_scenario
-from harness.stream.driver import DriverConfig, Is900
-from harness.stream.driver.transport import open_transport
-from harness.stream.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900.driver import DriverConfig, Is900
+from harness.stream.is900.driver.transport import open_transport
+from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
 from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.stream.emulator import EmulatorConfig, serve_emulator
-from harness.stream.emulator.server import EmulatorServer
+from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900.emulator.server import EmulatorServer
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command, Said
-from tests.stream.emulator.played import make_samples
+from tests.stream.is900.emulator.played import make_samples
 
 
 @pytest.fixture

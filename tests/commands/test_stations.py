@@ -7,10 +7,10 @@ import pytest
 
 from harness.commands.flags import parse_station_map
 from harness.errors import HarnessError
-from harness.stream.emulator import serve_emulator
+from harness.stream.is900.emulator import serve_emulator
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
-from tests.stream.driver.bench import make_samples
+from tests.stream.is900.driver.bench import make_samples
 
 LIVE = ["live", "--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik", "--port", "tcp://127.0.0.1:1"]
 

@@ -11,9 +11,9 @@ from harness.body.humanoid import build_body
 from harness.core.network import resolve_host
 from harness.errors import BadInput
 from harness.live.vmc import VmcOutput
-from harness.stream.driver.transport import open_transport
-from harness.stream.emulator.tcp_port import TcpPort
-from harness.stream.emulator.udp_broadcast import UdpPort
+from harness.stream.is900.driver.transport import open_transport
+from harness.stream.is900.emulator.tcp_port import TcpPort
+from harness.stream.is900.emulator.udp_broadcast import UdpPort
 from tests.live.posing import configuration, live_pose
 
 IPV4, IPV6 = socket.AF_INET, socket.AF_INET6

@@ -16,6 +16,7 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.compare.comparison import compare_runs
+from harness.compare.expected_orders import ExpectedOrder
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY
@@ -28,7 +29,6 @@ from harness.experiment.scenario_reader import load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.report.comparison.wording import comparison_sentence
 from harness.report.run.text import run_table
-from harness.results.expected_orders import ExpectedOrder
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cells, read_summary
 from harness.stream.frame import TrackerFrame

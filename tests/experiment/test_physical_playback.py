@@ -7,9 +7,9 @@ import pytest
 
 from harness.errors import UnknownName
 from harness.experiment.playback import Playback, prepare_playback
-from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.records import RecordValues, encode_records
-from harness.stream.codec.samples import DeviceSamples
+from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.is900.codec.records import RecordValues, encode_records
+from harness.stream.is900.codec.samples import DeviceSamples
 
 SCENARIO = """
 methods = ["ik:previous"]

@@ -14,9 +14,9 @@ from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_take import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenario_reader import find_scenario
-from harness.stream.codec import commands
-from harness.stream.codec.reader import WireFormat
-from harness.stream.emulator.device import Device
+from harness.stream.is900.codec import commands
+from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.is900.emulator.device import Device
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.stream.wire import frames_equal

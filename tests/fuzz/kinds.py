@@ -48,7 +48,7 @@ from harness.results.placement_findings import read_placement
 from harness.results.reader import load_run
 from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf
-from harness.stream.emulator.settings import DEFAULT_EMITTERS
+from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream

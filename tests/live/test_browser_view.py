@@ -22,7 +22,7 @@ from harness.live.browser_process import BrowserConfig
 from harness.live.browser_view import BrowserOutput, _run_process
 from harness.live.shared_memory import PoseRing
 from harness.live.viewer import _run_viewer_process
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.recorder import RecordingSwitch
 from harness.stream.recording.recording import read_recording
 from harness.view.server import COMMAND_HEADER

@@ -12,7 +12,7 @@ from harness.core.seeds import generator
 from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share, robust_slope
 from harness.simulate.components.stationary import Clock, gauss_markov
 from harness.simulate.noise import Noise, noise_preset
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.station_readings import CaptureBlock, StationReadings
 from tests.measure.resting_stations import simulate_static, station_readings
 

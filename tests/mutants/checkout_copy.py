@@ -99,6 +99,8 @@ class CheckoutCopy:
             bytecode.unlink()
 
     def _environment(self) -> dict[str, str]:
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "NUMBA_CACHE"))}
+        """That of this process, but tests may write bytecode: without it every run compiles the whole package anew."""
+        left_out = ("PYTEST_", "NUMBA_CACHE", "PYTHONDONTWRITEBYTECODE")
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(left_out)}
         folder = str(self.scratch)
         return kept | {"PYTHONPATH": str(self.root), "TMPDIR": folder, "OPENBLAS_NUM_THREADS": "1"}

@@ -35,7 +35,9 @@ def test_the_tables_agree() -> None:
     assert set(FRAME_METRICS) == {name for name, d in DEFINITIONS.items() if d.pool != "none"}
     endings = {"deg": "_deg", "mm": "_mm", "mm/s": "_mm_s", "m/s³": "_m_s3", "ms": "_ms"}
     for name, definition in DEFINITIONS.items():
+        assert definition.unit in {*endings, "frames", "frames/s", "share", "x"}, name
         assert name.endswith(endings.get(definition.unit, "")), name
+        assert definition.version >= 1, name
 
 
 def test_a_larger_body_in_the_right_pose_is_off_by_as_much_as_it_is_larger(judge: Judge, truth_qpos: Floats) -> None:
@@ -196,6 +198,20 @@ def test_a_shift_between_frames_is_found_within_a_tenth(judge: Judge, late: floa
     t = np.arange(FRAMES) / RATE_HZ
     found = timing.lag_ms(motion(t), motion(t - late / RATE_HZ), np.arange(FRAMES), RATE_HZ)
     assert found == pytest.approx(1e3 * late / RATE_HZ, abs=0.1 * 1e3 / RATE_HZ)
+
+
+@pytest.mark.parametrize(("frames", "measured"), [(60, True), (59, False)])
+def test_a_lag_needs_twenty_frames_within_reach_of_the_truth(frames: int, measured: bool) -> None:
+    """Half a second at either end, 20 frames, serves the shifts."""
+    motion = np.sin(np.outer(np.arange(frames) / RATE_HZ, np.linspace(1.0, 6.0, 48)))
+    found = timing.lag_ms(motion, np.roll(motion, 2, axis=0), np.arange(frames), RATE_HZ)
+    assert np.isfinite(found) == measured
+
+
+def test_steps_below_a_millisecond_have_a_rate() -> None:
+    assert timing.step_times_ms(np.array([0.4, 0.6, np.nan]))["fps"] == pytest.approx(2000.0)
+    assert np.isnan(timing.step_times_ms(np.zeros(3))["fps"])
+    assert np.isnan(list(timing.step_times_ms(np.full(2, np.nan)).values())).all()
 
 
 def test_a_shift_beyond_the_range_is_not_measured(judge: Judge, truth_qpos: Floats) -> None:

@@ -7,7 +7,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import BodyMotion
 from harness.score.metrics import FRAME_METRICS
-from harness.score.null_methods import NULL_METHODS, score_null_methods
+from harness.score.null_methods import NULL_METHODS, mean_pose, score_null_methods
 from harness.testing import doctor
 from tests.scored_run import RATE_HZ
 
@@ -28,6 +28,12 @@ def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
     assert found["mean_pose"]["root_position_mm"] == 0.0
     assert found["frozen_pose"]["jitter_m_s3"] == 0.0
     assert found["frozen_pose"]["lag_ms"] is None  # what does not move cannot be late
+
+
+def test_the_mean_pose_keeps_the_root_and_stills_every_hinge(truth_qpos: Floats) -> None:
+    found = mean_pose(truth_qpos)
+    np.testing.assert_array_equal(found[:, :7], truth_qpos[:, :7])
+    np.testing.assert_allclose(found[:, 7:], np.tile(truth_qpos[:, 7:].mean(axis=0), (len(found), 1)), atol=1e-12)
 
 
 @pytest.fixture

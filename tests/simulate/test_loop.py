@@ -11,9 +11,9 @@ from harness.core.motion import BodyMotion
 from harness.simulate.loop import looping_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.codec.items import SHORT_LIST
-from harness.stream.codec.reader import ByteCapture, FrameReader
-from harness.stream.emulator.device import Device
+from harness.stream.is900.codec.items import SHORT_LIST
+from harness.stream.is900.codec.reader import ByteCapture, FrameReader
+from harness.stream.is900.emulator.device import Device
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)

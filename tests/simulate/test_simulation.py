@@ -22,8 +22,8 @@ from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.reader import ByteCapture, CaptureStream, FrameReader
 from harness.stream.frame import TrackerFrame
+from harness.stream.is900.codec.reader import ByteCapture, CaptureStream, FrameReader
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 

@@ -10,15 +10,15 @@ import pytest
 
 from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
-from harness.stream.codec.reader import ByteCapture, WireFormat
-from harness.stream.codec.records import RecordValues, encode_records
-from harness.stream.driver import Is900
-from harness.stream.emulator import serve_emulator
+from harness.stream.is900.codec.reader import ByteCapture, WireFormat
+from harness.stream.is900.codec.records import RecordValues, encode_records
+from harness.stream.is900.driver import Is900
+from harness.stream.is900.emulator import serve_emulator
 from harness.stream.recording.recording import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
 from tests.long_demo import write_long_demo
-from tests.stream.emulator.played import make_samples, with_filter
+from tests.stream.is900.emulator.played import make_samples, with_filter
 from tests.stream.sources import RATE_HZ, SOURCES, PlayedTake, Sources, differences, overlap, read_sources
 
 ESTIMATED_FRAMES, CHECKED_FRAMES = 60, 25

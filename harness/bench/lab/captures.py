@@ -26,8 +26,8 @@ from harness.simulate.components.transient import Dropout
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.reader import ByteCapture, WireFormat
-from harness.stream.emulator.faults import Fault, add_byte_faults
+from harness.stream.is900.codec.reader import ByteCapture, WireFormat
+from harness.stream.is900.emulator.faults import Fault, add_byte_faults
 from harness.stream.recording.recording import record_capture
 
 SCENARIO = "lab"

@@ -14,6 +14,7 @@ from harness.experiment.workers.executors import TaskExecutor
 from harness.measure.departures import Departure
 from harness.results.digests import check_key, read_record, write_record
 from harness.results.manifest import source_hash
+from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust.characterization import characterize_capture
 
 _STORED = "an outcome of `harness bench lab --truth`"
@@ -116,7 +117,7 @@ def _analyse(kind: str, seed: int, folder: Path) -> CaptureOutcome:
         errors = registration_errors(against, seed) if kind in NO_FAULTS else {}
         checks = stored_checks(against.report.checks)
         return CaptureOutcome(kind, seed, source_hash(), checks, errors=errors, exchanged=exchanged)
-    found = characterize_capture(planted_capture(kind, seed, folder))
+    found = characterize_capture(CaptureReader(planted_capture(kind, seed, folder)))
     parameters = tuple(
         StoredNumber(key, one.value, _finite(one.low), _finite(one.high))
         for key, one in found.profile.parameters.items()

@@ -19,7 +19,7 @@ from harness.mocap.synthetic.takes import generate_rig
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.is900.codec.reader import ByteCapture, WireFormat
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.study.trust.trust_study import run_trust_study
 

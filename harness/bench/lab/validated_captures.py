@@ -25,6 +25,8 @@ from harness.measure.pose_series import TruthPoses
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.simulate.components.stationary import Clock, SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
+from harness.stream.recording.station_readings import CaptureReader
+from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.truth_motion import TruthMotion, nominal_mounts
 from harness.study.trust.validation import Validation, session_unit, validate_capture
 
@@ -46,9 +48,10 @@ def validate_planted(kind: str, seed: int, folder: Path) -> Validation:
     """Record a planted capture and validate it; a scale is compared with an earlier capture of the session."""
     expected = None
     if kind == "scale":
-        earlier = validate_capture(planted_capture(EARLIER, seed, folder), planted_truth(EARLIER, seed))
-        expected = session_unit(earlier, None, EARLIER)
-    return validate_capture(planted_capture(kind, seed, folder), planted_truth(kind, seed), expected=expected)
+        earlier = read_capture(CaptureReader(planted_capture(EARLIER, seed, folder)))
+        expected = session_unit(validate_capture(earlier, planted_truth(EARLIER, seed)), None, EARLIER)
+    capture = read_capture(CaptureReader(planted_capture(kind, seed, folder)))
+    return validate_capture(capture, planted_truth(kind, seed), expected=expected)
 
 
 def planted_truth(kind: str, seed: int) -> TruthMotion:

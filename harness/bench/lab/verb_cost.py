@@ -30,15 +30,18 @@ def measure_verb(verb: str, capture: Path, seed: int = 0) -> tuple[float, int]:
 
 def run_verb(verb: str, capture: Path, seed: int) -> None:
     """Run the library behind a verb in this process."""
+    from harness.stream.recording.station_readings import CaptureReader
+
     if verb == "characterize":
         from harness.study.trust.characterization import characterize_capture
 
-        characterize_capture(capture)
+        characterize_capture(CaptureReader(capture))
     else:
         from harness.bench.lab.validated_captures import planted_truth
+        from harness.study.trust.capture_readings import read_capture
         from harness.study.trust.validation import validate_capture
 
-        validate_capture(capture, planted_truth(BOXING_KIND, seed))
+        validate_capture(read_capture(CaptureReader(capture)), planted_truth(BOXING_KIND, seed))
 
 
 if __name__ == "__main__":

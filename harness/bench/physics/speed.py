@@ -28,7 +28,7 @@ from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics import physical_tracker
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
-from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
+from harness.stream.is900.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 MOUNTS = (
     *common.MOUNTS,

@@ -16,7 +16,7 @@ from harness.errors import Outcome
 from harness.experiment.scenario import Scenario
 from harness.experiment.scenario_reader import load_scenario
 from harness.mocap import synthetic
-from harness.results.expected_orders import METRIC
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 BEHAVIOURS = ("walking", "boxing", "jumping")
 MOST_BUILTIN = 12
@@ -103,7 +103,9 @@ def rank_rows(
 
     An item is the mean over its cells of a performer, and is not measured where one of them has no result.
     """
-    measured = {(row["scenario"], row["method"], frozenset(row["stations"]), row["clip"]): row[METRIC] for row in rows}
+    measured = {
+        (row["scenario"], row["method"], frozenset(row["stations"]), row["clip"]): row[PRIMARY_METRIC] for row in rows
+    }
     values: dict[tuple[str, str], dict[str, dict[str, dict[str, list[float | None]]]]] = {}
     for scenario in scenarios:
         behaviour, _, source = scenario.name.rsplit("_", 2)

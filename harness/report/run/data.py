@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.compare.run_statistics import GROUP_KEYS
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
@@ -17,7 +18,6 @@ from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, se
 from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
-from harness.results.summary import GROUP_KEYS
 from harness.score.angles import hinge_errors_deg, local_errors_deg
 from harness.score.pair import Pair, PoseSequence, compute_poses
 from harness.score.positions import joint_errors_mm

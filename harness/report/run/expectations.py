@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+from harness.compare.expected_orders import DECIMALS
+from harness.compare.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
 from harness.core.number_format import NOT_MEASURED, format_fixed, format_share
 from harness.report.kit.page import Block, Bullets, DataTable, Prose, TerminalOnly
-from harness.results.cell import setting_text
-from harness.results.expected_orders import DECIMALS, METRIC
-from harness.results.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 _MEANS = "means over the clips on which all were measured"
 _VERDICT = {True: "holds", False: "does not hold", None: "not judged"}
@@ -28,11 +28,11 @@ def expected_orders(summary: Mapping[str, Any]) -> list[Block]:
     for title, group in groupby(summary.get("expected_orders", []), key=_order_title):
         rows = list(group)
         cells = [[_setting(row), *_format_means(row), _verdict(row)] for row in rows]
-        caption = f"{METRIC} [deg], {_MEANS} (n)."
+        caption = f"{PRIMARY_METRIC} [deg], {_MEANS} (n)."
         table = DataTable(["setting", *rows[0]["names"], "order"], cells, f"Expected: {title}.", caption)
         reasons = dict.fromkeys(reason for row in rows if row["holds"] is False for reason in row["why"])
         blocks += [table, Bullets([f"Where {reason}" for reason in reasons], prefix="  ")]
-    return [TerminalOnly([Prose(f"expected orders: {METRIC}, {_MEANS} (n)")]), *blocks] if blocks else []
+    return [TerminalOnly([Prose(f"expected orders: {PRIMARY_METRIC}, {_MEANS} (n)")]), *blocks] if blocks else []
 
 
 def _order_title(row: Mapping[str, Any]) -> str:

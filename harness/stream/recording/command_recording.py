@@ -7,10 +7,10 @@ from contextlib import suppress
 from typing import Any
 
 from harness.errors import BadInput
-from harness.stream.codec.commands import find_danger, parse_command
-from harness.stream.codec.reader import WireFormat
-from harness.stream.driver import DriverConfig, DriverTiming
-from harness.stream.driver.connection import (
+from harness.stream.is900.codec.commands import find_danger, parse_command
+from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.is900.driver import DriverConfig, DriverTiming
+from harness.stream.is900.driver.connection import (
     WAKE_UP,
     DeviceConnection,
     Host,
@@ -18,8 +18,8 @@ from harness.stream.driver.connection import (
     candidate_baud_rates,
     detect_device,
 )
-from harness.stream.driver.exchange import Answer, exchange, read_wire_format
-from harness.stream.driver.transport import LineLost
+from harness.stream.is900.driver.exchange import Answer, exchange, read_wire_format
+from harness.stream.is900.driver.transport import LineLost
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
 from harness.stream.recording.recording import RecordingWriter

@@ -14,13 +14,13 @@ from pathlib import Path
 
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
-from harness.stream.codec.reader import WireFormat
-from harness.stream.driver.config import DriverConfig, DriverTiming
-from harness.stream.driver.connection import DeviceConnection, Host, NoAnswer, candidate_baud_rates, detect_device
-from harness.stream.driver.exchange import read_wire_format
-from harness.stream.driver.transport import LineLost, SelectTransport
-from harness.stream.emulator.pty_port import ClientPty, check_link_is_free
+from harness.stream.is900.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
+from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.connection import DeviceConnection, Host, NoAnswer, candidate_baud_rates, detect_device
+from harness.stream.is900.driver.exchange import read_wire_format
+from harness.stream.is900.driver.transport import LineLost, SelectTransport
+from harness.stream.is900.emulator.pty_port import ClientPty, check_link_is_free
 from harness.stream.line_events import LineEvent, LineEventKind
 from harness.stream.recording.blocks import RECEIVED, SENT
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S

@@ -37,7 +37,7 @@ from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
-from harness.stream.codec.reader import ByteCapture, WireFormat
+from harness.stream.is900.codec.reader import ByteCapture, WireFormat
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.blocks import (
     ANSWERED,

@@ -6,8 +6,8 @@ from itertools import product
 from harness.compare.claims import Errors, claim_lower_error
 from harness.compare.paired_statistics import compare_paired
 from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
+from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import SummaryRow, errors_by_unit, mean_table
@@ -15,9 +15,9 @@ from harness.study.papers.tables import SummaryRow, errors_by_unit, mean_table
 KERNEL_CCA, WEIGHTED_BLEND = "kernel_cca", "weighted_blend"
 KERNEL_CCA_LITERAL, WEIGHTED_BLEND_LITERAL = "kernel_cca:literal", "weighted_blend:literal"
 METHODS = (KERNEL_CCA, WEIGHTED_BLEND, "ik", "ik:previous")
-WORLD_METRICS = {METRIC: "deg", "mpjpe_mm": "mm"}
+WORLD_METRICS = {PRIMARY_METRIC: "deg", "mpjpe_mm": "mm"}
 """Metric -> unit, for tables."""
-_ROOT_RELATIVE_METRICS = {METRIC: "deg", "mpjpe_root_mm": "mm from the root"}
+_ROOT_RELATIVE_METRICS = {PRIMARY_METRIC: "deg", "mpjpe_root_mm": "mm from the root"}
 """Metric -> unit where the room is calibrated too: there a heading error adds an error that grows with the distance."""
 _TRACKER_NOTE = (
     "Stations are simulated without noise at 40 Hz, on one standard skeleton that the methods know, with known mounts "
@@ -113,7 +113,7 @@ def performers(rows: Iterable[SummaryRow]) -> tuple[str, ...]:
     return tuple(sorted({row["performer"] for row in rows}))
 
 
-def errors_by_method(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
+def errors_by_method(rows: Iterable[SummaryRow], metric: str = PRIMARY_METRIC) -> dict[str, dict[str, float]]:
     """Method -> unit -> error, of rows that differ in nothing else."""
     by_method: dict[str, list[SummaryRow]] = {}
     for row in rows:

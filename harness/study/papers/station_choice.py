@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from harness.compare.claims import Errors, claim_lower_error
 from harness.results.benchmark_statement import BenchmarkStatement, Reading
-from harness.results.expected_orders import METRIC
 from harness.results.findings import FindingsTable, PaperExperiment
+from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.station_sets import (
@@ -48,7 +48,7 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
     sides = {
         reading: {
             metric: {b: errors_by_set(study.rows(f"sensors_{b}", method=method), metric) for b in PUBLISHED_SETS}
-            for metric in (METRIC, "mpjpe_mm")
+            for metric in (PRIMARY_METRIC, "mpjpe_mm")
         }
         for reading, method in METHODS.items()
     }
@@ -56,9 +56,9 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
     claims = [
         replace(claim, reading=reading)
         for reading, errors in sides.items()
-        for claim in _claims(study, METHODS[reading], errors[METRIC], ranges)
+        for claim in _claims(study, METHODS[reading], errors[PRIMARY_METRIC], ranges)
     ]
-    angles = sides["ours"][METRIC]
+    angles = sides["ours"][PRIMARY_METRIC]
     return PaperExperiment(
         name="sensors",
         title="Comparison of sets of stations",
@@ -93,7 +93,7 @@ def rank_station_sets(study: PaperStudy) -> PaperExperiment:
             *(
                 set_table(
                     f"{b}, {METHODS[reading]}: all sets, mean ± sd, RMS over units (units)",
-                    errors[METRIC][b],
+                    errors[PRIMARY_METRIC][b],
                     errors["mpjpe_mm"][b],
                     ALL_STATIONS,
                 )

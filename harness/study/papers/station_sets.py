@@ -16,8 +16,8 @@ from harness.compare.paired_statistics import (
 from harness.core.split import ClipPart, allowed_frames
 from harness.experiment.motion import open_scenario_motion
 from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
-from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
+from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import SummaryRow, errors_by_unit, format_mean, mean_sd, number_of_units
 
@@ -55,7 +55,7 @@ def count_stations(name: str) -> int:
     return name.count("+") + 1
 
 
-def errors_by_set(rows: Iterable[SummaryRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
+def errors_by_set(rows: Iterable[SummaryRow], metric: str = PRIMARY_METRIC) -> dict[str, dict[str, float]]:
     """Set -> unit -> error, of rows that differ only in clip and stations."""
     by_set: dict[str, list[SummaryRow]] = {}
     for row in rows:

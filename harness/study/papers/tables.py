@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from harness.compare.run_statistics import GROUP_KEYS
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.results.cell import Cell
-from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, FindingsTable, LineChart
-from harness.results.summary import GROUP_KEYS
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 SummaryRow = Mapping[str, Any]
 RMS = "joint_angle_rms_deg"
@@ -35,11 +35,11 @@ class UnitErrors(dict[str, float]):
     """Unit -> root mean square beside it, of joint angles; None for other errors."""
 
 
-def errors_by_unit(rows: Iterable[SummaryRow], metric: str = METRIC) -> UnitErrors:
+def errors_by_unit(rows: Iterable[SummaryRow], metric: str = PRIMARY_METRIC) -> UnitErrors:
     """Errors of rows that differ only in the clip (see `PaperStudy.rows`).
 
     A unit of which a clip was not measured is left out, so that means of one unit can be paired. BadInput for two rows
-    of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
+    of one clip, and for rows that must not be pooled (see `compare.run_statistics.GROUP_KEYS`).
     """
     of_clip: dict[str, SummaryRow] = {}
     kinds: dict[str, Any] = {}
@@ -53,7 +53,7 @@ def errors_by_unit(rows: Iterable[SummaryRow], metric: str = METRIC) -> UnitErro
             raise BadInput(f"Two errors on {row['clip']} cannot be pooled.", "Select one value of what varies.")
         of_clip[row["clip"]] = row
     errors = UnitErrors(_average((row, row[metric]) for row in of_clip.values()))
-    if metric == METRIC:
+    if metric == PRIMARY_METRIC:
         errors.rms = _average((row, row.get(RMS)) for row in of_clip.values())
     return errors
 
@@ -135,7 +135,7 @@ def mean_bars(
     )
 
 
-def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, caption: str = "") -> LineChart:
+def error_lines(title: str, cells: Mapping[str, Cell], metric: str = PRIMARY_METRIC, caption: str = "") -> LineChart:
     """Line chart of errors over time; `cells` maps series to cells of one clip. Frames that a series lacks are gaps."""
     frames = sorted({int(k) for cell in cells.values() for k in cell.frame_index[cell.scores.scored]})
     position = {k: i for i, k in enumerate(frames)}
@@ -161,13 +161,13 @@ def errors_by_joint_group(
     """
     by_group: dict[tuple[str, str], list[tuple[SummaryRow, float]]] = {}
     for row, cell in cells:
-        for metric, (group, bones) in product((METRIC, RMS), groups.items()):
+        for metric, (group, bones) in product((PRIMARY_METRIC, RMS), groups.items()):
             errors = cell.scores.per_joint.get(metric, {})
             values = np.array([error for hinge, error in errors.items() if hinge.partition(".")[0] in bones])
             if len(values):
                 mean = np.sqrt(np.mean(values**2)) if metric == RMS else np.mean(values)
                 by_group.setdefault((group, metric), []).append((row, float(mean)))
-    found = {group: UnitErrors(_average(by_group.get((group, METRIC), []))) for group in groups}
+    found = {group: UnitErrors(_average(by_group.get((group, PRIMARY_METRIC), []))) for group in groups}
     for group, errors in found.items():
         errors.rms = _average(by_group.get((group, RMS), []))
     return found

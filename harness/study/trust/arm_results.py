@@ -33,6 +33,8 @@ from harness.score.loops import LoopFrames
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import sampling_times_s, simulate_tracker
 from harness.stream.recording.replay import RecordingStream
+from harness.stream.recording.station_readings import CaptureReader
+from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.reading_errors import (
     HealthCounts,
     count_health,
@@ -190,7 +192,8 @@ class _TrustTaskRun:
 
         BadInput for motion or stations that are not those of the clip.
         """
-        found = validate_capture(self.task.capture, truth_of_playback(self.playback, host_clock=False))
+        capture = read_capture(CaptureReader(self.task.capture))
+        found = validate_capture(capture, truth_of_playback(self.playback, host_clock=False))
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
         take = registered_take(self.stream, found.registration, self.playback, self.playback.tracker.rate_hz)

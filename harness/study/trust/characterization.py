@@ -22,6 +22,7 @@ from harness.measure.unit_report import UnitReport, unit_report
 from harness.results.digests import file_digest
 from harness.simulate.noise import noise_preset
 from harness.stream.recording.recording import EXPECTED_FILE
+from harness.stream.recording.station_readings import CaptureReader
 
 UNIFORM_KEYS = (
     "components.excursion.size_m",
@@ -163,25 +164,24 @@ class Characterization:
 
 
 def characterize_capture(
-    path: Path,
+    reader: CaptureReader,
     *,
-    name: str = "",
     expected: UnitFile | None = None,
     rigid: tuple[str, str] | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
     """Measure a unit from a capture, and compare it with the preset `default` or with an earlier unit file.
 
-    `name` is that of the unit; by default the capture's. BadFile and BadInput as `measure.profile.measure_profile`.
+    The unit has the name of the capture. BadFile and BadInput as `measure.profile.measure_profile`.
     """
-    profile = measure_profile(path, rigid=rigid, progress=progress)
-    unit = make_unit_file(profile, name or path.stem, path)
+    profile = measure_profile(reader, rigid=rigid, progress=progress)
+    unit = make_unit_file(profile, reader.path)
     known = preset_values() if expected is None else unit_values(expected)
     checks = check_departures(measured_numbers(profile), expected_numbers(profile, known))
     return Characterization(profile, unit, tuple(checks), expected.name if expected else "the preset default")
 
 
-def make_unit_file(profile: UnitProfile, name: str, path: Path) -> UnitFile:
+def make_unit_file(profile: UnitProfile, path: Path) -> UnitFile:
     """The unit file of a profile: measured values in their places, the preset's where nothing was measured."""
     components = preset_components()
     defaults = dict(flatten_components(components))
@@ -189,7 +189,7 @@ def make_unit_file(profile: UnitProfile, name: str, path: Path) -> UnitFile:
     values = {key: number.value for key, number in measured.items() if number.is_measured}
     reasons = {key: number.reason for key, number in measured.items() if not number.is_measured}
     return UnitFile(
-        name,
+        path.stem,
         nest_components(_in_order(values), components),
         {"rate_hz": profile.rate_hz, "items": list(profile.items)},
         {key: number for key, number in {**measured, **_means(profile)}.items() if number.is_measured},

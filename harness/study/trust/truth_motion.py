@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -14,13 +13,13 @@ from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.skeleton import Skeleton
-from harness.errors import BadFile, BadInput
+from harness.errors import BadInput
 from harness.experiment.playback import Playback
 from harness.experiment.scenario import Scenario
-from harness.measure.pose_series import MeasuredPoses, TruthPoses
+from harness.measure.pose_series import TruthPoses
 from harness.simulate.loop import loop_motion
 from harness.simulate.simulation import exact_calibration
-from harness.stream.recording.station_readings import CaptureReader, StationReadings
+from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 
 _MARGIN_S = 0.5
 """Time for which the loops of an emulator reach beyond a capture [s]."""
@@ -135,24 +134,22 @@ def nominal_mounts(calibration: Calibration, stations: Sequence[str]) -> dict[st
     return {station: NominalMount(mount_m, turn) for station, mount_m, turn in mounts}
 
 
-def truth_of_capture(path: Path, stations: Sequence[str]) -> TruthMotion:
+def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMotion:
     """Another capture as the reference: its stations are the bodies, those of the same name carry the stations.
 
-    Times are those of its device's clock. BadFile, and BadInput unless it has every station.
+    Times are those of its device's clock. BadInput unless it has every station.
     """
-    reader = CaptureReader(path)
-    readings, notes = read_stations(reader)
     bodies = {}
-    for name, one in readings.items():
-        poses = measured_poses(one)
+    for name, readings in other.readings.items():
+        poses = measured_poses(readings)
         rows = np.flatnonzero(poses.valid & np.isfinite(poses.measured_s))
         highest_s = np.maximum.accumulate(np.append(-np.inf, poses.measured_s[rows]))[:-1]
         rows = rows[poses.measured_s[rows] > highest_s]
         bodies[name] = TruthPoses(poses.measured_s[rows], poses.position_m[rows], poses.tracker_from_station[rows])
-    lost = (f"{path.name}: {text}" for text in (*notes, *reader.damage))
+    lost = (f"{other.path.name}: {text}" for text in (*other.left_out, *other.damage))
     note = "Scale, heading and clocks are those relative to the other tracker, and are not compared with a preset."
     return TruthMotion(
-        f"the capture {path.name}", bodies, common_names(stations, bodies), is_tracker=True, notes=(note, *lost)
+        f"the capture {other.path.name}", bodies, common_names(stations, bodies), is_tracker=True, notes=(note, *lost)
     )
 
 
@@ -165,37 +162,3 @@ def common_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> d
             "Name its bodies as the stations of the capture.",
         )
     return {name: name for name in stations}
-
-
-def read_stations(reader: CaptureReader) -> tuple[dict[str, StationReadings], tuple[str, ...]]:
-    """All readings of the longest session of a capture, station by station, and notes on what is left out.
-
-    The device's clock begins anew in each session. BadFile for a capture without a record.
-    """
-    blocks = [block for block in reader.blocks() if block.stations]
-    if not blocks:
-        raise BadFile(reader.path, "no record of a station", "a capture with readings", "Record it again.")
-    records: dict[int, int] = {}
-    for block in blocks:
-        records[block.session] = records.get(block.session, 0) + block.records
-    longest = max(records, key=lambda session: (records[session], -session))
-    others = sum(records.values()) - records[longest]
-    notes = []
-    if others:
-        notes.append(f"{others} records of {len(records) - 1} other session(s) of the device are left out.")
-    if garbage := sum(block.garbage_bytes for block in blocks):
-        notes.append(f"{garbage} bytes belong to no record.")
-    out = {}
-    for station in reader.wire.stations:
-        parts = [block.stations[station] for block in blocks if block.session == longest]
-        columns = ([getattr(part, name) for part in parts] for name in StationReadings.__dataclass_fields__)
-        out[station] = StationReadings(*(np.concatenate(column) for column in columns))
-    return out, tuple(notes)
-
-
-def measured_poses(readings: StationReadings) -> MeasuredPoses:
-    """The readings as poses for the registration."""
-    valid = np.isfinite(readings.position_m[:, 0]) & np.isfinite(readings.tracker_from_station[:, 0])
-    return MeasuredPoses(
-        readings.measured_s, readings.position_m, readings.tracker_from_station, valid & ~readings.suspect
-    )

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -11,19 +10,11 @@ from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
-from harness.experiment.recorded_take import find_playback, registered_take
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
-from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
+from harness.experiment.recorded_take import registered_take
+from harness.measure.angular_speed import identify_stations, record_period_s
 from harness.measure.departures import Departure, compare_with_expected
-from harness.measure.pose_series import MeasuredPoses, TruthSpline
-from harness.measure.registration import (
-    LEAST_OVERLAP_S,
-    Registration,
-    StationResiduals,
-    register,
-    require_stamps,
-)
+from harness.measure.pose_series import MeasuredPoses
+from harness.measure.registration import Registration, StationResiduals, register, require_stamps
 from harness.measure.unit_file import UnitFile
 from harness.measure.unit_report import CaptureSummary
 from harness.measure.validation_report import (
@@ -33,22 +24,13 @@ from harness.measure.validation_report import (
     estimated_poses,
     residual_series,
 )
-from harness.mocap.clip_file import FORMATS, read_clip
-from harness.mocap.library import LibraryFolders
-from harness.stream.codec.items import BITS_PER_BYTE, record_size
-from harness.stream.recording.recording import read_recording
+from harness.stream.is900.codec.items import BITS_PER_BYTE, record_size
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.station_readings import CaptureReader, StationReadings
+from harness.stream.recording.station_readings import StationReadings
+from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
-from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
-from harness.study.trust.truth_motion import (
-    TruthMotion,
-    measured_poses,
-    read_stations,
-    truth_of_capture,
-    truth_of_clip,
-    truth_of_playback,
-)
+from harness.study.trust.truth_motion import TruthMotion
 
 SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
 """Errors of methods that a validated capture states."""
@@ -59,15 +41,13 @@ _DEFAULT_LATENCY_S, _DEFAULT_BAUD = 0.004, 115200
 _MOST_LEFT_OUT = 0.15
 """Share of a station's readings that excursions and echoes are left out for at most [choice]."""
 _NO_HOST_CLOCK = "reference not on the host's clock"
-_LOOPED_CORRELATION = 0.8
-"""Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
     """What a reference shows of a capture."""
 
-    reader: CaptureReader
+    capture: CaptureReadings
     truth: TruthMotion
     registration: Registration
     exchanged: Mapping[str, str]
@@ -81,64 +61,8 @@ class Validation:
         return tuple(check for check in self.report.checks if check.is_named)
 
 
-def load_truth(
-    capture: Path,
-    truth: str,
-    *,
-    scenario: str | None = None,
-    folder: LibraryFolders | None = None,
-) -> TruthMotion:
-    """The reference that `truth` names: a capture, a C3D, TUM, CSV or motion file, or a clip of a scenario.
-
-    Stations and mounts of a clip are those of `scenario`, by default the capture's own. BadFile, BadInput and
-    UnknownName that name what is missing.
-    """
-    path = Path(truth)
-    stations, suffix = CaptureReader(capture).wire.stations, path.suffix.lower()
-    if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
-        return read_truth_file(path, stations)
-    if suffix.lstrip(".") in (*FORMATS, "asf"):
-        return truth_of_clip(read_clip(path), _scenario_of(capture, scenario, path), stations)
-    if path.is_file():
-        return truth_of_capture(path, stations)
-    playback = find_playback(RecordingStream(capture), scenario=scenario, clip=truth, folder=folder)
-    if read_recording(capture).note.get("source") == "simulation":
-        return truth_of_playback(playback, stations, host_clock=True)
-    readings, _ = read_stations(CaptureReader(capture))
-    stamps_s = np.concatenate([one.stamp_s[np.isfinite(one.stamp_s)] for one in readings.values()])
-    if len(stamps_s):
-        device_s = float(stamps_s.min()), float(stamps_s.max())
-        loops = truth_of_playback(playback, stations, host_clock=False, device_s=device_s)
-        if _plays_in_loops(readings, loops):
-            return loops
-    return truth_of_playback(playback, stations, host_clock=False)
-
-
-def _plays_in_loops(readings: Mapping[str, StationReadings], loops: TruthMotion) -> bool:
-    """Whether the capture moves as an emulator that repeats the clip, not as a performer who did it once."""
-    poses = {station: measured_poses(one) for station, one in readings.items()}
-    if not all(one.valid.any() for one in poses.values()):
-        return False
-    splines = {station: TruthSpline(loops.bodies[loops.body_of[station]]) for station in poses}
-    try:
-        found = coarse_offset(poses, splines, record_period_s(poses), LEAST_OVERLAP_S)
-    except NotComparable:
-        return False
-    return found.correlation >= _LOOPED_CORRELATION
-
-
-def _scenario_of(capture: Path, scenario: str | None, motion: Path) -> Scenario:
-    """The scenario with stations and mounts: the given one, or that of the capture's note. BadInput without one."""
-    name = scenario or read_recording(capture).note.get("scenario")
-    if not isinstance(name, str):
-        raise BadInput(
-            f"Nothing says where the stations are worn in {motion.name}.", "Name a scenario with --scenario."
-        )
-    return load_scenario(name)
-
-
 def validate_capture(
-    capture: Path,
+    capture: CaptureReadings,
     truth: TruthMotion,
     *,
     expected: UnitFile | None = None,
@@ -148,21 +72,8 @@ def validate_capture(
 
     BadInput as `measure.registration.register`, and for a station that the reference does not carry.
     """
-    reader = CaptureReader(capture)
-    progress("reading", 0, 3)
-    readings, notes = read_stations(reader)
-    poses = {station: measured_poses(one) for station, one in readings.items() if station in truth.body_of}
-    if not poses:
-        raise BadInput(
-            f"No station of {capture.name} is in the reference.",
-            f"The capture has {', '.join(readings)}; the reference carries {', '.join(truth.body_of)}.",
-        )
-    require_stamps(poses)
-    if unseen := [station for station, one in poses.items() if not one.valid.any()]:
-        notes = (*notes, f"{', '.join(unseen)}: no pose in the whole capture; left out.")
-        poses = {station: one for station, one in poses.items() if one.valid.any()}
-    if not poses:
-        raise NotComparable(f"No station of {capture.name} has a pose.", "Record positions and orientations.")
+    readings, wire = capture.readings, capture.wire
+    poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
     pairs, exchanged = _identify(poses, truth)
     registration = register(poses, truth.bodies, pairs=pairs)
@@ -185,15 +96,14 @@ def validate_capture(
             int(errors.valid.sum()),
             float(np.mean(readings[station].quality == 0.0)),
         )
-    checks = _checks(numbers, registration, truth, pairs, expected, reader)
-    host_s = np.concatenate([one.received_s for one in readings.values()])
-    duration_s = float(host_s.max() - host_s.min()) if len(host_s) else 0.0
-    wire = reader.wire
+    checks = _checks(numbers, registration, truth, pairs, expected, wire)
     due = round(registration.overlap_s * wire.rate_hz)
     progress("", 3, 3)
     report = ValidationReport(
-        name=capture.stem,
-        capture=CaptureSummary(capture.name, duration_s, wire.stations, wire.rate_hz, damage=tuple(reader.damage)),
+        name=capture.path.stem,
+        capture=CaptureSummary(
+            capture.path.name, capture.duration_s, wire.stations, wire.rate_hz, damage=capture.damage
+        ),
         truth=truth.title,
         matched_frames=round(registration.matched * due),
         expected_frames=due,
@@ -208,13 +118,33 @@ def validate_capture(
             for station, body in exchanged.items()
         ),
         notes=(
-            *notes,
+            *capture.left_out,
+            *unseen,
             *describe_left_out(registration.errors),
             *truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),
     )
-    return Validation(reader, truth, registration, exchanged, report)
+    return Validation(capture, truth, registration, exchanged, report)
+
+
+def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dict[str, MeasuredPoses], tuple[str, ...]]:
+    """The poses of the stations that the reference carries, and a sentence on those that were never seen.
+
+    BadInput for stations without a body or without time stamps; NotComparable without a pose.
+    """
+    poses = {station: measured_poses(one) for station, one in capture.readings.items() if station in truth.body_of}
+    if not poses:
+        raise BadInput(
+            f"No station of {capture.path.name} is in the reference.",
+            f"The capture has {', '.join(capture.readings)}; the reference carries {', '.join(truth.body_of)}.",
+        )
+    require_stamps(poses)
+    seen = {station: one for station, one in poses.items() if one.valid.any()}
+    if not seen:
+        raise NotComparable(f"No station of {capture.path.name} has a pose.", "Record positions and orientations.")
+    unseen = ", ".join(station for station in poses if station not in seen)
+    return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
 
 
 def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]:
@@ -229,25 +159,25 @@ def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]
 
 
 def evaluate_registered(
-    capture: Path,
     found: Validation,
     methods: Sequence[str],
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> list[Evaluation]:
-    """Evaluate methods on the frames of a capture with the registered room and mounts, on the performer's body.
+    """Evaluate methods on the frames of the capture with the registered room and mounts, on the performer's body.
 
     BadInput where the reference has no performer or no frame is inside it; else as `evaluate_each`.
     """
-    playback, rate_hz = found.truth.playback, found.reader.wire.rate_hz
+    capture, playback = found.capture, found.truth.playback
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
-    take = registered_take(RecordingStream(capture), found.registration, playback, rate_hz, found.truth.loop_s)
+    frames = RecordingStream(capture.path)
+    take = registered_take(frames, found.registration, playback, capture.wire.rate_hz, found.truth.loop_s)
     return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
 def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFile:
     """A unit file that also holds what the reference showed: speed error, and the session's scale and latency."""
-    wire = found.reader.wire
+    wire = found.capture.wire
     start = base or UnitFile(name, preset_components(), {"rate_hz": wire.rate_hz, "items": list(wire.items)})
     components = {key: dict(table) for key, table in start.components.items()}
     measured, not_measured = dict(start.measured), dict(start.not_measured)
@@ -296,12 +226,12 @@ def _checks(
     truth: TruthMotion,
     pairs: Mapping[str, str],
     expected: UnitFile | None,
-    reader: CaptureReader,
+    wire: WireFormat,
 ) -> list[Departure]:
     if truth.is_tracker:
         return []
     preset = preset_components()
-    record_s = record_size(reader.wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
+    record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
     known = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],

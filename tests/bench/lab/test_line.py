@@ -18,8 +18,11 @@ from harness.bench.lab.outcomes import CaptureOutcome, stored_checks
 from harness.bench.lab.truth import is_sized
 from harness.core.working_folder import python_command, python_environment
 from harness.mocap.synthetic.takes import RIG_TAKES
+from harness.stream.recording.station_readings import CaptureReader
+from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.characterization import characterize_capture
-from harness.study.trust.validation import load_truth, session_unit, validate_capture
+from harness.study.trust.truth_source import TruthSource, load_truth
+from harness.study.trust.validation import session_unit, validate_capture
 from tests.bench.lab.scenario_files import write_scenario
 
 pytestmark = pytest.mark.slow
@@ -60,12 +63,14 @@ def _record(folder: Path, kind: str, seeds: tuple[int, ...]) -> list[Path]:
 
 def _outcome(folder: Path, kind: str, seed: int, capture: Path, earlier: Path | None) -> CaptureOutcome:
     if PLANTED_FAULTS[kind].verb == "characterize":
-        return CaptureOutcome(kind, seed, "", stored_checks(characterize_capture(capture).checks))
-    scenario, clip = str(write_scenario(folder, EARLIER, seed)), "boxing_p1_01"
+        return CaptureOutcome(kind, seed, "", stored_checks(characterize_capture(CaptureReader(capture)).checks))
+    source = TruthSource("boxing_p1_01", str(write_scenario(folder, EARLIER, seed)))
     expected = None
     if earlier is not None:
-        expected = session_unit(validate_capture(earlier, load_truth(earlier, clip, scenario=scenario)), None, EARLIER)
-    found = validate_capture(capture, load_truth(capture, clip, scenario=scenario), expected=expected)
+        before = read_capture(CaptureReader(earlier))
+        expected = session_unit(validate_capture(before, load_truth(before, source)), None, EARLIER)
+    now = read_capture(CaptureReader(capture))
+    found = validate_capture(now, load_truth(now, source), expected=expected)
     exchanged = tuple(f"{station}: {body}" for station, body in sorted(found.exchanged.items()))
     return CaptureOutcome(kind, seed, "", stored_checks(found.report.checks), exchanged=exchanged)
 

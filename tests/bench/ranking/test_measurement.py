@@ -22,7 +22,7 @@ from harness.core.split import performer_of
 from harness.errors import Outcome
 from harness.experiment.scenario import Scenario
 from harness.experiment.workers.executors import run_in_process
-from harness.results.expected_orders import METRIC
+from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.command import Command
 
 
@@ -65,7 +65,7 @@ def planted_rows(scenarios: list[Scenario], missing: tuple[str, str] = ("", ""))
                     if (method, clip) != missing:
                         error = 1.0 + n + m + 0.01 * k * (1 + (n + m) % 2)
                         row = {"scenario": scenario.name, "method": method, "clip": clip, "stations": stations}
-                        yield {**row, METRIC: error}
+                        yield {**row, PRIMARY_METRIC: error}
 
 
 def test_rows_become_rankings_by_behaviour() -> None:

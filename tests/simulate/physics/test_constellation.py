@@ -17,8 +17,8 @@ from harness.simulate.physics.constellation import (
     middle_of_path_m,
 )
 from harness.simulate.physics.emitters import read_mcf, write_mcf
-from harness.stream.codec.replies import Emitter
-from harness.stream.emulator.settings import DEFAULT_EMITTERS
+from harness.stream.is900.codec.replies import Emitter
+from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
 
 DOWN = (0.0, 0.0, 1.0)
 

@@ -15,15 +15,15 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
-from harness.stream.codec.samples import DeviceSamples
-from harness.stream.driver import DriverConfig, Is900
-from harness.stream.emulator import serve_emulator
 from harness.stream.frame import TrackerFrame
+from harness.stream.is900.codec.samples import DeviceSamples
+from harness.stream.is900.driver import DriverConfig, Is900
+from harness.stream.is900.emulator import serve_emulator
 from harness.stream.recording import guided_capture
 from harness.stream.recording.guided_capture import Stretch, capture_stretches, finished_stretches
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.station_readings import CaptureBlock, CaptureReader
-from tests.stream.driver.bench import START_S, Bench, EmulatedDevice, make_samples
+from tests.stream.is900.driver.bench import START_S, Bench, EmulatedDevice, make_samples
 
 STATIC = Stretch("static", 4.0, "let the stations lie still", True)
 SLOW = Stretch("slow", 4.0, "sweep the stations", False)
@@ -229,7 +229,7 @@ def test_motion_that_is_over_counts_no_more() -> None:
 GUIDED = """
 import sys
 from pathlib import Path
-from harness.stream.driver import DriverConfig
+from harness.stream.is900.driver import DriverConfig
 from harness.stream.recording.guided_capture import Stretch, capture_stretches
 stretches = [Stretch("static", 1.5, "rest", True), Stretch("covered", 1.0, "cover", True)]
 capture_stretches(sys.argv[1], DriverConfig(), Path(sys.argv[2]), stretches, {}, ready=lambda: True)

@@ -11,9 +11,9 @@ import pytest
 import serial
 
 from harness.experiment.playback import Playback, prepare_playback
-from harness.stream.driver import DriverConfig, Is900
-from harness.stream.emulator import serve_emulator
-from harness.stream.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
+from harness.stream.is900.driver import DriverConfig, Is900
+from harness.stream.is900.emulator import serve_emulator
+from harness.stream.is900.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, SystemFault
-from harness.stream.codec.reader import ByteCapture, WireFormat
-from harness.stream.codec.records import RecordFormat
+from harness.stream.is900.codec.reader import ByteCapture, WireFormat
+from harness.stream.is900.codec.records import RecordFormat
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.blocks import (
     BLOCK_MARKER,
@@ -287,7 +287,7 @@ def test_a_full_disk_is_reported() -> None:
 
 ENDLESS_WRITER = """
 import sys
-from harness.stream.codec.reader import WireFormat
+from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.recording import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
 writer.on_configured(WireFormat(("head",), 40.0), 0.0, 0.0)

@@ -6,6 +6,7 @@ import pytest
 
 from harness.bench.lab.captures import planted_capture
 from harness.measure.unit_file import UnitFile
+from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust.characterization import (
     DEFAULT_KEPT,
     Characterization,
@@ -24,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def white(folder: Path) -> Characterization:
-    return characterize_capture(planted_capture("white", 1001, folder))
+    return characterize_capture(CaptureReader(planted_capture("white", 1001, folder)))
 
 
 def test_doubled_white_noise_is_named_with_its_size(white: Characterization) -> None:
@@ -53,7 +54,7 @@ def test_the_unit_file_has_measured_values_and_defaults_with_reasons(white: Char
 
 
 def test_a_unit_is_no_departure_from_itself(white: Characterization, folder: Path) -> None:
-    again = characterize_capture(folder / "white_1001.rec", expected=white.unit)
+    again = characterize_capture(CaptureReader(folder / "white_1001.rec"), expected=white.unit)
     assert again.expected_from == white.unit.name
     assert not again.named
     assert len(again.checks) >= 25
@@ -61,13 +62,13 @@ def test_a_unit_is_no_departure_from_itself(white: Characterization, folder: Pat
 
 def test_another_day_is_compared_with_an_earlier_unit(white: Characterization, folder: Path) -> None:
     unit: UnitFile = white.unit
-    found = characterize_capture(planted_capture("clock", 1002, folder), expected=unit)
+    found = characterize_capture(CaptureReader(planted_capture("clock", 1002, folder)), expected=unit)
     named = {check.key for check in found.named}
     assert {"components.white.position_m", "components.clock.drift_ppm"} <= named
 
 
 def test_a_clock_that_was_not_set_is_named(folder: Path) -> None:
-    found = characterize_capture(planted_capture("stamps", 1001, folder))
+    found = characterize_capture(CaptureReader(planted_capture("stamps", 1001, folder)))
     named = {check.key: check.measured for check in found.named}
     assert named["timing.stamp_resolution_s"].value == pytest.approx(0.002)
     assert named["timing.clock_age_s"].value == pytest.approx(18_000.0, abs=1.0)

@@ -19,14 +19,8 @@ from harness.simulate.noise import Noise
 from harness.simulate.simulation import exact_calibration
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.station_readings import CaptureReader
-from harness.study.trust.truth_motion import (
-    common_names,
-    measured_poses,
-    read_stations,
-    truth_of_capture,
-    truth_of_clip,
-    truth_of_playback,
-)
+from harness.study.trust.capture_readings import measured_poses, read_capture
+from harness.study.trust.truth_motion import common_names, truth_of_capture, truth_of_clip, truth_of_playback
 
 CLIP = "boxing_p1_01"
 
@@ -115,14 +109,13 @@ def test_a_clip_is_worn_with_the_stations_of_a_scenario() -> None:
 
 
 def test_another_capture_gives_its_readings(playback: Playback, tmp_path: Path) -> None:
-    path = capture(playback, tmp_path / "a.rec")
-    truth = truth_of_capture(path, ["head"])
-    readings, _ = read_stations(CaptureReader(path))
-    poses = measured_poses(readings["head"])
+    other = read_capture(CaptureReader(capture(playback, tmp_path / "a.rec")))
+    truth = truth_of_capture(other, ["head"])
+    poses = measured_poses(other.readings["head"])
     np.testing.assert_array_equal(truth.bodies["head"].position_m, poses.position_m[poses.valid])
     assert truth.is_tracker
     with pytest.raises(BadInput, match="no body 'nose'"):
-        truth_of_capture(path, ["nose"])
+        truth_of_capture(other, ["nose"])
 
 
 def test_the_longest_session_is_read_and_the_others_are_named(playback: Playback, tmp_path: Path) -> None:
@@ -130,14 +123,13 @@ def test_the_longest_session_is_read_and_the_others_are_named(playback: Playback
     simulation = playback.simulation
     record_capture(path, simulation.wire_format, simulation.wire, {}, seconds=2.0)
     record_capture(path, simulation.wire_format, simulation.wire, {})
-    alone, none = read_stations(CaptureReader(whole))
-    readings, notes = read_stations(CaptureReader(path))
-    assert none == ()
-    assert len(notes) == 1
-    assert notes[0].startswith("4")  # 480 records of 2 s
-    assert notes[0].endswith("records of 1 other session(s) of the device are left out.")
-    for station, one in alone.items():
-        np.testing.assert_array_equal(readings[station].position_m, one.position_m)
+    alone, both = read_capture(CaptureReader(whole)), read_capture(CaptureReader(path))
+    assert alone.left_out == ()
+    assert len(both.left_out) == 1
+    assert both.left_out[0].startswith("4")  # 480 records of 2 s
+    assert both.left_out[0].endswith("records of 1 other session(s) of the device are left out.")
+    for station, one in alone.readings.items():
+        np.testing.assert_array_equal(both.readings[station].position_m, one.position_m)
 
 
 def test_a_capture_without_records_is_refused(playback: Playback, tmp_path: Path) -> None:
@@ -145,12 +137,12 @@ def test_a_capture_without_records_is_refused(playback: Playback, tmp_path: Path
     simulation = playback.simulation
     record_capture(path, simulation.wire_format, simulation.wire, {}, seconds=0.0)
     with pytest.raises(BadFile, match="no record of a station"):
-        read_stations(CaptureReader(path))
+        read_capture(CaptureReader(path))
 
 
 def test_lost_and_suspect_readings_are_not_valid(playback: Playback, tmp_path: Path) -> None:
-    readings, _ = read_stations(CaptureReader(capture(playback, tmp_path / "a.rec")))
-    for one in readings.values():
+    one_capture = read_capture(CaptureReader(capture(playback, tmp_path / "a.rec")))
+    for one in one_capture.readings.values():
         valid = measured_poses(one).valid
         assert not valid[one.quality == 0.0].any()
         assert not valid[one.suspect].any()

@@ -1,0 +1,71 @@
+"""All readings of one capture, read once: what `validate` relates to a reference."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.errors import BadFile
+from harness.measure.pose_series import MeasuredPoses
+from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.recording.station_readings import CaptureReader, StationReadings
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureReadings:
+    """The longest session of a capture. The device's clock begins anew in each session."""
+
+    path: Path
+    note: Mapping[str, Any]
+    """The latest note on the origin of the recording."""
+    wire: WireFormat
+    readings: Mapping[str, StationReadings]
+    """Station -> its readings."""
+    damage: tuple[str, ...]
+    """Descriptions of the damaged or truncated parts of the file."""
+    left_out: tuple[str, ...]
+    """What the file has beside the readings, a sentence each."""
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Station names, in the order of the device's stations."""
+        return self.wire.stations
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first record of the session to its last, on the host's clock [s]."""
+        received_s = np.concatenate([one.received_s for one in self.readings.values()])
+        return float(received_s.max() - received_s.min()) if len(received_s) else 0.0
+
+
+def read_capture(reader: CaptureReader) -> CaptureReadings:
+    """Read the longest session of a capture; BadFile for a capture without a record."""
+    blocks = [block for block in reader.blocks() if block.stations]
+    if not blocks:
+        raise BadFile(reader.path, "no record of a station", "a capture with readings", "Record it again.")
+    records: dict[int, int] = {}
+    for block in blocks:
+        records[block.session] = records.get(block.session, 0) + block.records
+    longest = max(records, key=lambda session: (records[session], -session))
+    others = sum(records.values()) - records[longest]
+    left_out = []
+    if others:
+        left_out.append(f"{others} records of {len(records) - 1} other session(s) of the device are left out.")
+    if garbage := sum(block.garbage_bytes for block in blocks):
+        left_out.append(f"{garbage} bytes belong to no record.")
+    readings = {}
+    for station in reader.wire.stations:
+        parts = [block.stations[station] for block in blocks if block.session == longest]
+        columns = ([getattr(part, name) for part in parts] for name in StationReadings.__dataclass_fields__)
+        readings[station] = StationReadings(*(np.concatenate(column) for column in columns))
+    return CaptureReadings(reader.path, dict(reader.note), reader.wire, readings, tuple(reader.damage), tuple(left_out))
+
+
+def measured_poses(readings: StationReadings) -> MeasuredPoses:
+    """The readings as poses for the registration."""
+    valid = np.isfinite(readings.position_m[:, 0]) & np.isfinite(readings.tracker_from_station[:, 0])
+    return MeasuredPoses(
+        readings.measured_s, readings.position_m, readings.tracker_from_station, valid & ~readings.suspect
+    )

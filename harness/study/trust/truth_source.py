@@ -1,0 +1,86 @@
+"""The reference that a user names for a capture: found and read once, whatever kind it is of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.errors import BadInput, NotComparable
+from harness.experiment.recorded_take import find_playback
+from harness.experiment.scenario import Scenario
+from harness.experiment.scenario_reader import load_scenario
+from harness.measure.angular_speed import coarse_offset, record_period_s
+from harness.measure.pose_series import TruthSpline
+from harness.measure.registration import LEAST_OVERLAP_S
+from harness.mocap.clip_file import FORMATS, read_clip
+from harness.mocap.library import LibraryFolders
+from harness.stream.recording.replay import RecordingStream
+from harness.stream.recording.station_readings import CaptureReader
+from harness.study.trust.capture_readings import CaptureReadings, measured_poses, read_capture
+from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
+from harness.study.trust.truth_motion import TruthMotion, truth_of_capture, truth_of_clip, truth_of_playback
+
+_LOOPED_CORRELATION = 0.8
+"""Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
+
+
+@dataclass(frozen=True)
+class TruthSource:
+    """Where the reference of a capture is."""
+
+    name: str
+    """A capture, a C3D, TUM, CSV or motion file, or a clip of a scenario."""
+    scenario: str | None = None
+    """Scenario with the stations and mounts of a clip; by default that of the capture's note."""
+    folder: LibraryFolders | None = None
+    """Folders of real motion."""
+
+
+def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
+    """The reference of a capture. BadFile, BadInput and UnknownName that name what is missing."""
+    path = Path(source.name)
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
+        return read_truth_file(path, capture.stations)
+    if suffix.lstrip(".") in (*FORMATS, "asf"):
+        return truth_of_clip(read_clip(path), _scenario_of(capture, source), capture.stations)
+    if path.is_file():
+        return truth_of_capture(read_capture(CaptureReader(path)), capture.stations)
+    return _truth_of_scenario(capture, source)
+
+
+def _scenario_of(capture: CaptureReadings, source: TruthSource) -> Scenario:
+    """The scenario with stations and mounts: the given one, or that of the capture's note. BadInput without one."""
+    name = source.scenario or capture.note.get("scenario")
+    if not isinstance(name, str):
+        where = f"Nothing says where the stations are worn in {Path(source.name).name}."
+        raise BadInput(where, "Name a scenario with --scenario.")
+    return load_scenario(name)
+
+
+def _truth_of_scenario(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
+    """A clip that the simulator or an emulator played, or that a performer did once."""
+    stream = RecordingStream(capture.path)
+    playback = find_playback(stream, scenario=source.scenario, clip=source.name, folder=source.folder)
+    if capture.note.get("source") == "simulation":
+        return truth_of_playback(playback, capture.stations, host_clock=True)
+    stamps_s = np.concatenate([one.stamp_s[np.isfinite(one.stamp_s)] for one in capture.readings.values()])
+    if len(stamps_s):
+        device_s = float(stamps_s.min()), float(stamps_s.max())
+        loops = truth_of_playback(playback, capture.stations, host_clock=False, device_s=device_s)
+        if _plays_in_loops(capture, loops):
+            return loops
+    return truth_of_playback(playback, capture.stations, host_clock=False)
+
+
+def _plays_in_loops(capture: CaptureReadings, loops: TruthMotion) -> bool:
+    """Whether the capture moves as an emulator that repeats the clip, not as a performer who did it once."""
+    poses = {station: measured_poses(readings) for station, readings in capture.readings.items()}
+    if not all(one.valid.any() for one in poses.values()):
+        return False
+    splines = {station: TruthSpline(loops.bodies[loops.body_of[station]]) for station in poses}
+    try:
+        found = coarse_offset(poses, splines, record_period_s(poses), LEAST_OVERLAP_S)
+    except NotComparable:
+        return False
+    return found.correlation >= _LOOPED_CORRELATION
