@@ -8,6 +8,7 @@ from harness.compare.expected_orders import DECIMALS
 from harness.compare.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
 from harness.core.number_format import NOT_MEASURED, format_fixed, format_share
 from harness.report.kit.page import Block, Bullets, DataTable, Prose, TerminalOnly
+from harness.results.cell import setting_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 _MEANS = "means over the clips on which all were measured"
