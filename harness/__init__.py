@@ -42,7 +42,7 @@ else:
         "__version__": "harness.core.package_data",
         "compare_runs": "harness.compare.comparison",
         "load": "harness.results.reader",
-        "load_scenario": "harness.experiment.scenario",
+        "load_scenario": "harness.experiment.scenario_reader",
         "methods": "harness.reconstruct.registry",
         "read_clip": "harness.mocap.clip_file",
         "run": "harness.experiment.engine",
