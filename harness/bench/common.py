@@ -18,7 +18,7 @@ from harness.experiment.cells import clear_caches
 from harness.experiment.engine import BatchResults, run_cells
 from harness.experiment.methods.remote_method import close_methods
 from harness.experiment.plan import check_names
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import exact_calibration

@@ -33,7 +33,7 @@ from harness.experiment.round_robin_timing import (
     time_method,
     time_round_robin,
 )
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method

@@ -26,7 +26,7 @@ from harness.errors import BadInput
 from harness.experiment.benchmark_clips import load_clean_scenario
 from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.tasks import ClipTask
 from harness.mocap import synthetic
 from harness.mocap.sources import (

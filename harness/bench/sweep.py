@@ -23,9 +23,9 @@ from harness.core.child_process import run_python
 from harness.core.split import ClipPart
 from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.motion import open_scenario_motion
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.tasks import ClipTask
 from harness.reconstruct import registry
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit

@@ -9,9 +9,9 @@ from harness.body.places import NAMED_PLACES
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
 from harness.core.split import declared_training_data, training_note
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario, shipped_scenarios
-from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.experiment.tasks import cell_names
 from harness.mocap import synthetic
 from harness.reconstruct import registry

@@ -221,7 +221,7 @@ def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | l
 
     With `device` the names may have stations of the device (`head=3`); they are then in the order of the device.
     """
-    from harness.experiment.scenario_reader import load_scenario
+    from harness.experiment.scenarios.scenario_reader import load_scenario
 
     if args.stations is None:
         return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).worn_stations))

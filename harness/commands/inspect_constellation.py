@@ -140,8 +140,8 @@ def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tup
 
 def _mounts(name: str) -> "list[Mount]":
     """The nominal mounts of a set of stations; UnknownName."""
-    from harness.experiment.scenario import Station
-    from harness.experiment.scenario_reader import read_station_sets
+    from harness.experiment.scenarios.scenario import Station
+    from harness.experiment.scenarios.scenario_reader import read_station_sets
 
     sets = read_station_sets()
     if name not in sets:

@@ -17,8 +17,8 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import DatabaseMethod, Method, Reconstructor

@@ -22,9 +22,9 @@ from harness.experiment.evaluation import evaluate
 from harness.experiment.methods.method_process import MethodFailure
 from harness.experiment.methods.method_run import describe_failure
 from harness.experiment.methods.remote_method import close_methods, find_method
-from harness.experiment.motion import forget_motion, open_scenario_motion
 from harness.experiment.observed_take import simulated_take
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.motion_source import forget_motion, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.tasks import ClipTask, PlannedCell
 from harness.reconstruct.contract import Method
 from harness.results import manifest, storage

@@ -23,8 +23,8 @@ from harness.core.stream_health import poor_hearing
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.methods.remote_method import NamedMethod
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,

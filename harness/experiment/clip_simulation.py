@@ -4,8 +4,8 @@ from pathlib import Path
 
 from harness.body.retargeting import retarget_to_own_body
 from harness.core.motion import Clip
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.simulation import Simulation, simulate_tracker
 
 

@@ -2,10 +2,11 @@
 
 The way of a scenario:
 
-1. `scenario_reader` reads a TOML file into a `Scenario`, a frozen record whose values are checked.
-2. `plan` replaces patterns by clips, checks that every name exists, and lists the cells: one frozen `RunPlan`.
-3. `workers/task_loop` hands the tasks of the plan to an executor. A worker evaluates each cell with `cells` and writes
-   it: `clip_evaluation` makes the observed take, `evaluation` trains the method, runs it and scores it.
+1. `scenarios/scenario_reader` reads a TOML file into a `Scenario`, a frozen record that is checked once.
+2. `plan` replaces patterns by clips, refuses names that do not exist, and makes one frozen `RunPlan`: cells, tasks and
+   manifest.
+3. `workers/task_loop` hands the tasks to an executor. In a worker `cells` makes and writes each cell: `clip_evaluation`
+   prepares the clip, and `evaluation` trains the method, runs it over the frames and scores its answers.
 4. `run_store` keeps the outcomes in the index of the folder, and writes the summary at the end.
 
 A run is a sweep of one scenario. Finished cells are kept, and the same command resumes an interrupted folder. Workers
@@ -27,8 +28,8 @@ from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.methods.remote_method import close_methods
 from harness.experiment.plan import RunOptions, plan_cells, plan_run, plan_sweep
 from harness.experiment.run_store import CellStore, RunFolder
-from harness.experiment.scenario import Scenario
-from harness.experiment.sweep_config import Sweep
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.sweep_config import Sweep
 from harness.experiment.workers.executors import TaskExecutor, process_executor, run_in_process
 from harness.experiment.workers.task_loop import evaluate_tasks
 from harness.mocap.library import LibraryFolders

@@ -14,11 +14,11 @@ from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.methods.method_table import MethodTable
-from harness.experiment.motion import expand_clips, open_scenario_motion
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.tracker_setup import TrackerSetup
 from harness.experiment.tasks import ClipTask, cell_names, plan_tasks, split_task
-from harness.experiment.tracker_setup import TrackerSetup
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
 from harness.results.manifest import Manifest, describe_run

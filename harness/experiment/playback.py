@@ -20,10 +20,10 @@ from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.errors import BadInput, UnknownName, shorten
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.motion import expand_clips, open_scenario_motion
 from harness.experiment.plan import check_names
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
 from harness.mocap.library import LibraryFolders
 from harness.simulate.loop import simulate_loop

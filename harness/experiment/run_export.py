@@ -7,7 +7,7 @@ from harness.body.anatomy import body_geoms
 from harness.body.mounts import locate_mount
 from harness.core.fields import build
 from harness.errors import BadInput
-from harness.experiment.scenario import Station
+from harness.experiment.scenarios.scenario import Station
 from harness.mocap.write.body_model import BodyModel, MountedStation
 from harness.mocap.write.export import export
 from harness.mocap.write.posed_motion import PosedMotion

@@ -12,8 +12,8 @@ import pytest
 from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import find_scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct.methods.ik import PREVIOUS
 from harness.stream.is900.codec.samples import DeviceSamples

@@ -10,8 +10,8 @@ from harness.compare.significance import SIGNIFICANCE
 from harness.core.split import ClipPart
 from harness.errors import RenamedKey
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.mocap.synthetic import BEHAVIOURS
 from harness.reconstruct import registry

@@ -11,9 +11,9 @@ import pytest
 from harness.core.split import ClipPart
 from harness.errors import BadFile
 from harness.experiment.cells import CellOutcome, clear_caches, run_task
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.tasks import ClipTask
 from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
 from harness.results.storage import Cell

@@ -14,8 +14,8 @@ from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.methods.method_run import run_method
-from harness.experiment.scenario import Scenario, Station
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario import Scenario, Station
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method

@@ -10,9 +10,9 @@ import pytest
 from harness.cli import main
 from harness.core.split import ExampleLeak
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
-from harness.experiment.sweep_config import Sweep
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import Sweep
 from harness.experiment.workers.executors import process_executor
 from harness.mocap import synthetic
 from harness.testing.regression_gate import RegressionGate

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile, BadInput
-from harness.experiment.fitted_unit import read_fitted_unit
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.fitted_unit import read_fitted_unit
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.simulate.noise import noise_preset
 from tests.core.digested_toml import as_earlier_version

@@ -14,9 +14,9 @@ import pytest
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.methods.isolation import Isolation
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.cell import Cell
 from harness.results.storage import read_cells, read_summary
 from tests.experiment.evil_methods import FAILING, HANGING, HARMLESS, MARK, Honest, method_name

@@ -8,7 +8,7 @@ from harness.body.humanoid import build_body
 from harness.calibrate.liu2011_calibration import Liu2011Constants, PrintedObjective
 from harness.calibrate.pose_calibration import measure_poses, pose_bundle
 from harness.calibrate.skeleton_prior import fit_skeleton_prior
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.synthetic import sample_skeletons
 from harness.simulate.components.mount import perturb_mounts

@@ -10,8 +10,8 @@ from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
 from harness.experiment.plan import check_names
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.noise import STATISTICAL_COMPONENTS
 from harness.study.placement.config import base_scenario, load_placement_study
 

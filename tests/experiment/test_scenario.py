@@ -8,9 +8,9 @@ import pytest
 from harness.core.fields import replace_fields
 from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
-from harness.experiment.motion import expand_clips
-from harness.experiment.scenario import Station
-from harness.experiment.scenario_reader import load_scenario, shipped_scenarios
+from harness.experiment.scenarios.motion_source import expand_clips
+from harness.experiment.scenarios.scenario import Station
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
 from harness.results.cell import varied_text
 from harness.simulate.components.faults import LostStation
 from harness.simulate.components.transient import Echo

@@ -17,9 +17,9 @@ from harness.errors import BadInput, Outcome
 from harness.experiment import engine
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.methods.method_run import run_method
-from harness.experiment.scenario import CalibrationSettings, Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import CalibrationSettings, Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,

@@ -20,8 +20,8 @@ from harness.core.interrupts import REPEAT_S
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
 from harness.experiment.engine import run_cells, run_sweep
-from harness.experiment.scenario_reader import load_scenario
-from harness.experiment.sweep_config import expand_sweep, load_sweep
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
 from harness.experiment.tasks import ClipTask, cell_names, plan_tasks
 from harness.experiment.workers.executors import R, TaskExecutor, run_in_process
 from harness.results.folder_kind import folder_lock

@@ -12,7 +12,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise

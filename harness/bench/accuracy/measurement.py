@@ -32,7 +32,7 @@ from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION
 from harness.experiment.methods.remote_method import resolve_method
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell
 from harness.results.manifest import current_circumstances

@@ -17,8 +17,8 @@ from harness.core.motion import Clip
 from harness.core.package_data import VERSION
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.mocap.synthetic.takes import generate_rig, stretch_marks
 from harness.simulate.components.stationary import SessionBias

@@ -13,8 +13,8 @@ from harness.bench.lab.captures import FIVE_MINUTES, SCENARIO, planted_capture, 
 from harness.bench.lab.verb_cost import BOXING_KIND, measure_verb
 from harness.body.retargeting import retarget_to_own_body
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.synthetic.takes import generate_rig
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings

@@ -13,8 +13,8 @@ from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, comp
 from harness.core.package_data import data_folder
 from harness.core.split import performer_of
 from harness.errors import Outcome
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.results.reported_metrics import PRIMARY_METRIC
 

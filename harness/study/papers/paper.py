@@ -15,10 +15,10 @@ from harness.core.package_data import data_folder
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import BadInput, Outcome, SystemFault, UnknownName, was_interrupted
-from harness.experiment.motion import open_scenario_motion
 from harness.experiment.plan import check_names
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.results import manifest

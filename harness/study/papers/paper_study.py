@@ -18,7 +18,7 @@ from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.tasks import cell_names
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest

@@ -17,9 +17,9 @@ from harness.core.split import ClipPart
 from harness.experiment import benchmark_clips
 from harness.experiment.benchmark_clips import BenchmarkClip
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.motion import open_scenario_motion
 from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest

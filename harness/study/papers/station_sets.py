@@ -14,7 +14,7 @@ from harness.compare.paired_statistics import (
     mean_interval,
 )
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.motion import open_scenario_motion
+from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.results.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.results.reported_metrics import PRIMARY_METRIC

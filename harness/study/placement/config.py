@@ -13,9 +13,9 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import SCHEMA, Scenario
-from harness.experiment.scenario_checks import check_scenario
-from harness.experiment.scenario_reader import find_config
+from harness.experiment.scenarios.scenario import SCHEMA, Scenario
+from harness.experiment.scenarios.scenario_checks import check_scenario
+from harness.experiment.scenarios.scenario_reader import find_config
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,

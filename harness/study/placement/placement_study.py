@@ -18,7 +18,7 @@ from harness.compare.units import count_units
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest

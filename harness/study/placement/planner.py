@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.study.placement.config import PlacementStudy
 from harness.study.placement.plan import PlacementPlan, plan_placement, plan_study

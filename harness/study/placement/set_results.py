@@ -20,8 +20,8 @@ from harness.core.split import ClipPart
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.motion import open_scenario_motion
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.tasks import cell_names
 from harness.experiment.workers.executors import TaskExecutor
 from harness.mocap.library import LibraryFolders

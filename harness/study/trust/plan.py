@@ -18,8 +18,8 @@ from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.ranges import MethodName, Name, Range, Text, check_fields
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import Scenario, dotted_keys
-from harness.experiment.scenario_reader import find_scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario, dotted_keys
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 
 PLAN_SCHEMA = 1
 KIND = "trust plan"

@@ -19,9 +19,9 @@ from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
 from harness.experiment.cells import clear_caches
-from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.fitted_unit import FITTED_PRESET, read_fitted_unit
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders

@@ -15,7 +15,7 @@ from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.experiment.playback import Playback
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.measure.pose_series import TruthPoses
 from harness.simulate.loop import loop_motion
 from harness.simulate.simulation import exact_calibration

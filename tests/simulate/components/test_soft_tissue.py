@@ -14,7 +14,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, pack
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.components.mount import MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact, simulate_oscillators, soft_limit
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset

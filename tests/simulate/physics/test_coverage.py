@@ -9,8 +9,8 @@ from harness.body.humanoid import build_body
 from harness.body.mounts import Mount
 from harness.body.retargeting import retarget_to_own_body
 from harness.core.motion import BodyMotion
-from harness.experiment.scenario import Station
-from harness.experiment.scenario_reader import read_station_sets
+from harness.experiment.scenarios.scenario import Station
+from harness.experiment.scenarios.scenario_reader import read_station_sets
 from harness.mocap import synthetic
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation

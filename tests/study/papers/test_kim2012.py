@@ -8,9 +8,9 @@ import pytest
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart, allowed_frames
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.motion import open_scenario_motion
 from harness.experiment.plan import check_names
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.findings import PaperFindings, read_findings, write_findings
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
 from harness.study.papers.paper_study import PaperStudy, open_study, run_scenarios

@@ -12,9 +12,9 @@ import pytest
 from harness.core.seeds import generator
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import UnknownName
-from harness.experiment.motion import open_scenario_motion
 from harness.experiment.plan import check_names
-from harness.experiment.scenario_reader import load_scenario, shipped_scenarios
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.cell import Cell
 from harness.results.findings import PaperExperiment

@@ -6,9 +6,9 @@ from typing import Literal
 
 from harness.__main__ import main
 from harness.compare.claims import claim_lower_error
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_motion import ScenarioMotion
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.findings import PaperExperiment
 from harness.study.papers import paper as papers
 from harness.study.papers.paper import Paper

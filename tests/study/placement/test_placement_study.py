@@ -12,7 +12,7 @@ import harness
 from harness.cli import main
 from harness.compare.units import Sampling
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.scenario_reader import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.status import read_status
 from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import PlacementFindings, StatisticalPower, read_placement, write_placement

@@ -14,7 +14,7 @@ from harness.core.fields import replace_fields
 from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields
 from harness.core.split import StatisticalUnit
 from harness.errors import BadInput
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset

@@ -4,9 +4,9 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_checks import check_scenario
-from harness.experiment.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_checks import check_scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
 

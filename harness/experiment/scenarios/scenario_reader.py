@@ -13,9 +13,9 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import check_words
 from harness.errors import BadFile, UnknownName, name_file
-from harness.experiment.fitted_unit import merge_fitted_unit
-from harness.experiment.scenario import Scenario
-from harness.experiment.scenario_checks import check_expected_orders, check_scenario
+from harness.experiment.scenarios.fitted_unit import merge_fitted_unit
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_checks import check_expected_orders, check_scenario
 
 _STATION_SETS_FILE = "stations.toml"
 

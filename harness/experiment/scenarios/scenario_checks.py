@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.core.split import ClipPart
 from harness.errors import BadFile, UnknownName
-from harness.experiment.scenario import SCHEMA, Scenario
+from harness.experiment.scenarios.scenario import SCHEMA, Scenario
 from harness.results.cell import varied_text
 
 
