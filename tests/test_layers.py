@@ -50,6 +50,9 @@ RENAMES_FILES = {
 }
 """Files that may call os.replace, os.rename or os.fsync, and why."""
 
+NAMES_BONES = {"calibrate": 1, "core": 1, "experiment": 3, "reconstruct": 6, "study": 2, "testing": 1}
+"""Most files of a folder that name `BONES` or `HINGES`. New code asks `Body` or its skeleton."""
+
 
 def module_name(file: Path) -> str:
     parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
@@ -143,6 +146,19 @@ def test_no_public_name_equals_a_folder() -> None:
         for node in tree_of(file).body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 assert node.name not in folders, f"{name}.{node.name}"
+
+
+def test_no_more_files_name_the_bones_and_hinges() -> None:
+    found: dict[str, int] = {}
+    for file in PACKAGE.rglob("*.py"):
+        nodes = list(ast.walk(tree_of(file)))
+        names = {node.id for node in nodes if isinstance(node, ast.Name)}
+        names |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+        names |= {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+        if names & {"BONES", "HINGES"}:
+            folder = file.relative_to(PACKAGE).parts[0]
+            found[folder] = found.get(folder, 0) + 1
+    assert not {folder: count for folder, count in found.items() if count > NAMES_BONES.get(folder, 0)}
 
 
 def test_mujoco_stays_where_kinematics_live() -> None:

@@ -20,10 +20,10 @@ from harness.measure.unit_file import read_unit_file
 from harness.results.findings import read_findings
 from harness.results.placement_findings import read_placement
 from harness.results.reader import load_results
+from harness.results.storage import open_study
 from harness.simulate.physics.emitters import read_mcf
 from harness.stream.recording.recording import read_recording
 from harness.stream.recording.replay import RecordingStream
-from harness.study.papers.paper_study import open_study
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
 from tests.command import Command

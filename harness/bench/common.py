@@ -20,9 +20,9 @@ from harness.experiment.methods.remote_method import close_methods
 from harness.experiment.plan import check_names
 from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
+from harness.results.storage import open_study
 from harness.simulate.link import TrackerConfig
 from harness.simulate.simulation import exact_calibration
-from harness.study.papers.paper_study import open_study
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 """Stations of the first paper (Liu et al. 2011)."""

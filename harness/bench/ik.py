@@ -29,7 +29,6 @@ from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.core.working_folder import plain_import
-from harness.experiment.round_robin_timing import MethodTimings, TimedStep, take_turns
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -37,6 +36,7 @@ from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.frame import TrackerFrame
+from harness.study.speed.round_robin_timing import MethodTimings, TimedStep, take_turns
 
 with plain_import():
     import mink

@@ -23,16 +23,6 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.progress import ProgressBar, ProgressCallback
-from harness.experiment import benchmark_clips
-from harness.experiment.benchmark_clips import BenchmarkClip
-from harness.experiment.round_robin_timing import (
-    REFERENCE_METHOD,
-    MethodSpeed,
-    TimedStep,
-    measure_speed,
-    time_method,
-    time_round_robin,
-)
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
@@ -48,6 +38,16 @@ from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.frame import TrackerFrame
+from harness.study.speed import benchmark_clips
+from harness.study.speed.benchmark_clips import BenchmarkClip
+from harness.study.speed.round_robin_timing import (
+    REFERENCE_METHOD,
+    MethodSpeed,
+    TimedStep,
+    measure_speed,
+    time_method,
+    time_round_robin,
+)
 
 MIN_SPEED_RATIO = {"expert_map": 0.1, "dynamic_map": 0.1, "local_pca": 0.1, "kernel_cca": 0.2, "weighted_blend": 0.25}
 """Least speed of each method with its final inverse kinematics, relative to that of `ik` in the same turns."""

@@ -19,7 +19,6 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Ints, Singles
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment import benchmark_clips
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
@@ -29,6 +28,7 @@ from harness.reconstruct.index.selection import FLAT_MAX_VECTORS, best_index
 from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.study.speed import benchmark_clips
 
 SIZES = (6_600, 66_000)
 QUERIES_PER_TURN, TURNS_PER_CLIP = 40, 2

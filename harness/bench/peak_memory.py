@@ -14,10 +14,10 @@ from scipy.linalg import solve
 
 from harness.core.child_process import run_python
 from harness.core.seeds import generator
-from harness.experiment import benchmark_clips
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Reconstructor
 from harness.reconstruct.database import MotionDatabase
+from harness.study.speed import benchmark_clips
 
 NO_METHOD = "nothing"
 CLIP_S = 4.0

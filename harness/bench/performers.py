@@ -23,7 +23,6 @@ from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.benchmark_clips import load_clean_scenario
 from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
@@ -38,6 +37,7 @@ from harness.mocap.sources import (
 )
 from harness.reconstruct import registry
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.study.speed.benchmark_clips import load_clean_scenario
 
 METHOD = "local_pca"
 BLOCK_S, MOST_BLOCKS, MOST_TAKES = 2.0, 6, 3

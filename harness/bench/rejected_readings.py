@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from harness.core.calibration import Calibration
-from harness.experiment import benchmark_clips
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
 from harness.stream.frame import TrackerFrame
+from harness.study.speed import benchmark_clips
 
 GATED_METHODS = (
     *("ik", "local_pca", "dynamic_map", "expert_map", "weighted_blend", "kernel_cca"),

@@ -147,7 +147,7 @@ class _RetargetGoal:
 
 def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:
     """The 24 bones of the clip's skeleton and their angles (T, 48) [rad]; UnknownName or BadInput if it lacks them."""
-    source, dofs = clip.skeleton.subset(humanoid24.BONES)
+    source, dofs = humanoid24.select_bones(clip.skeleton)
     humanoid.require_humanoid(source)
     return source, clip.angles_rad[:, dofs]
 

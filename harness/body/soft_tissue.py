@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from harness.core import humanoid24
-from harness.errors import UnknownName
 
 THICKNESS_M: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
@@ -38,7 +37,6 @@ THICKNESS_M: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 def tissue_thickness_m(bone: str, along: float) -> float:
     """Thickness at a place along a bone, 0 at its joint to 1 at its far end [m]; UnknownName for the bone."""
-    if bone not in humanoid24.BONES:
-        raise UnknownName("bone", bone, humanoid24.BONES)
+    humanoid24.standard_skeleton().index(bone)
     at_joint, at_end = THICKNESS_M[bone if bone in THICKNESS_M else bone[1:]]
     return at_joint + along * (at_end - at_joint)

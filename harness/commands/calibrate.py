@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
     line_options,
     parse_names,
-    parse_stations,
     positive_int,
     refuse_flags_of_others,
     repeat_flags,
 )
 from harness.commands.output import print_result, print_status
+from harness.commands.playback_flags import DEVICE_STATIONS_HELP, default_station_count, parse_device_stations
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -141,7 +140,8 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
-    stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args, device=True)))
+    scenario, asked = load_scenario(args.scenario), parse_device_stations(args.stations)
+    stations = tuple(select_stations(scenario, default_station_count(scenario) if asked is None else asked))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
         terminal = PoseTerminal(session.body.skeleton, sys.stderr)

@@ -7,18 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    DEFAULT_STATION_COUNT,
     Verbs,
     add_verb,
-    open_playback,
     parse_characters,
     parse_items,
-    parse_stations,
     positive_float,
     positive_int,
     repeat_flags,
 )
 from harness.commands.output import print_result, print_status
+from harness.commands.playback_flags import (
+    DEFAULT_STATION_COUNT,
+    PlaybackOptions,
+    open_playback,
+    parse_device_stations,
+)
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 
@@ -77,7 +80,11 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
     if args.tcp and args.check_baud:
         raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
-    playback = open_playback(args, parse_stations(args, device=True), posing=args.poses)
+    stations = parse_device_stations(args.stations)
+    options = PlaybackOptions(
+        args.scenario, stations, args.clip, args.rate, args.seed, args.mocap, args.noise, args.poses
+    )
+    playback = open_playback(options)
     scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer

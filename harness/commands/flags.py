@@ -10,21 +10,14 @@ from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.methods.isolation import Isolation
-    from harness.experiment.playback import Playback
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
 """Most worker processes on one computer [choice]."""
-DEFAULT_STATION_COUNT = 4
-"""Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 5)."""
-DEVICE_STATIONS_HELP = (
-    "number of the scenario's stations, or their names, in the order of the device's active stations; or names with "
-    "stations of the device: head=3,torso=1 (default: the first 4)"
-)
 Action = Callable[[argparse.Namespace], Outcome]
 _SCENARIO = "Copy the scenario, {}, and name the copy"
 _MOVIE = "`harness view RUN --clip CLIP --methods METHOD --save FILE.mp4` makes a movie of any clip"
@@ -214,30 +207,6 @@ def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
     if len(values) != 9 or not all(abs(value) < float("inf") for value in values):
         raise argparse.ArgumentTypeError(f"{text!r} is not nine numbers such as 0,0,0,1,0,0,0,1,0")
     return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
-
-
-def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | list[str]:
-    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name.
-
-    With `device` the names may have stations of the device (`head=3`); they are then in the order of the device.
-    """
-    from harness.experiment.scenarios.scenario_reader import load_scenario
-
-    if args.stations is None:
-        return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).worn_stations))
-    if is_whole_number(args.stations):
-        return int(args.stations)
-    return parse_device_names(args.stations) if device else parse_names(args.stations)
-
-
-def open_playback(
-    args: argparse.Namespace, stations: int | list[str] | None, scenario: str = "", *, posing: bool = False
-) -> "Playback":
-    """The playback of `--clip`, `--rate`, `--noise`, `--seed` and `--mocap`; by default of the verb's scenario."""
-    from harness.experiment.playback import prepare_playback
-
-    options = {"clip": args.clip, "rate_hz": args.rate, "noise": vars(args).get("noise"), "seed": args.seed}
-    return prepare_playback(scenario or args.scenario, stations=stations, folder=args.mocap, posing=posing, **options)
 
 
 def parse_device_names(text: str) -> list[str]:

@@ -6,22 +6,19 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    DEVICE_STATIONS_HELP,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
-    is_whole_number,
     line_options,
-    open_playback,
-    parse_stations,
     positive_float,
     repeat_flags,
 )
 from harness.commands.output import print_caveat, print_result, print_status, show_progress
+from harness.commands.playback_flags import DEVICE_STATIONS_HELP, PlaybackOptions, open_playback, parse_device_stations
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
@@ -30,8 +27,8 @@ if TYPE_CHECKING:
     from harness.calibrate.guided_calibration import Calibrator
     from harness.core.calibration import Calibration
     from harness.experiment.playback import Playback
-    from harness.live.pose import Output
-    from harness.stream.is900.driver import Tracker
+    from harness.live.outputs import SessionSetup
+    from harness.stream.is900.driver import DriverConfig, Tracker
     from harness.stream.line_events import EventCounter
     from harness.stream.recording.recorder import RecordingSwitch
 
@@ -90,179 +87,166 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.calibration_file import read_calibration
+    from harness.commands import live_summary
     from harness.experiment.methods.isolation import DEFAULT_ISOLATION
     from harness.experiment.methods.remote_method import resolve_method
-    from harness.live import summary
+    from harness.live.outputs import OutputOptions, open_outputs
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
     from harness.stream.line_events import EventCounter
     from harness.stream.recording.recorder import RecordingSwitch
 
-    playback = open_playback(args, parse_stations(args, device=True))
-    if args.calibration not in _CALIBRATION_KINDS:
-        if not Path(args.calibration).suffix:
-            raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
-        named = args.stations is not None and not is_whole_number(args.stations)
-        calibration = read_calibration(args.calibration)
-        print_caveat(args.calibration, calibration.caveat)
-        playback = playback.with_calibration(calibration, named=named, say=print_status)
+    output_options = OutputOptions(
+        vmc=args.vmc,
+        lsl=args.lsl,
+        anywhere=args.anywhere,
+        bvh=args.bvh,
+        poses=args.poses,
+        view=args.view,
+        no_browser=args.no_browser,
+        out=args.out,
+        force=args.force,
+    )
+    stations = parse_device_stations(args.stations)
+    playback_options = PlaybackOptions(args.scenario, stations, args.clip, args.rate, args.seed, args.mocap)
+    playback = open_playback(playback_options)
+    config = _driver_config(args, playback)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
     if args.calibration == "poses":
-        playback = playback.with_calibration(_calibrate_by_poses(args, playback, events))
+        calibration = _calibrate_by_poses(args.port, config, playback, events, playback_options)
+        playback = playback.with_calibration(calibration)
+    elif args.calibration not in _CALIBRATION_KINDS:
+        calibration = _read_calibration(args.calibration)
+        playback = playback.with_calibration(calibration, named=isinstance(stations, list), say=print_status)
+    setup = _describe_session(playback, f"{args.method} on {args.port}", in_room=args.calibration != "tpose")
     with ExitStack() as opened:
         recorder = RecordingSwitch()
-        outputs = _open_outputs(args, playback, recorder, opened)
-        device = opened.enter_context(_open_device(args, playback, events, recorder))
-        rate_hz = playback.tracker.rate_hz
+        outputs = open_outputs(output_options, setup, recorder, opened, print_status)
+        device = opened.enter_context(_open_device(args.port, config, playback, events, recorder))
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
             reconstructor = playback.clip_evaluation.fit_method(method, args.method)
             warm_up(reconstructor, playback.calibration, playback.simulation.frames[:_WARM_UP_FRAMES])
             with defer_interrupts():
-                floor = opened.enter_context(JitterProbe())
+                probe = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
-            plan = LiveOptions(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
-            done = run_session(
+            options = LiveOptions(setup.rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
+            result = run_session(
                 device,
                 playback.performer_calibration.body,
                 reconstructor,
-                _initial_calibration(args, playback),
+                _initial_calibration(args.calibration, playback),
                 outputs,
-                plan,
+                options,
                 say=print_status,
                 progress=show_progress,
             )
-        beside = floor.finish()
+        jitter = probe.finish()
         content = {
             "method": args.method,
             "scenario": playback.scenario.name,
-            "stations": list(playback.scenario.stations),
-            "rate_hz": rate_hz,
-            **summary.as_dict(done, beside),
+            "stations": list(setup.stations),
+            "rate_hz": setup.rate_hz,
+            **live_summary.as_dict(result, jitter),
             "line": device.counts,
             "events": [asdict(event) for event in events.events],
         }
     line = [f"{name} {count}" for name, count in (device.counts | events.counts()).items()]
-    outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
-    if done.stopped and not done.poses and not done.failed:
+    outcome = Outcome.PASS if result.poses and not result.failed else Outcome.INCOMPLETE
+    if result.stopped and not result.poses and not result.failed:
         outcome = Outcome.INTERRUPTED
-    lines = (*summary.lines(done, beside), f"line: {', '.join(line)}")
-    stations = args.stations if "=" in (args.stations or "") else ",".join(playback.scenario.stations)
-    following = ["record", args.port, "take.rec", "--stations", stations, *repeat_flags(args, "rate", *LINE_FLAGS)]
+    lines = (*live_summary.lines(result, jitter), f"line: {', '.join(line)}")
+    names = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
+    following = ["record", args.port, "take.rec", "--stations", names, *repeat_flags(args, "rate", *LINE_FLAGS)]
     return print_result(args, content, *lines, outcome=outcome, following=following)
+
+
+def _driver_config(args: argparse.Namespace, playback: "Playback") -> "DriverConfig":
+    """How the tracker is set up for the stations and the motion of a playback."""
+    from harness.stream.is900.codec.items import position_range_m
+    from harness.stream.is900.driver import DriverConfig
+
+    options = {"items": playback.tracker.items, **line_options(args)}
+    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
+    stations = tuple(playback.scenario.stations)
+    return DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
 
 
 @contextmanager
 def _open_device(
-    args: argparse.Namespace,
+    port: str,
+    config: "DriverConfig",
     playback: "Playback",
     events: "EventCounter",
     recorder: "RecordingSwitch | None" = None,
 ) -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream.is900.codec.items import position_range_m
-    from harness.stream.is900.driver import DriverConfig, open_tracker
+    from harness.stream.is900.driver import open_tracker
 
-    tracker = playback.tracker
-    stations = tuple(playback.scenario.stations)
-    options = {"items": tracker.items, **line_options(args)}
-    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
-    config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
-    with open_tracker(args.port, config, observer=recorder, on_event=events) as device:
+    rate_hz = playback.tracker.rate_hz
+    with open_tracker(port, config, observer=recorder, on_event=events) as device:
         runs_hz = device.wire.rate_hz
-        if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
+        if abs(runs_hz - rate_hz) > _RATE_TOLERANCE * rate_hz:
             raise BadInput(
-                f"The device sends {runs_hz:.1f} frames per second, {playback.scenario.name} has {tracker.rate_hz:g}.",
+                f"The device sends {runs_hz:.1f} frames per second, {playback.scenario.name} has {rate_hz:g}.",
                 f"Say --rate {runs_hz:.0f}: a method learns at the tracker's rate.",
             )
-        where = f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz"
+        where = f"{device.identification or 'an IS-900'} at {port}, {rate_hz:g} Hz"
         print_status(f"{where}; stations {device.station_list}")
         print_status(device.setup_note)
         yield device
 
 
-def _open_outputs(
-    args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch", opened: ExitStack
-) -> "list[Output]":
-    """Open the requested outputs; `opened` closes them again, also when a later one is refused."""
-    from harness.live.file_outputs import BvhOutput, PoseTableOutput
-    from harness.live.lsl import LslOutput
-    from harness.live.viewer import ViewerOutput
-    from harness.live.vmc import VmcOutput
+def _describe_session(playback: "Playback", title: str, *, in_room: bool) -> "SessionSetup":
+    """What outputs show of the session; the room is left out where its first seconds calibrate it."""
+    from harness.live.outputs import SessionSetup
 
-    if args.out is not None and args.view not in ("frames", "browser"):
-        raise BadInput("--out without --view frames or browser.", "Give both, or neither.")
-    if args.no_browser and args.view != "browser":
-        raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
-    if args.anywhere and args.lsl is None:
-        raise BadInput("--anywhere without --lsl.", "Name the streams with --lsl.")
-    skeleton, rate_hz = playback.performer_calibration.body.skeleton, playback.tracker.rate_hz
-    stations = tuple(playback.scenario.stations)
-    config: dict[str, Any] = {
-        "vmc": lambda: VmcOutput(args.vmc, skeleton),
-        "lsl": lambda: LslOutput(args.lsl, skeleton, rate_hz, network=args.anywhere),
-        "bvh": lambda: BvhOutput(args.bvh, skeleton, rate_hz, force=args.force),
-        "poses": lambda: PoseTableOutput(args.poses, skeleton, stations, force=args.force),
-        "view": lambda: (
-            _open_browser(args, playback, recorder)
-            if args.view == "browser"
-            else ViewerOutput(args.view, skeleton, args.out, force=args.force)
-        ),
-    }
-    outputs: list[Output] = []
-    for name, make in config.items():
-        if getattr(args, name) is not None:
-            with defer_interrupts():
-                outputs.append(make())
-                opened.callback(outputs[-1].close)
-            print_status(outputs[-1].description)
-    return outputs
-
-
-def _open_browser(args: argparse.Namespace, playback: "Playback", recorder: "RecordingSwitch") -> "Output":
-    """Show the session on a page, and open it in the browser unless --no-browser."""
-    import webbrowser
-
-    from harness.live.browser_view import BrowserOutput
-
-    room = playback.calibration.world_from_tracker, playback.calibration.tracker_origin_m
-    output = BrowserOutput(
+    calibration = playback.calibration
+    return SessionSetup(
         playback.performer_calibration.body.skeleton,
         tuple(playback.scenario.stations),
-        None if args.calibration == "tpose" else room,  # found in the session's first seconds
-        recorder,
-        args.out or Path(),
-        f"{args.method} on {args.port}",
+        playback.tracker.rate_hz,
+        (calibration.world_from_tracker, calibration.tracker_origin_m) if in_room else None,
+        title,
     )
-    if not args.no_browser and not webbrowser.open(output.url):
-        print_status("No browser was found: open the address in one.")
-    return output
 
 
-def _calibrate_by_poses(args: argparse.Namespace, playback: "Playback", events: "EventCounter") -> "CalibrationFile":
+def _read_calibration(name: str) -> "CalibrationFile":
+    """A calibration by `harness calibrate`; UnknownName for what names neither a file nor a kind."""
+    from harness.calibrate.calibration_file import read_calibration
+
+    if not Path(name).suffix:
+        raise UnknownName("file or kind of calibration", name, _CALIBRATION_KINDS)
+    calibration = read_calibration(name)
+    print_caveat(name, calibration.caveat)
+    return calibration
+
+
+def _calibrate_by_poses(
+    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", options: PlaybackOptions
+) -> "CalibrationFile":
     """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.live.pose_terminal import PoseTerminal
 
-    session = CalibrationSession(args.scenario, tuple(playback.scenario.stations), folder=args.mocap)
-    with _open_device(args, playback, events) as device:
+    session = CalibrationSession(options.scenario, tuple(playback.scenario.stations), folder=options.folder)
+    with _open_device(port, config, playback, events) as device:
         terminal = PoseTerminal(session.body.skeleton, sys.stderr)
         try:
             held = session.collect_poses(device, print_status, [terminal]).holds
         finally:
             terminal.close()
-    found = session.solve(held, args.port)
+    found = session.solve(held, port)
     for line in found.lines:
         print_status(line)
     return found.file
 
 
-def _initial_calibration(args: argparse.Namespace, playback: "Playback") -> "Calibration | Calibrator":
+def _initial_calibration(kind: str, playback: "Playback") -> "Calibration | Calibrator":
     from harness.calibrate.guided_calibration import TPoseCalibrator
 
-    if args.calibration == "tpose":
+    if kind == "tpose":
         return TPoseCalibrator(playback.body, playback.mounts)
     return playback.calibration

@@ -13,12 +13,12 @@ from harness.commands.flags import (
     add_verb,
     is_whole_number,
     line_options,
-    open_playback,
     parse_device_names,
     parse_names,
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
+from harness.commands.playback_flags import PlaybackOptions, open_playback
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
@@ -94,7 +94,18 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     stations = args.stations
     if stations is not None:
         stations = int(stations) if is_whole_number(stations) else parse_names(stations)
-    playback = open_playback(args, stations, scenario, posing=bool(args.poses))
+    options = PlaybackOptions(
+        scenario,
+        stations,
+        args.clip,
+        args.rate,
+        args.seed,
+        args.mocap,
+        args.noise,
+        posing=bool(args.poses),
+        every_station=True,
+    )
+    playback = open_playback(options)
     played, simulation = playback.scenario, playback.simulation
     note = {
         "source": "simulation",

@@ -3,16 +3,20 @@
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, repeat_flags
 from harness.commands.output import print_caveat, print_data, print_result, print_status
+from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
+    from harness.experiment.evaluation import Evaluation
+    from harness.experiment.observed_take import ObservedTake
     from harness.stream.recording.recording import Recording
     from harness.stream.recording.replay import RecordingStream
 
@@ -108,7 +112,7 @@ def _format_counts(stream: "RecordingStream") -> str:
 
 def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
-    from harness.experiment.evaluation import check_methods, evaluate_each, format_score_table
+    from harness.experiment.evaluation import check_methods, evaluate_each
     from harness.experiment.recorded_take import find_playback, has_station_names, recorded_take
 
     options = {
@@ -136,3 +140,37 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
     outcome = Outcome.INCOMPLETE if any(score.failure for score in scores) else outcome
     return print_result(args, content, f"played from {played}", "", format_score_table(scores), outcome=outcome)
+
+
+def format_score_table(evaluations: Sequence["Evaluation"]) -> str:
+    """A row for each method that did not fail, and a table of the standard deviations if a method states them.
+
+    The failures follow, each with the last line of its reason, and a line if too few records arrived.
+    """
+    from harness.core.text_table import Table
+    from harness.report.run.metric_columns import TABLE_COLUMNS, sigma_lines
+
+    rows, done = [], [one for one in evaluations if not one.failure]
+    for one in done:
+        figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
+        rows.append([one.title, f"{one.scores.matched}/{one.scores.expected}", *figures])
+    table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
+    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in done])
+    failed = [f"failed: {one.method}: {one.failure.strip().splitlines()[-1]}" for one in evaluations if one.failure]
+    missing = _missing_records(evaluations[0].take) if evaluations else []
+    return "\n".join([*(table.lines() if done else []), *sigmas, *failed, *missing])
+
+
+def _missing_records(take: "ObservedTake") -> list[str]:
+    """A line if fewer records arrived than let anything be measured, unless the recording's scenario allows it."""
+    from harness.score.loops import COVERAGE_FLOOR
+
+    if take.records_arrived >= COVERAGE_FLOOR * take.records_expected:
+        return []
+    arrived = f"{take.records_arrived:,} of {take.records_expected:,} records arrived"
+    if take.overload:
+        return [f"{arrived}, which tracker.overload of the recording's scenario allows."]
+    return [
+        f"{arrived}: the line is too slow for the stations, or some were off. Record at a lower rate, a higher baud "
+        "rate or with fewer stations. If the slow line is what the scenario studies, set tracker.overload = true in it."
+    ]

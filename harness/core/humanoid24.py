@@ -108,6 +108,16 @@ def standard_skeleton() -> Skeleton:
     )
 
 
+def has_bones(skeleton: Skeleton) -> bool:
+    """Whether a clip's skeleton has the 24 bones."""
+    return set(BONES) <= set(skeleton.names)
+
+
+def select_bones(skeleton: Skeleton) -> tuple[Skeleton, Ints]:
+    """The 24 bones of a clip's skeleton and the (D,) hinges that they have; UnknownName if it lacks a bone."""
+    return skeleton.subset(BONES)
+
+
 def limits_rad() -> Floats:
     """(48, 2) lowest and highest hinge angle [rad]."""
     return np.deg2rad([limits for bone in BONES for limits in _LIMITS_DEG[bone].values()])

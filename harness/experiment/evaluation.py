@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.estimate import name_with_lag
-from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressCallback
-from harness.core.text_table import Table
 from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION
@@ -24,8 +22,7 @@ from harness.experiment.methods.method_run import NO_ANSWERS, MethodAnswers, des
 from harness.experiment.methods.remote_method import resolve_method, run_over_frames
 from harness.experiment.observed_take import ObservedTake
 from harness.reconstruct.contract import Method
-from harness.results.reported_metrics import TABLE_COLUMNS, sigma_lines
-from harness.score.loops import COVERAGE_FLOOR, LoopScores, score_loops
+from harness.score.loops import LoopScores, score_loops
 from harness.score.metrics import FRAME_METRICS
 from harness.score.timing import step_times_ms
 from harness.score.uncertainty import score_sigma
@@ -152,32 +149,3 @@ def check_methods(names: Sequence[str]) -> None:
     for name in names:
         with suppress(MethodFailure):  # it fails when it is evaluated, alone
             resolve_method(name, DEFAULT_ISOLATION)
-
-
-def format_score_table(evaluations: Sequence[Evaluation]) -> str:
-    """A row for each method that did not fail, and a table of the standard deviations if a method states them.
-
-    The failures follow, each with the last line of its reason, and a line if too few records arrived.
-    """
-    rows, done = [], [one for one in evaluations if not one.failure]
-    for one in done:
-        figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
-        rows.append([one.title, f"{one.scores.matched}/{one.scores.expected}", *figures])
-    table = Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows)
-    sigmas = sigma_lines(["method"], [([one.title], one.sigma_scores) for one in done])
-    failed = [f"failed: {one.method}: {one.failure.strip().splitlines()[-1]}" for one in evaluations if one.failure]
-    missing = _missing_records(evaluations[0].take) if evaluations else []
-    return "\n".join([*(table.lines() if done else []), *sigmas, *failed, *missing])
-
-
-def _missing_records(take: ObservedTake) -> list[str]:
-    """A line if fewer records arrived than let anything be measured, unless the recording's scenario allows it."""
-    if take.records_arrived >= COVERAGE_FLOOR * take.records_expected:
-        return []
-    arrived = f"{take.records_arrived:,} of {take.records_expected:,} records arrived"
-    if take.overload:
-        return [f"{arrived}, which tracker.overload of the recording's scenario allows."]
-    return [
-        f"{arrived}: the line is too slow for the stations, or some were off. Record at a lower rate, a higher baud "
-        "rate or with fewer stations. If the slow line is what the scenario studies, set tracker.overload = true in it."
-    ]

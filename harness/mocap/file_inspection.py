@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.humanoid24 import BONES
+from harness.core.humanoid24 import has_bones, select_bones
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadFile, BadInput
@@ -80,8 +80,8 @@ def inspect_clip(clip: Clip) -> Inspection:
     """
     skeleton = clip.skeleton
     pose = forward_kinematics(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
-    humanoid = set(BONES) <= set(skeleton.names)
-    bones = [skeleton.index(bone) for bone in (BONES if humanoid else skeleton.names)]
+    humanoid = has_bones(skeleton)
+    bones = [skeleton.index(bone) for bone in (select_bones(skeleton)[0] if humanoid else skeleton).names]
     rest_m = np.concatenate([np.zeros((1, 3)), rest_positions(skeleton.parents, skeleton.bone_m)[bones]])
     names = ("root", *(skeleton.names[b] for b in bones))
     position_m = np.concatenate([clip.root_m[:, None], pose.end_m[:, bones]], axis=1)

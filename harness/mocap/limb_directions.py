@@ -5,7 +5,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
-from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
 
 _LIMBS = (
@@ -21,7 +21,7 @@ _LIMBS = (
     ("rtibia",),
 )
 """The bones of each limb. Single hands and feet are too short: a millimetre of noise turns them by a degree."""
-_MOVED = tuple(bone for bone in BONES if bone[1:] not in ("hand", "foot"))
+_MOVED = tuple(bone for bone in standard_skeleton().names if bone[1:] not in ("hand", "foot"))
 """The bones of the limbs, and those that carry them."""
 MIRRORED = np.array([0, 1, 3, 2, 5, 4, 7, 6, 9, 8])
 """(10,) the limb that each one becomes when left and right change places."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, find_runs
-from harness.core.humanoid24 import BONES, limits_rad, standard_skeleton
+from harness.core.humanoid24 import has_bones, limits_rad, select_bones, standard_skeleton
 from harness.core.rotations import wrap_angle
 from harness.core.skeleton import Skeleton, equivalent_euler_angles, local_rotation
 
@@ -114,7 +114,7 @@ def find_fastest_joint(names: tuple[str, ...], position_m: Floats, rate_hz: floa
 
 def has_standard_hinges(skeleton: Skeleton) -> bool:
     """Whether the skeleton has the 24 bones with the standard hinges, so that the model's limits apply."""
-    return set(BONES) <= set(skeleton.names) and skeleton.subset(BONES)[0].dof_names == standard_skeleton().dof_names
+    return has_bones(skeleton) and select_bones(skeleton)[0].dof_names == standard_skeleton().dof_names
 
 
 def measure_limit_violations(skeleton: Skeleton, angles_rad: Floats) -> tuple[float, float, str]:
@@ -122,7 +122,7 @@ def measure_limit_violations(skeleton: Skeleton, angles_rad: Floats) -> tuple[fl
 
     The limits are those of `core.humanoid24` and hold for principal angles; `has_standard_hinges` must be true.
     """
-    body, dofs = skeleton.subset(BONES)
+    body, dofs = select_bones(skeleton)
     angles = principal_angles(body, angles_rad[:, dofs])
     limits = limits_rad()
     excess = np.maximum(limits[:, 0] - angles, angles - limits[:, 1])

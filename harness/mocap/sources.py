@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.core.humanoid24 import BONES
+from harness.core.humanoid24 import select_bones
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, UnknownName
@@ -180,6 +180,6 @@ def read_skeletons(folders: LibraryFolders) -> dict[str, Skeleton]:
 def _read_skeleton(path: Path) -> Skeleton:
     skeleton = read_asf(path)
     try:
-        return skeleton.subset(BONES)[0]
+        return select_bones(skeleton)[0]
     except UnknownName as error:
         raise BadFile(path, str(error), "the 24 bones of core.humanoid24", "Leave it out of the library.") from error

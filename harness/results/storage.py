@@ -6,11 +6,11 @@ inputs, the method and the source of both, so that edited code never reuses stal
 
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-from harness.core.files import TEMPORARY, content_key, digest
+from harness.core.files import TEMPORARY, content_key, digest, to_json_types
 from harness.core.ranges import check_words
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadFile, BadInput, Outcome
@@ -21,7 +21,7 @@ from harness.results.content_types import (
     find_impossible_sigma,
     find_impossible_statistic,
 )
-from harness.results.digests import write_result_json
+from harness.results.digests import STUDY_FILE, read_result_json, write_result_json
 from harness.results.folder_kind import LOCK_FILE, folder_lock
 from harness.results.index import CellIndex
 from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
@@ -35,6 +35,7 @@ __all__ = [
     "has_cell",
     "open_folder",
     "open_run",
+    "open_study",
     "read_cell",
     "read_cells",
     "read_summary",
@@ -98,6 +99,17 @@ def open_run(out: Path, manifest: Manifest) -> Iterator[None]:
     with open_folder(out, "manifest.json", manifest.as_dict(), "run", difference):
         (out / "cells").mkdir(exist_ok=True)
         yield
+
+
+def open_study(out: Path, identity: Mapping[str, Any]) -> AbstractContextManager[None]:
+    """Create a study's folder, or open it to resume, and hold its lock; BadInput as `open_folder`."""
+
+    def difference(path: Path) -> str:
+        advice = "Restore it from a copy, or name another folder with --out."
+        stored, given = read_result_json(path, "the identity of a study", advice), to_json_types(identity)
+        return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
+
+    return open_folder(out, STUDY_FILE, identity, "study", difference)
 
 
 def read_summary(out: Path) -> dict[str, Any]:

@@ -11,10 +11,10 @@ pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
 from harness.bench import methods, peak_memory
 from harness.bench.peak_memory import NO_METHOD
-from harness.experiment import benchmark_clips
-from harness.experiment.round_robin_timing import measure_speed
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
+from harness.study.speed import benchmark_clips
+from harness.study.speed.round_robin_timing import measure_speed
 
 
 @pytest.fixture(scope="module")

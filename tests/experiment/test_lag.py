@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.commands.replay import format_score_table
 from harness.compare.comparison import compare_results
 from harness.core.messages import MessageError
 from harness.errors import Outcome, ShapeError
 from harness.experiment import engine
-from harness.experiment.evaluation import evaluate_each, format_score_table
+from harness.experiment.evaluation import evaluate_each
 from harness.experiment.methods.method_messages import decode_answers, encode_answers
 from harness.experiment.methods.method_run import MethodAnswers, run_method
 from harness.experiment.playback import Playback, prepare_playback

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.commands.replay import format_score_table
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
-from harness.experiment.evaluation import Evaluation, check_methods, evaluate_each, format_score_table
+from harness.experiment.evaluation import Evaluation, check_methods, evaluate_each
 from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_take import find_playback, frame_numbers, recorded_take

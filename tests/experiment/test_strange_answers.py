@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.commands.replay import format_score_table
 from harness.errors import Outcome
 from harness.experiment import engine
-from harness.experiment.evaluation import evaluate_each, format_score_table
+from harness.experiment.evaluation import evaluate_each
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import recorded_take
 from harness.results.storage import read_cells, read_summary

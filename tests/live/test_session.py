@@ -13,11 +13,11 @@ import pytest
 from harness.body import humanoid
 from harness.calibrate.guided_calibration import Notifier, TPoseCalibrator
 from harness.calibrate.hold import UnusableHold
+from harness.commands import live_summary
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
 from harness.experiment.playback import Playback, prepare_playback
-from harness.live import summary
 from harness.live.pose import LivePose
 from harness.live.scheduling_jitter import JitterProbe
 from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
@@ -287,25 +287,25 @@ def test_a_late_pose_has_the_frame_that_it_answers() -> None:
 
 def test_the_lag_is_added_to_the_latency() -> None:
     done = performed(Paced(frames(12), 0.005), Late(), plan=LiveOptions(100.0, queue_frames=99))
-    content = summary.as_dict(done, {})
+    content = live_summary.as_dict(done, {})
     assert (content["lag_frames"], content["lag_ms"]) == (2, 20.0)
     for name, ms in content["latency"]["last byte to pose"].items():
         assert content["latency_with_lag"][name] == pytest.approx(ms + 20.0)
-    (line,) = [line for line in summary.lines(done, {}) if line.startswith("with the method's lag of 2 frames")]
+    (line,) = [line for line in live_summary.lines(done, {}) if line.startswith("with the method's lag of 2 frames")]
     assert float(line.split()[-3]) == pytest.approx(content["latency"]["last byte to pose"]["p50_ms"] + 20.0, abs=0.006)
     causal = performed(Paced(frames(5), 0.005), Counting(), plan=LiveOptions(100.0, queue_frames=99))
-    assert summary.as_dict(causal, {})["lag_ms"] == 0.0
-    assert not any("lag" in line for line in summary.lines(causal, {}))
+    assert live_summary.as_dict(causal, {})["lag_ms"] == 0.0
+    assert not any("lag" in line for line in live_summary.lines(causal, {}))
 
 
 def test_a_summary_says_what_happened() -> None:
     done = performed(Paced(frames(5), 0.01), Counting(), plan=LiveOptions(100.0, queue_frames=9))
     times = {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 7.5}
     beside = {"timer": times, "handover": times, "sleeps": 7}
-    content = summary.as_dict(done, beside)
+    content = live_summary.as_dict(done, beside)
     assert (content["frames"], content["poses"], content["deadline_ms"]) == (5, 5, 10.0)
     assert content["floor"] == beside
-    text = "\n".join(summary.lines(done, beside))
+    text = "\n".join(live_summary.lines(done, beside))
     for words in (
         "last byte to pose",
         "5 poses in",

@@ -20,7 +20,6 @@ from harness.body.kinematics import bone_poses
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.humanoid24 import BONES
 from harness.measure.pose_series import TruthPoses
 from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
 from harness.simulate.components.stationary import Clock, SpeedError
@@ -60,7 +59,7 @@ def planted_truth(kind: str, seed: int) -> TruthMotion:
     body, take = retarget_to_own_body(clip)
     calibration = exact_calibration(body, scenario.nominal_mounts, scenario.device)
     position_m, world_from_bone = bone_poses(body.skeleton, take.qpos)
-    time_s, rows = np.arange(len(take)) / take.rate_hz, {bone: BONES.index(bone) for bone in calibration.bones}
+    time_s, rows = np.arange(len(take)) / take.rate_hz, {bone: body.skeleton.index(bone) for bone in calibration.bones}
     return TruthMotion(
         f"clip {clip.name}, {time_s[-1]:.1f} s",
         {bone: TruthPoses(time_s, position_m[:, row], world_from_bone[:, row]) for bone, row in rows.items()},

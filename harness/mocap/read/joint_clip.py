@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
-from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton, hinge_angles, hinge_rotation, unwrap_angles
 from harness.errors import BadInput
@@ -127,7 +127,7 @@ def to_clip(joint_clip: JointClip, joint_map: JointMap) -> Clip:
     mean_deg = np.rad2deg(residual_rad.mean(axis=0))
     worst = int(np.argmax(mean_deg))
     note = f"hinges fitted to joint rotations: mean residual {mean_deg.mean():.2f} deg, "
-    note += f"largest at {BONES[worst]} ({mean_deg[worst]:.2f} deg)"
+    note += f"largest at {clip.skeleton.names[worst]} ({mean_deg[worst]:.2f} deg)"
     return replace(clip, notes=(*clip.notes, note))
 
 
@@ -198,7 +198,7 @@ def _build_skeleton(joint_clip: JointClip, joint_map: JointMap) -> tuple[Skeleto
 
 
 def _check_map(joint_clip: JointClip, joint_map: JointMap) -> None:
-    absent = [bone for bone in ("root", *BONES) if bone not in joint_map]
+    absent = [bone for bone in ("root", *standard_skeleton().names) if bone not in joint_map]
     if absent:
         raise BadInput(f"The joint map lacks {', '.join(absent)}.", "Map every bone of the 24, and root.")
     for bone, mapping in joint_map.items():

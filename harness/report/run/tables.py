@@ -12,14 +12,13 @@ from harness.report.kit.page import Block, BrowserOnly, Code, DataTable, Prose, 
 from harness.report.kit.ranking import BOLD_NOTE, LAG_NOTE
 from harness.report.kit.text import format_statistic, last_line
 from harness.report.run.data import Row, RunData, Trace
+from harness.report.run.metric_columns import SIGMA_COLUMNS, format_sigma_scores
 from harness.report.run.ranking import GroupedValues, best_series, group_values
 from harness.results.cell import setting_text
 from harness.results.reported_metrics import (
     MAX_FALLBACK_SHARE,
     PRIMARY_METRIC,
     SECONDARY_METRIC,
-    SIGMA_COLUMNS,
-    format_sigma_scores,
 )
 from harness.score.metrics import DEFINITIONS
 from harness.score.uncertainty import sum_sigma

@@ -12,14 +12,13 @@ from harness.report.kit.text import last_line, name_motion
 from harness.report.run.calibration import calibration_tables
 from harness.report.run.data import lag_of, note_of
 from harness.report.run.expectations import expected_orders, recovery_table
+from harness.report.run.metric_columns import TABLE_COLUMNS, sigma_lines
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
 from harness.results.reported_metrics import (
     MAX_FALLBACK_SHARE,
     PRIMARY_METRIC,
     SECONDARY_METRIC,
-    TABLE_COLUMNS,
-    sigma_lines,
 )
 
 MOST_ROWS = 12

@@ -24,7 +24,8 @@ from harness.reconstruct import registry
 from harness.results import manifest
 from harness.results.cell import varied_text
 from harness.results.findings import FindingsTable, PaperExperiment, PaperFindings, write_findings
-from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios, shorten_scenario
+from harness.results.storage import open_study
+from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios, shorten_scenario
 
 PAPERS = ("liu2011", "kim2012")
 """Names of modules of this folder, each with a `PAPER`."""

@@ -7,7 +7,6 @@ Its quick form has a few short clips, to see that everything works. It decides n
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,8 +22,8 @@ from harness.experiment.tasks import cell_names
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
-from harness.results.digests import STUDY_FILE, check_key, read_result_json, write_result_json
-from harness.results.storage import open_folder, read_summary
+from harness.results.digests import check_key, read_result_json, write_result_json
+from harness.results.storage import read_summary
 
 CLIPS, LONGEST_S = 2, 3.0
 """Number of test clips of each behaviour, and their length with the first second [s]."""
@@ -110,17 +109,6 @@ def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
     """Rows of a summary, cached by its time of writing, since experiments read it many times."""
     rows: list[dict[str, Any]] = read_summary(run)["cells"]
     return rows
-
-
-def open_study(out: Path, identity: Mapping[str, Any]) -> AbstractContextManager[None]:
-    """Create a study's folder, or open it to resume, and hold its lock; BadInput as `storage.open_folder`."""
-
-    def difference(path: Path) -> str:
-        advice = "Restore it from a copy, or name another folder with --out."
-        stored, given = read_result_json(path, "the identity of a study", advice), to_json_types(identity)
-        return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
-
-    return open_folder(out, STUDY_FILE, identity, "study", difference)
 
 
 def run_scenarios(

@@ -14,10 +14,7 @@ from typing import Any
 from harness.core.files import content_key
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.experiment import benchmark_clips
-from harness.experiment.benchmark_clips import BenchmarkClip
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
 from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders, MotionLibrary
@@ -26,6 +23,9 @@ from harness.results import manifest
 from harness.results.benchmark_statement import BenchmarkStatement
 from harness.results.findings import BarChart, FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import DATABASE_SHARE, PaperStudy
+from harness.study.speed import benchmark_clips
+from harness.study.speed.benchmark_clips import BenchmarkClip
+from harness.study.speed.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
 
 MAX_TEST_S = 12.0
 """Longest part of a held-out take that is followed [s]."""

@@ -32,8 +32,8 @@ from harness.results.placement_findings import (
     StatisticalPower,
     write_placement,
 )
+from harness.results.storage import open_study
 from harness.score.metrics import DEFINITIONS
-from harness.study.papers.paper_study import open_study
 from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim

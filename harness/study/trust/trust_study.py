@@ -27,6 +27,7 @@ from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
 from harness.results.digests import write_result_json
 from harness.results.folder_kind import FINDINGS
+from harness.results.storage import open_study
 from harness.results.trust_findings import (
     Equivalence,
     ErrorDistance,
@@ -36,7 +37,6 @@ from harness.results.trust_findings import (
     TrustFindings,
 )
 from harness.stream.recording.recording import PLAN, read_recording
-from harness.study.papers.paper_study import open_study
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
     ArmErrors,

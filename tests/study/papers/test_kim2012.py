@@ -12,8 +12,9 @@ from harness.experiment.plan import check_names
 from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.findings import PaperFindings, read_findings, write_findings
+from harness.results.storage import open_study
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
-from harness.study.papers.paper_study import PaperStudy, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, run_scenarios
 from harness.study.papers.station_sets import format_station_set
 from harness.study.papers.tables import HINGE_GROUPS
 

@@ -19,8 +19,9 @@ from harness.experiment.status import read_status
 from harness.results.digests import read_result_json, write_result_json
 from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
 from harness.results.folder_kind import folder_lock
+from harness.results.storage import open_study
 from harness.study.papers.paper import Paper, reproduce
-from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios
 from harness.study.papers.tables import errors_by_unit
 from tests.interrupts import heeding_interrupts
 from tests.results.finish import folder_bytes

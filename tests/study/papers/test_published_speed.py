@@ -8,8 +8,6 @@ import pytest
 
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment import benchmark_clips
-from harness.experiment.round_robin_timing import MethodSpeed
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
@@ -29,6 +27,8 @@ from harness.study.papers.published_speed import (
     missing_clips,
     truncate_motions,
 )
+from harness.study.speed import benchmark_clips
+from harness.study.speed.round_robin_timing import MethodSpeed
 from tests.mocap.sample_files import clip, write_clip
 
 TINY = PublishedSpeed(

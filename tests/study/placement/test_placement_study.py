@@ -16,8 +16,8 @@ from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.status import read_status
 from harness.results.folder_kind import FINDINGS
 from harness.results.placement_findings import PlacementFindings, StatisticalPower, read_placement, write_placement
+from harness.results.storage import open_study
 from harness.simulate.link import TrackerConfig
-from harness.study.papers.paper_study import open_study
 from harness.study.placement import placement_study
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import run_placement

@@ -12,16 +12,16 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
-from harness.experiment.benchmark_clips import (
+from harness.reconstruct.contract import Reconstructor
+from harness.reconstruct.database import MotionDatabase
+from harness.score.timing import step_times_ms
+from harness.stream.frame import TrackerFrame
+from harness.study.speed.benchmark_clips import (
     WARM_UP_FRAMES,
     BenchmarkClip,
     fit_named_method,
     joint_angle_error_deg,
 )
-from harness.reconstruct.contract import Reconstructor
-from harness.reconstruct.database import MotionDatabase
-from harness.score.timing import step_times_ms
-from harness.stream.frame import TrackerFrame
 
 FRAMES_PER_TURN = 40
 """Consecutive frames of one method: one second at 40 Hz."""

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.experiment import benchmark_clips
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
+from harness.study.speed import benchmark_clips
 
 
 @pytest.fixture(scope="module")

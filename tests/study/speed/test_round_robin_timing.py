@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.experiment import benchmark_clips, round_robin_timing
-from harness.experiment.benchmark_clips import WARM_UP_FRAMES, BenchmarkClip
-from harness.experiment.round_robin_timing import (
+from harness.reconstruct.database import MotionDatabase
+from harness.stream.frame import TrackerFrame
+from harness.study.speed import benchmark_clips, round_robin_timing
+from harness.study.speed.benchmark_clips import WARM_UP_FRAMES, BenchmarkClip
+from harness.study.speed.round_robin_timing import (
     FRAMES_PER_TURN,
     MethodTimings,
     TimedStep,
@@ -14,8 +16,6 @@ from harness.experiment.round_robin_timing import (
     time_method,
     time_round_robin,
 )
-from harness.reconstruct.database import MotionDatabase
-from harness.stream.frame import TrackerFrame
 
 
 @pytest.fixture(scope="module")

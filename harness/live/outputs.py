@@ -1,0 +1,108 @@
+"""The outputs that a user asks for, opened one after another."""
+
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from harness.core.arrays import Floats
+from harness.core.interrupts import defer_interrupts
+from harness.core.skeleton import Skeleton
+from harness.errors import BadInput
+from harness.live.browser_view import BrowserOutput
+from harness.live.file_outputs import BvhOutput, PoseTableOutput
+from harness.live.lsl import LslOutput
+from harness.live.pose import Output
+from harness.live.viewer import ViewerOutput
+from harness.live.vmc import VmcOutput
+from harness.stream.recording.recorder import RecordingSwitch
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Where the poses of a live session go; BadInput for options that need another one."""
+
+    vmc: str | None = None
+    """[HOST:]PORT that receives the VMC protocol."""
+    lsl: str | None = None
+    """Name of the streams of the Lab Streaming Layer."""
+    anywhere: bool = False
+    """Whether those streams are announced to other computers too."""
+    bvh: Path | None = None
+    poses: Path | None = None
+    """Table of poses and frame times."""
+    view: Literal["window", "browser", "frames"] | None = None
+    no_browser: bool = False
+    """Whether the page of the view "browser" is served, but not opened."""
+    out: Path | None = None
+    """Folder of the pictures of the view "frames", and of recordings that the view "browser" starts."""
+    force: bool = False
+    """Whether files that exist are replaced."""
+
+    def __post_init__(self) -> None:
+        if self.out is not None and self.view not in ("frames", "browser"):
+            raise BadInput("--out without --view frames or browser.", "Give both, or neither.")
+        if self.no_browser and self.view != "browser":
+            raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
+        if self.anywhere and self.lsl is None:
+            raise BadInput("--anywhere without --lsl.", "Name the streams with --lsl.")
+
+
+@dataclass(frozen=True, eq=False)
+class SessionSetup:
+    """What outputs show of a live session beside its poses."""
+
+    skeleton: Skeleton
+    stations: tuple[str, ...]
+    rate_hz: float
+    """Expected frame rate of the tracker [Hz]."""
+    room: tuple[Floats, Floats] | None
+    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
+    title: str
+
+
+def open_outputs(
+    options: OutputOptions,
+    setup: SessionSetup,
+    recorder: RecordingSwitch,
+    opened: ExitStack,
+    say: Callable[[str], None] = lambda text: None,
+) -> list[Output]:
+    """Open the requested outputs; `opened` closes them again, also when a later one is refused.
+
+    `say` receives a line on each of them. `recorder` is that of the recordings that the view "browser" starts.
+    """
+    outputs: list[Output] = []
+    waiting = _requested_outputs(options, setup, recorder, say)
+    while True:
+        with defer_interrupts():
+            output = next(waiting, None)
+            if output is None:
+                return outputs
+            outputs.append(output)
+            opened.callback(output.close)
+        say(output.description)
+
+
+def _requested_outputs(
+    options: OutputOptions, setup: SessionSetup, recorder: RecordingSwitch, say: Callable[[str], None]
+) -> Iterator[Output]:
+    """Open each output when it is asked for."""
+    if options.vmc is not None:
+        yield VmcOutput(options.vmc, setup.skeleton)
+    if options.lsl is not None:
+        yield LslOutput(options.lsl, setup.skeleton, setup.rate_hz, network=options.anywhere)
+    if options.bvh is not None:
+        yield BvhOutput(options.bvh, setup.skeleton, setup.rate_hz, force=options.force)
+    if options.poses is not None:
+        yield PoseTableOutput(options.poses, setup.skeleton, setup.stations, force=options.force)
+    if options.view == "browser":
+        folder = options.out or Path()
+        page = BrowserOutput(setup.skeleton, setup.stations, setup.room, recorder, folder, setup.title)
+        if not options.no_browser and not webbrowser.open(page.url):
+            say("No browser was found: open the address in one.")
+        yield page
+    elif options.view is not None:
+        yield ViewerOutput(options.view, setup.skeleton, options.out, force=options.force)
