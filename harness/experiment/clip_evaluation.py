@@ -14,7 +14,7 @@ import numpy as np
 from harness.body import humanoid, retargeting
 from harness.body.mounts import locate_mount
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
-from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.humanoid24 import select_bones, standard_skeleton
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
@@ -75,7 +75,7 @@ class Subject:
     def body(self) -> humanoid.Body:
         """The performer's true body."""
         if self.motion.body == "own":
-            return humanoid.build_body(self.clip.skeleton.subset(BONES)[0])
+            return humanoid.build_body(select_bones(self.clip.skeleton)[0])
         return humanoid.build_body(standard_skeleton())
 
     @cached_property
