@@ -13,21 +13,21 @@ from filelock import FileLock
 
 from harness.bench.lab.captures import planted_capture
 from harness.bench.lab.validated_captures import planted_truth
+from harness.bench.limits import state_verdict
 from harness.bench.physics import error_statistics
 from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
 from harness.cli import main
 from harness.errors import Outcome
 from harness.experiment.playback import prepare_playback
-from harness.measure.unit_report import UnitReport
-from harness.measure.validation_report import ValidationReport
+from harness.measure.reports.unit_report import UnitReport
+from harness.measure.reports.validation_report import ValidationReport
 from harness.report.coverage import page as coverage
 from harness.report.coverage.content import CoverageContent
 from harness.report.coverage.page import coverage_page
 from harness.report.kit.page import Page
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.results.benchmark_statement import state_verdict
-from harness.results.placement_findings import PlacementFindings, read_placement
-from harness.results.trust_findings import TrustFindings
+from harness.results.findings.placement_findings import PlacementFindings, read_placement
+from harness.results.findings.trust_findings import TrustFindings
 from harness.stream.recording.recording import record_capture
 from harness.stream.recording.station_readings import CaptureReader
 from harness.study.placement.placement_study import run_placement

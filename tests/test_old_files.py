@@ -17,8 +17,8 @@ from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
 from harness.experiment.scenarios.fitted_unit import read_fitted_unit
 from harness.measure.unit_file import read_unit_file
-from harness.results.findings import read_findings
-from harness.results.placement_findings import read_placement
+from harness.results.findings.paper_findings import read_findings
+from harness.results.findings.placement_findings import read_placement
 from harness.results.reader import load_results
 from harness.results.storage import open_study
 from harness.simulate.physics.emitters import read_mcf

@@ -27,8 +27,8 @@ from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import POPULATION_SIZE, read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.simulate import noise as noises
+from harness.simulate.calibration_motion import hold_poses, hold_times_s
 from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.held_poses import hold_poses, hold_times_s
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 

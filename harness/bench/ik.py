@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.bench.common import MOUNTS, world_calibration
+from harness.bench.limits import hold_to_limit
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.body.retargeting import retarget_to_own_body
@@ -34,7 +35,7 @@ from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.stream.frame import TrackerFrame
 from harness.study.speed.round_robin_timing import MethodTimings, TimedStep, take_turns
 

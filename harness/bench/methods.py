@@ -17,6 +17,7 @@ import numpy as np
 from harness.bench import neighbour_search
 from harness.bench.common import in_world
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
+from harness.bench.limits import hold_to_limit
 from harness.bench.peak_memory import NO_METHOD, measure_peak_bytes
 from harness.body import humanoid
 from harness.core import rotations
@@ -36,7 +37,7 @@ from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.expert_map import FEATURES, ExpertMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.stream.frame import TrackerFrame
 from harness.study.speed import benchmark_clips
 from harness.study.speed.benchmark_clips import BenchmarkClip

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from harness.bench.common import STATIONS, world_calibration
+from harness.bench.limits import hold_to_limit
 from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.core.arrays import Ints, Singles
@@ -27,7 +28,7 @@ from harness.reconstruct.index.inverted_file import cells_for, probes_for
 from harness.reconstruct.index.selection import FLAT_MAX_VECTORS, best_index
 from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.study.speed import benchmark_clips
 
 SIZES = (6_600, 66_000)

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
+from harness.bench.limits import hold_to_limit
 from harness.body.retargeting import retarget_to_common_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
@@ -36,7 +37,7 @@ from harness.mocap.sources import (
     open_motion_source,
 )
 from harness.reconstruct import registry
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.study.speed.benchmark_clips import load_clean_scenario
 
 METHOD = "local_pca"

@@ -9,10 +9,11 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from harness.bench.limits import hold_to_limit
 from harness.core.calibration import Calibration
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.reconstruct.solver.outlier_gate import OutlierGate
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.stream.frame import TrackerFrame
 from harness.study.speed import benchmark_clips
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from harness.bench.common import MOUNTS, STATIONS, pose_all
 from harness.bench.cpu_time import time_cpu
+from harness.bench.limits import hold_to_limit
 from harness.body import retargeting
 from harness.mocap import synthetic
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate import noise
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.stream.is900.codec.decoder import Decoder

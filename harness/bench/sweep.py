@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, process_times
+from harness.bench.limits import hold_to_limit
 from harness.core.arrays import Floats
 from harness.core.child_process import run_python
 from harness.core.split import ClipPart
@@ -28,7 +29,7 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.tasks import ClipTask
 from harness.reconstruct import registry
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.index import CellIndex
 from harness.results.table import TIME_COLUMNS, compute_group_statistics, write_table
 

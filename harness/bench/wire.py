@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
+from harness.bench.limits import hold_to_limit
 from harness.bench.wire_device import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
 from harness.experiment.playback import prepare_playback
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.stream.is900.codec.decoder import Decoder
 from harness.stream.is900.codec.items import STATION_CHARACTERS, record_type
 from harness.stream.is900.codec.reader import FrameReader

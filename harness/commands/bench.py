@@ -12,7 +12,7 @@ from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.results.benchmark_statement import BenchmarkStatement
+    from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 ACCURACY = "accuracy"
 """Name of the benchmark of accuracy, which runs alone."""
@@ -112,8 +112,8 @@ def _print_statements(
 
     The outcome is REGRESSED where a target is missed. Where none is, it is INCOMPLETE where benchmarks were left out.
     """
+    from harness.bench.limits import count_missed, outcome_of
     from harness.report.kit.statement_lines import statement_lines
-    from harness.results.benchmark_statement import count_missed, outcome_of
 
     content, outcome = {"rows": [row.as_dict() for row in rows], **content}, outcome_of(rows)
     if content.get("left_out") and outcome is not Outcome.REGRESSED:

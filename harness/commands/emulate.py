@@ -96,7 +96,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
             opened.enter_context(closing(port))
-        characters = config.plugged(len(samples.stations))
+        characters = config.station_characters(len(samples.stations))
         names = ", ".join(f"{c} {name}" for c, name in zip(characters, samples.stations, strict=True))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
         played = (

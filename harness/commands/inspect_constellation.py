@@ -65,12 +65,12 @@ def _load(path: Path) -> Constellation:
     """The constellation in a file; a bare name that no file has is a shipped one."""
     from harness.core.input_file import names_input_file
     from harness.core.ranges import check_words
-    from harness.simulate.physics.constellation import shipped_constellation
+    from harness.simulate.physics.constellation import constellation_path
     from harness.simulate.physics.emitters import read_mcf
 
     check_words(path)
     if path.parent == Path() and not names_input_file(path):
-        path = shipped_constellation(path.stem)
+        path = constellation_path(path.stem)
     return load_constellation(ConstellationSettings(emitters=read_mcf(path)))
 
 
@@ -87,7 +87,7 @@ def _content(args: argparse.Namespace, constellation: Constellation) -> Coverage
     for height_m in HEIGHTS_M:
         found = emitter_coverage(constellation, grid_m(x_m, y_m, np.array([floor_m - height_m])))
         shape = len(x_m), len(y_m)
-        views.append(PlanView(height_m, x_m, y_m, found.heard.reshape(shape), found.dilution.reshape(shape)))
+        views.append(PlanView(height_m, x_m, y_m, found.emitters.reshape(shape), found.dilution.reshape(shape)))
     stations = _station_rows(args, constellation) if args.clip is not None else ("", ())
     return CoverageContent(
         name=args.file.stem,
@@ -113,7 +113,7 @@ def _place_rows(constellation: Constellation, floor_m: float) -> list[CoverageRo
         depths_m = floor_m - np.asarray(heights_m, dtype=float)
         grid = grid_m(middle_m[0] + across_m, middle_m[1] + across_m, depths_m)
         found: EmitterCoverage = emitter_coverage(constellation, grid)
-        return CoverageRow(place, found.share, found.fixed_share, found.median_heard, found.median_dilution)
+        return CoverageRow(place, found.share, found.fix_share, found.median_emitters, found.median_dilution)
 
     whole = row(f"0 to {SIDE_M:g} m", np.linspace(0.0, SIDE_M, _POINTS))
     return [whole, *(row(f"{height_m:g} m", [height_m]) for height_m in HEIGHTS_M)]
@@ -132,7 +132,7 @@ def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tup
     body, motion = retarget_to_own_body(clip)
     found = station_coverage(constellation, body, motion, exact_calibration(body, mounts, TrackerConfig()))
     rows = [
-        StationRow(name, found.shares(row), found.fixed_share(row), found.median_dilution(row))
+        StationRow(name, found.shares(row), found.fix_share(row), found.median_dilution(row))
         for row, name in enumerate(found.stations)
     ]
     return clip.name, rows

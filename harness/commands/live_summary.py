@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from harness.core.number_format import count_noun, format_fixed
+from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
 from harness.live.session import LiveResult
 
@@ -21,7 +21,7 @@ def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
         "origin": result.origin,
         "deadline_ms": 1e3 * stages.deadline_s,
         "deadline_missed": stages.missed,
-        "lag_frames": result.lag,
+        "lag_frames": result.lag_frames,
         "lag_ms": 1e3 * result.lag_s,
         "latency": {name: durations.as_dict() for name, durations in stages.by_name().items()},
         "latency_with_lag": _with_lag(result),
@@ -34,8 +34,8 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
     """A table of latencies with the computer's scheduling jitter below, and the counts, as lines of text."""
     stages = result.stages
     rows = [_time_row(name, durations.as_dict()) for name, durations in stages.by_name().items()]
-    if result.lag:
-        rows.append(_time_row(f"with the method's lag of {count_noun(result.lag, 'frame')}", _with_lag(result)))
+    if result.lag_frames:
+        rows.append(_time_row(f"with the method's {result.lag_text}", _with_lag(result)))
     rows += [_time_row(name, jitter[key]) for name, key in _JITTER_LABELS.items() if jitter.get(key)]
     states = "; ".join(
         ", ".join(f"{count} {name}" for name, count in counted.items()) for counted in (result.status, result.origin)

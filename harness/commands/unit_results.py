@@ -11,7 +11,7 @@ from harness.core.progress import show_steps
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from harness.measure.departures import Departure
+    from harness.measure.reports.departures import Departure
     from harness.measure.unit_file import UnitFile
     from harness.report.kit.page import Page
 

@@ -32,9 +32,9 @@ from harness.core.files import (
 )
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, shorten
-from harness.results.digests import file_digest, insert_digest, write_result_json
-from harness.results.folder_kind import CELLS_FILE
-from harness.results.integrity import read_summary_json
+from harness.results.files.digests import file_digest, insert_digest, write_result_json
+from harness.results.files.folder_kind import CELLS_FILE
+from harness.results.files.integrity import read_summary_json
 from harness.results.reader import (
     BASELINE_FILES,
     BASELINES,

@@ -45,7 +45,7 @@ MARGINS = {
     **dict.fromkeys(TIME_METRICS, _TIME),
     "fps": Margin(1.0 / 3.0, 1.0, rise_is_worse=False),
 }
-"""Metric -> margin; values of the truth, counts and lag have none, since neither direction is better."""
+"""Metric -> margin; values of the truth, counts and `lag_ms` have none, since neither direction is better."""
 
 
 def margin_of(metric: str) -> Margin:

@@ -60,13 +60,13 @@ class MethodRanking:
 
 
 def split_by_lag(values: Mapping[str, ClipValues], lags: Mapping[str, int]) -> dict[int, dict[str, ClipValues]]:
-    """Lag [frames] -> the methods with that lag, the causal ones first; a method without an entry in `lags` is causal.
+    """Lag [frames] -> its methods, the causal ones first; a method without an entry in `lags` is causal.
 
     Each part is ranked alone.
     """
     parts: dict[int, dict[str, ClipValues]] = {}
-    for lag in sorted({lags.get(name, 0) for name in values}):
-        parts[lag] = {name: of for name, of in values.items() if lags.get(name, 0) == lag}
+    for frames in sorted({lags.get(name, 0) for name in values}):
+        parts[frames] = {name: of for name, of in values.items() if lags.get(name, 0) == frames}
     return parts
 
 

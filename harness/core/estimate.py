@@ -143,6 +143,11 @@ def check_sigma(angle_sigma_rad: Floats) -> None:
         raise ValueError(f"{found}; it must be above 0, at least {MIN_SIGMA_RAD:.3g}, and below {MAX_POSE_VALUE:g}")
 
 
+def answer_lag(answer: Any) -> int:
+    """Lag of what a method answered [frames], which may be an object of its own; 0 where it has none."""
+    return int(getattr(answer, "lag", 0))
+
+
 def session_lag(lags: Sequence[int] | Ints) -> int:
     """The lag L of a session [frames] from the lags (F,) of all its estimates; 0 without estimates.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_statistics import run_statistics
+from harness.compare.run_summary.run_statistics import run_statistics
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY
 from harness.core.progress import ProgressCallback

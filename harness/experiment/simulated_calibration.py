@@ -26,7 +26,7 @@ from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.simulate.held_poses import hold_poses
+from harness.simulate.calibration_motion import hold_poses
 from harness.simulate.noise import Noise
 from harness.simulate.simulation import Simulation, TrackerConfig, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame

@@ -16,13 +16,15 @@ from harness.stream.frame import TrackerFrame
 
 @dataclass(frozen=True, eq=False)
 class LivePose:
-    """One solved frame of a live session: the frame that the estimate answers, which a lag makes an earlier one."""
+    """One solved frame of a live session: the frame that the estimate answers, which may be earlier than that of the
+    step.
+    """
 
     number: int
     """Number of the pose, from 0; dropped frames are not counted."""
     frame: TrackerFrame
     taken_s: float
-    """Host monotonic clock when the frame of the step was taken from the queue, `estimate.lag` frames later [s]."""
+    """Host monotonic clock when the frame of the step was taken from the queue, when the estimate was made [s]."""
     ready_s: float
     """Host monotonic clock when the pose was ready [s]."""
     measured_s: float

@@ -15,6 +15,7 @@ from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin, Status
+from harness.core.number_format import count_noun
 from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
 from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
@@ -67,12 +68,17 @@ class LiveResult:
     """Time from the first to the last pose [s]."""
     failed: dict[str, str] = field(default_factory=dict)
     """Error of each output that failed, by its name."""
-    lag: int = 0
+    lag_frames: int = 0
     """Number of frames by which the method answers later than it could, see `core.estimate.Estimate.lag`."""
     lag_s: float = 0.0
     """The lag times the expected frame period [s]. No stage contains it, but every pose is so much older."""
     stopped: bool = False
     """Whether Ctrl-C or another signal ended the session."""
+
+    @property
+    def lag_text(self) -> str:
+        """The lag in words, such as "lag of 2 frames"."""
+        return f"lag of {count_noun(self.lag_frames, 'frame')}"
 
     @property
     def poses(self) -> int:
@@ -232,8 +238,8 @@ class _SolverThread:
             estimate = session.step(frame)
             ready_s = self._clock()
             self._waiting.append((frame, self._host_clock.measured_s(frame)))
-            if estimate.lag > done.lag:  # the first frames of a session with a lag: the first one is answered again
-                done.lag, done.lag_s = estimate.lag, estimate.lag / self._options.rate_hz
+            if estimate.lag > done.lag_frames:  # the first frames: the first one is answered again
+                done.lag_frames, done.lag_s = estimate.lag, estimate.lag / self._options.rate_hz
                 continue
             while len(self._waiting) > estimate.lag + 1:
                 self._waiting.popleft()

@@ -202,9 +202,9 @@ def _correlations(station: MeasuredPoses, splines: Mapping[str, TruthSpline], of
     """Correlation of the station's angular speed with that of each body; 0 with too little in common."""
     known = station.valid & np.isfinite(station.measured_s)
     time_s, turn = station.measured_s[known], station.tracker_from_station[known]
-    lag = 4
-    middle_s, step_s = 0.5 * (time_s[lag:] + time_s[:-lag]) - offset_s, time_s[lag:] - time_s[:-lag]
-    measured = _angle(turn[:-lag], turn[lag:]) / np.maximum(step_s, 1e-6)
+    span = 4
+    middle_s, step_s = 0.5 * (time_s[span:] + time_s[:-span]) - offset_s, time_s[span:] - time_s[:-span]
+    measured = _angle(turn[:-span], turn[span:]) / np.maximum(step_s, 1e-6)
     usable = (step_s > 0.0) & (step_s < 3.0 * np.median(step_s))
     out = []
     for spline in splines.values():

@@ -19,7 +19,7 @@ SMALLEST_SHARE = 1e-3
 _TRIM = 2.5
 """Standard deviations beyond which a difference is left out."""
 _MOST_DIFFERENCES = 40_000
-"""About the most differences of one lag that are used."""
+"""About the most differences of one interval that are used."""
 _LONGEST_LAG_S = 30.0
 _NORMAL_MEDIAN = 0.6744897501960817
 """Median of the absolute value of a standard normal variable."""
@@ -32,7 +32,7 @@ _TRIMMED_VARIANCE = 1.0 - 2.0 * _TRIM * math.exp(-0.5 * _TRIM**2) / math.sqrt(2.
 def start_values(series: Sequence[StaticSeries], left_out: Sequence[Bools]) -> Floats:
     """Rough logarithms (6,) of the parameters, which echoes, excursions and gaps hardly change; see `NOISE_KEYS`.
 
-    They come from trimmed variances of differences. Those over a lag t have the variance
+    They come from trimmed variances of differences. Those over a time t have the variance
     2 w^2 + 2 s^2 (1 - exp(-t / tau)). A spread that is not found is a thousandth of the total. BadInput for fewer than
     100 readings.
     """
@@ -57,7 +57,7 @@ def rough_logarithms(samples: Sequence[NoiseSample]) -> Floats:
     rate_hz = max(sample.rate_hz for sample in samples)
     longest = max(len(sample.used) for sample in samples) // 3
     lags = np.unique(np.rint(np.geomspace(1.0, max(min(_LONGEST_LAG_S * rate_hz, longest), 2.0), 24)).astype(int))
-    variances = np.array([[_difference_variance(samples, number, lag) for lag in lags] for number in range(3)])
+    variances = np.array([[_difference_variance(samples, number, rows) for rows in lags] for number in range(3)])
     lag_s = lags / rate_hz
     best, found = np.inf, np.zeros(6)
     for correlation_s in np.geomspace(0.5 / rate_hz, max(lag_s[-1], 1.0 / rate_hz), 60):
@@ -80,15 +80,15 @@ def rough_logarithms(samples: Sequence[NoiseSample]) -> Floats:
     return out
 
 
-def _difference_variance(samples: Sequence[NoiseSample], number: int, lag: int) -> float:
-    """Variance of differences over a lag of rows, without those beyond 2.5 standard deviations; 0 if unknown."""
+def _difference_variance(samples: Sequence[NoiseSample], number: int, interval: int) -> float:
+    """Variance of differences over an interval of rows, without those beyond 2.5 standard deviations; 0 if unknown."""
     parts = []
     for sample in samples:
-        both = sample.used[lag:] & sample.used[:-lag]
+        both = sample.used[interval:] & sample.used[:-interval]
         values = sample.groups[number]
         stride = max(len(both) * len(samples) // _MOST_DIFFERENCES, 1)
         rows = np.flatnonzero(both)[::stride]
-        parts.append((values[rows + lag] - values[rows]).ravel())
+        parts.append((values[rows + interval] - values[rows]).ravel())
     differences = np.abs(np.concatenate(parts))
     if len(differences) == 0:
         return 0.0

@@ -130,11 +130,11 @@ def _agrees_nearby(middle_m: Floats, middle_turn: Floats) -> Bools:
     """(K,) whether all windows within `_NEIGHBOURS` of each are near each other; NaN is near to everything."""
     count = len(middle_m)
     out = np.ones(count, bool)
-    for lag in range(1, 2 * _NEIGHBOURS + 1):
-        apart = np.linalg.norm(middle_m[lag:] - middle_m[:-lag], axis=1) > _RANGE_M
-        apart |= rotations.angle_between_rad(middle_turn[lag:], middle_turn[:-lag]) > _RANGE_RAD
+    for rows in range(1, 2 * _NEIGHBOURS + 1):
+        apart = np.linalg.norm(middle_m[rows:] - middle_m[:-rows], axis=1) > _RANGE_M
+        apart |= rotations.angle_between_rad(middle_turn[rows:], middle_turn[:-rows]) > _RANGE_RAD
         for i in np.flatnonzero(apart).tolist():  # the windows that have both of the pair among their neighbours
-            out[max(i + lag - _NEIGHBOURS, 0) : i + _NEIGHBOURS + 1] = False
+            out[max(i + rows - _NEIGHBOURS, 0) : i + _NEIGHBOURS + 1] = False
     return out
 
 

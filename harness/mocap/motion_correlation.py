@@ -2,7 +2,7 @@
 
 An edited copy no longer has the poses of the clip, but it still speeds up and slows down with it. The descriptions of
 `shared_motion` are differentiated once and twice, which takes drift and offsets away, and the changes in a window of
-one clip are correlated with those of the other clip at every lag. Amplitude does not matter. The upper body is also
+one clip are correlated with those of the other clip at every shift. Amplitude does not matter. The upper body is also
 compared alone, because the legs may have been replaced. Different takes correlate less, also those of one walker: the
 longer the window, the less. So a long window finds larger edits than a short one.
 

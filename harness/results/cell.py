@@ -22,14 +22,14 @@ from harness.core.files import flush_together, move_into_place, temporary_path, 
 from harness.core.input_file import MEGABYTE
 from harness.core.npz_file import read_npz
 from harness.errors import BadFile, ShapeError
-from harness.results.content_types import (
+from harness.results.files.content_types import (
     check_cell_types,
     find_cell_fault,
     find_impossible_errors,
     find_impossible_metric,
     find_impossible_sigma,
 )
-from harness.results.digests import check_file, check_key, insert_digest, read_result_json
+from harness.results.files.digests import check_file, check_key, insert_digest, read_result_json
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -161,7 +161,7 @@ class Cell:
     @property
     def lag(self) -> int:
         """Number of later frames that the method used for each estimate; 0 for a causal one."""
-        return int(self.defined_by.get("lag", 0))
+        return lag_of(self.defined_by)
 
     @property
     def sigma_scores(self) -> Mapping[str, float]:
@@ -333,12 +333,17 @@ def read_row(folder: Path) -> dict[str, Any]:
     return row_of_content(folder, content)
 
 
+def lag_of(row: Mapping[str, Any]) -> int:
+    """Lag of the method of a row or of a cell's conditions [frames]; those of older versions are of causal methods."""
+    return int(row.get("lag", OPTIONAL_COLUMNS["lag"]))
+
+
 def row_of_content(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
     """The row of a cell from the content of its cell.json; BadFile when columns are missing."""
     try:
         first, rest = ({name: content[name] for name in names} for names in (IDENTITY, TRAILING_COLUMNS))
         optional = {
-            "lag": int(content["defined_by"].get("lag", OPTIONAL_COLUMNS["lag"])),
+            "lag": lag_of(content["defined_by"]),
             "sigma_scores": content.get("sigma_scores", OPTIONAL_COLUMNS["sigma_scores"]),
         }
         return {**first, **content["metrics"], **rest, **optional}

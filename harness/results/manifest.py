@@ -20,7 +20,7 @@ from harness.core.files import to_json_types
 from harness.core.package_data import PACKAGE_FOLDER, VERSION, data_folder
 from harness.core.split import StatisticalUnit
 from harness.errors import BadFile, UnknownName
-from harness.results.digests import read_result_json
+from harness.results.files.digests import read_result_json
 from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")

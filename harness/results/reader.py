@@ -11,11 +11,11 @@ from harness.core.ranges import check_words
 from harness.core.stream_health import excess_loss
 from harness.errors import BadFile, BadInput, MissingExtra, UnknownName
 from harness.results.cell import Cell, cell_folder, read_content, row_of_content
-from harness.results.content_types import find_impossible_metric
-from harness.results.digests import check_file, check_key, read_result_json
-from harness.results.folder_kind import CELLS_FILE
+from harness.results.files.content_types import find_impossible_metric
+from harness.results.files.digests import check_file, check_key, read_result_json
+from harness.results.files.folder_kind import CELLS_FILE
+from harness.results.files.integrity import check_folder, check_row
 from harness.results.index import INDEX_FILE, CellIndex
-from harness.results.integrity import check_folder, check_row
 from harness.results.manifest import Manifest, flatten
 from harness.results.storage import read_cells
 from harness.score.metrics import DEFINITIONS

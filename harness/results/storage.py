@@ -15,16 +15,16 @@ from harness.core.ranges import check_words
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
-from harness.results.content_types import (
+from harness.results.files.content_types import (
     check_summary_types,
     find_impossible_metric,
     find_impossible_sigma,
     find_impossible_statistic,
 )
-from harness.results.digests import STUDY_FILE, read_result_json, write_result_json
-from harness.results.folder_kind import LOCK_FILE, folder_lock
+from harness.results.files.digests import STUDY_FILE, read_result_json, write_result_json
+from harness.results.files.folder_kind import LOCK_FILE, folder_lock
+from harness.results.files.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.index import CellIndex
-from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.manifest import Manifest
 from harness.results.table import compute_group_statistics, write_table
 
@@ -158,8 +158,8 @@ def write_summary(index: CellIndex, out: Path, statistics: Mapping[str, Any], **
 
     summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason), line_loss
     (see `core.stream_health`; absent where every line let its cell be measured), groups (see
-    `table.compute_group_statistics`) and the given `statistics`: those of `compare.run_statistics` for a run, none for
-    a sweep. The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell was measured. The index
+    `table.compute_group_statistics`) and the given `statistics`: those of `compare.run_summary` for a run, none for a
+    sweep. The outcome is NOT_COMPARABLE if no cell or, because of its line, not every cell was measured. The index
     then gets the digests of the files and its own.
     """
     counts = index.counts()

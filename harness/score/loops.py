@@ -87,7 +87,7 @@ def score_loops(
     """Errors of F configurations (F, 55) against the E true poses that one or more loops relate them to.
 
     `metrics` are those to compute, of `FRAME_METRICS`. The first loop begins with the warm-up. Frames without an
-    estimate, because the method has a lag, are expected and not matched.
+    estimate, because the method waits for later frames, are expected and not matched.
     """
     skeleton, ground_m = estimate_skeleton or truth.skeleton, contact.ground_m(truth) if len(truth.root_m) else 0.0
 

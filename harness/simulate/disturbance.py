@@ -1,7 +1,7 @@
 """Disturbances: named faults of limited duration from which a reconstructor must recover.
 
 Two runs that differ only in their disturbance share every other random draw (`core.seeds`). So the undisturbed run
-shows the error without the fault; `compare.recovery` compares the two.
+shows the error without the fault; `compare.run_summary.recovery` compares the two.
 """
 
 from dataclasses import asdict, dataclass, replace

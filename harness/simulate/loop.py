@@ -15,12 +15,12 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
-from harness.simulate.held_poses import minimum_jerk
+from harness.simulate.calibration_motion import minimum_jerk
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import filter_samples
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.readings import SimulatedReadings
-from harness.simulate.resting_ends import START_S, STOP_S
+from harness.simulate.rest_pieces import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 from harness.stream.is900.codec.samples import DeviceSamples, FilterSamples
@@ -73,7 +73,7 @@ def _simulate_physical_loop(
     session: str,
 ) -> DeviceSamples:
     """Readings of one loop by a physical tracker, which does not stop between take and way back."""
-    trajectory, frames = looping_trajectory(body, take, tracker.rate_hz)
+    trajectory, frames = loop_trajectory(body, take, tracker.rate_hz)
     taken_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     time_s = np.arange(frames)[:, None] / tracker.rate_hz + taken_s[0]
     readings = simulate_readings(
@@ -108,7 +108,7 @@ def _device_samples(
     )
 
 
-def looping_trajectory(body: Body, take: BodyMotion, rate_hz: float) -> tuple[Trajectory, int]:
+def loop_trajectory(body: Body, take: BodyMotion, rate_hz: float) -> tuple[Trajectory, int]:
     """Trajectory of a take and of the way back in one piece, and the number of frames of a round.
 
     A round takes this number of periods of `rate_hz`; then the take begins again with its first position and velocity.

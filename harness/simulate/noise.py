@@ -81,7 +81,7 @@ class Noise:
         clock remain.
         """
         for component in (
-            *(self._worn_and_statistical() if self.physics is None else ()),
+            *(self._body_and_statistical() if self.physics is None else ()),
             *self.position_offset,
             *self.orientation_offset,
             self.dropout,
@@ -91,7 +91,7 @@ class Noise:
             if component is not None:
                 component.apply(readings)
 
-    def _worn_and_statistical(self) -> "tuple[ErrorComponent | None, ...]":
+    def _body_and_statistical(self) -> "tuple[ErrorComponent | None, ...]":
         worn = (self.soft_tissue, self.mount, self.strap_slip, *self.mount_slip)
         return (*worn, self.speed, self.session, self.drift, self.white, self.excursion, self.echo)
 

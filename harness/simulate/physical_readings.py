@@ -15,12 +15,12 @@ from harness.core.calibration import Calibration
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physics.constellation import Constellation, check_reach, load_constellation, middle_of_path_m
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
 from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room, place_room
 from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.worn import BodyMotionSource, Worn
+from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.readings import FilterReadings, SimulatedReadings
 from harness.simulate.trajectory import Trajectory
 from harness.stream.is900.codec.samples import FilterSamples
@@ -55,7 +55,7 @@ def simulate_physical_readings(
     whole = trajectory.with_lead_in(lead_in_s(physics))
     if whole.ends_s == trajectory.duration_s:
         whole = whole.with_lead_out(_LEAD_OUT_S)
-    worn = Worn(
+    displacement = StationDisplacement(
         noise,
         calibration.stations,
         skin_below(trajectory.body.skeleton, mounts, calibration),
@@ -66,16 +66,16 @@ def simulate_physical_readings(
         session=session,
     )
     tracker = PhysicalTracker(
-        BodyMotionSource(whole, calibration, worn),
+        BodyMotionSource(whole, calibration, displacement),
         physics,
         constellation,
         placed,
-        Sight(trajectory.body, placed) if physics.room.shadow else None,
+        LineOfSight(trajectory.body, placed) if physics.room.shadow else None,
         seed=seed,
         take=take,
         session=session,
     )
-    return tracker.measure(time_s), constellation
+    return tracker.measure_take(time_s), constellation
 
 
 def place_constellation(

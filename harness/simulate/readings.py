@@ -36,7 +36,7 @@ class FilterReadings(NamedTuple):
     """(2, E, S, 3) positions of the enhancement modes 1 and 2 [m]."""
     enhanced_tracker_from_station: Floats
     """(2, E, S, 4) unit quaternions of these modes."""
-    hearing_share: Floats
+    coverage_share: Floats
     """(S,) share of the take's slots in which the station has heard three emitters or more within a turn, directly."""
     echo_share: Floats
     """(S,) share of the take's ranges that came from an echo."""
@@ -96,7 +96,7 @@ class SimulatedReadings:
         out: Bools = named & (self.time_s >= from_s) & (self.time_s < to_s)
         return out
 
-    def move(self, offset_m: Floats) -> None:
+    def translate(self, offset_m: Floats) -> None:
         """Add offsets (..., 3) in the tracker's axes to the positions [m]."""
         self.position_m = self.position_m + offset_m
 
@@ -104,7 +104,7 @@ class SimulatedReadings:
         """Rotate orientations by rotation vectors (..., 3) in the tracker's axes [rad]."""
         self.turn = rotations.multiply(rotations.exp(rotation_vector_rad), self.turn)
 
-    def lose(self, lost: Bools) -> None:
+    def hold_last_valid(self, lost: Bools) -> None:
         """Set quality 0 for these readings (N, S); each repeats the last valid reading of its station."""
         self.quality[lost] = 0.0
         valid_row = np.where(lost, 0, np.arange(len(lost))[:, None])

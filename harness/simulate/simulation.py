@@ -152,7 +152,7 @@ def simulate_readings(
     calibration = exact_calibration(trajectory.body, mounts, tracker)
     skin = skin_below(trajectory.body.skeleton, mounts, calibration)
     if noise.physics is None:
-        measured = _measure_ideally(trajectory, calibration, time_s)
+        measured = _ideal_readings(trajectory, calibration, time_s)
     else:
         found, constellation = simulate_physical_readings(
             *(trajectory, mounts, calibration, noise, noise.physics, time_s),
@@ -187,7 +187,7 @@ def simulate_readings(
     return readings
 
 
-def _measure_ideally(trajectory: Trajectory, calibration: Calibration, time_s: Floats) -> dict[str, Any]:
+def _ideal_readings(trajectory: Trajectory, calibration: Calibration, time_s: Floats) -> dict[str, Any]:
     """The fields of readings that depend on the motion, as an ideal tracker measures them."""
     motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
@@ -241,7 +241,7 @@ def _health(
     counts = {f"{name}_share": float(np.mean(hit)) for name, hit in readings.affected.items()}
     if readings.filter is not None:
         for station, hears, echoes in zip(
-            readings.stations, readings.filter.hearing_share, readings.filter.echo_share, strict=True
+            readings.stations, readings.filter.coverage_share, readings.filter.echo_share, strict=True
         ):
             counts |= {hearing_key(station): float(hears), f"{station} echoes": float(echoes)}
     return {

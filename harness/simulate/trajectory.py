@@ -14,11 +14,11 @@ from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.simulate.held_poses import minimum_jerk
-from harness.simulate.resting_ends import (
+from harness.simulate.calibration_motion import minimum_jerk
+from harness.simulate.rest_pieces import (
     START_S,
     STOP_S,
-    extended,
+    extend,
     start_piece,
     stop_piece,
     with_rest_after,
@@ -85,7 +85,7 @@ class Trajectory:
         """The trajectory from -`warm_up_s` [s], where the performer rests in the first pose, then starts to move.
 
         Position and velocity are continuous; the take stays as it is, to the bit. BadInput for a time that is not
-        longer than the start (`resting_ends.START_S`).
+        longer than the start (`rest_pieces.START_S`).
         """
         return self._with_spline(with_rest_before(self._spline, warm_up_s))
 
@@ -115,7 +115,7 @@ class Trajectory:
         again = int(np.searchsorted(self._take.x[1:-1], OVERLAP_S)) + 1
         pieces = [stop_piece(self._take), back.c, sign * start_piece(self._take), sign * self._take.c[:, :again]]
         ends_s = np.concatenate([back.x, [loop_s], loop_s + self._take.x[1 : again + 1]])
-        looped = extended(self._spline, np.concatenate(pieces, axis=1), ends_s)
+        looped = extend(self._spline, np.concatenate(pieces, axis=1), ends_s)
         return self._with_spline(with_rest_after(looped, _LAST_REST_S))
 
     def _with_spline(self, spline: PPoly) -> "Trajectory":

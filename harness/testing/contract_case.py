@@ -16,7 +16,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate, Origin, Status
+from harness.core.estimate import Estimate, Origin, Status, answer_lag
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.reconstruct.contract import Method, Reconstructor, Session
@@ -75,7 +75,7 @@ class ContractCase:
         return np.array([root_m.min(axis=0) - 3.0, root_m.max(axis=0) + 3.0])
 
     def run(self, frames: Frames) -> list[Estimate]:
-        """Estimates of a new session, one for each frame that it answers: all but the last `lag` frames."""
+        """Estimates of a new session, one for each frame that it answers: all but the last if a method waits."""
         return answers_by_frame(self.steps(frames))
 
     def steps(self, frames: Frames) -> list[Estimate]:
@@ -98,8 +98,8 @@ def run_session(session: Session, frames: Frames) -> list[Estimate]:
 
 
 def answers_by_frame(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """The last estimate of each frame that is answered, from those of all steps of a session with a constant lag."""
-    return list(estimates[getattr(estimates[-1], "lag", 0) :])
+    """The last estimate of each frame that is answered, from those of all steps of a session."""
+    return list(estimates[answer_lag(estimates[-1]) :])
 
 
 def stack_qpos(estimates: Sequence[Estimate]) -> Floats:

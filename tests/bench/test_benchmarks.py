@@ -7,10 +7,11 @@ import pytest
 
 from harness.bench import benchmarks
 from harness.bench.cpu_time import hold_cpu_to_limit
+from harness.bench.limits import hold_to_limit, state_verdict
 from harness.bench.startup import DemoTimes, demo_rows
 from harness.errors import MissingExtra, Outcome, UnknownName
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from tests.command import Command
 
 

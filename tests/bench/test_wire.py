@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from harness.bench.cpu_time import overbooked
+from harness.bench.limits import outcome_of
 from harness.bench.wire import LineRun, _last_clock_reset, _losses_and_latency, _pose_times, line_rows
 from harness.bench.wire_device import CASES
 from harness.errors import Outcome
-from harness.results.benchmark_statement import outcome_of
 
 
 def test_records_count_from_the_last_time_that_the_clock_was_zeroed() -> None:

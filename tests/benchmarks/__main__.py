@@ -4,8 +4,9 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from harness.bench.limits import count_missed, outcome_of
 from harness.report.kit.statement_lines import statement_lines
-from harness.results.benchmark_statement import BenchmarkStatement, count_missed, outcome_of
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from tests.benchmarks.leak_check import bench_leak_check
 from tests.benchmarks.live_viewer import bench_live_viewer
 from tests.benchmarks.load import bench_load

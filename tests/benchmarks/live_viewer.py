@@ -15,11 +15,12 @@ from threading import Thread
 import numpy as np
 
 from harness.bench.cpu_time import overbooked
+from harness.bench.limits import hold_to_limit
 from harness.bench.wire import start_device
 from harness.bench.wire_device import SCENARIO
 from harness.core.child_process import PythonProcess
 from harness.errors import HarnessError
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.view.server import EVENTS_PATH
 
 PAIRS = 5

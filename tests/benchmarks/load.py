@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.bench.limits import hold_to_limit
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.mocap.read import amc
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 FRAMES = 5000
 MAX_RATIO = 3.0

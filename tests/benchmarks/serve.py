@@ -18,11 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.bench.cpu_time import overbooked
+from harness.bench.limits import hold_to_limit
 from harness.bench.wire import SECONDS, start_device
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.live.scheduling_jitter import JitterProbe
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.stream.is900.codec import commands
 from harness.stream.is900.codec.items import STANDARD_LIST
 from harness.stream.recording.blocks import RECEIVED

@@ -19,7 +19,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.simulate.held_poses import hold_poses, hold_times_s
+from harness.simulate.calibration_motion import hold_poses, hold_times_s
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame

@@ -9,9 +9,9 @@ import numpy as np
 from harness.core.files import content_key, to_json
 from harness.core.seeds import generator
 from harness.results.cell import IDENTITY, TRAILING_COLUMNS
-from harness.results.digests import file_digest, insert_digest
+from harness.results.files.digests import file_digest, insert_digest
+from harness.results.files.integrity import compute_digests
 from harness.results.index import CellIndex
-from harness.results.integrity import compute_digests
 from harness.results.manifest import Manifest
 from harness.results.reader import CellResult, ResultSet
 from harness.score.metrics import DEFINITIONS, VERSIONS

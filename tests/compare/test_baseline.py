@@ -14,7 +14,7 @@ from harness.compare.comparison import compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.results import storage
-from harness.results.digests import read_result_json, write_result_json
+from harness.results.files.digests import read_result_json, write_result_json
 from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run

@@ -16,7 +16,7 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.compare.comparison import compare_runs
-from harness.compare.expected_orders import ExpectedOrder
+from harness.compare.run_summary.expected_orders import ExpectedOrder
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY

@@ -11,7 +11,7 @@ from harness.cli import main
 from harness.errors import BadFile
 from harness.experiment.status import read_status
 from harness.results.cell import as_row
-from harness.results.folder_kind import folder_lock
+from harness.results.files.folder_kind import folder_lock
 from harness.results.index import CellIndex
 from harness.results.storage import read_cells
 from tests.planted import Plan, planted_run

@@ -42,9 +42,9 @@ from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
 from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.results.findings import read_findings
+from harness.results.findings.paper_findings import read_findings
+from harness.results.findings.placement_findings import read_placement
 from harness.results.index import INDEX_FILE
-from harness.results.placement_findings import read_placement
 from harness.results.reader import load_run
 from harness.results.storage import read_summary
 from harness.simulate.physics.emitters import read_mcf

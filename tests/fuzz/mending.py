@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.toml_file import insert_toml_digest
-from harness.results.digests import insert_digest
+from harness.results.files.digests import insert_digest
+from harness.results.files.integrity import compute_digests
 from harness.results.index import _content_digest
-from harness.results.integrity import compute_digests
 
 
 def _mend_json(path: Path, **digests: Any) -> None:

@@ -282,7 +282,7 @@ def test_a_late_pose_has_the_frame_that_it_answers() -> None:
     assert [pose.root_m[2] for pose in output.poses] == list(range(10)), "each frame once, the last two never"
     assert [pose.number for pose in output.poses] == list(range(10))
     assert np.all(np.diff([pose.measured_s for pose in output.poses]) > 0.0)
-    assert (done.poses, done.lag, done.lag_s) == (10, 2, 0.02)
+    assert (done.poses, done.lag_frames, done.lag_s) == (10, 2, 0.02)
 
 
 def test_the_lag_is_added_to_the_latency() -> None:

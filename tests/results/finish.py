@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_statistics import run_statistics
+from harness.compare.run_summary.run_statistics import run_statistics
 from harness.results import storage
-from harness.results.digests import write_result_json
-from harness.results.folder_kind import LOCK_FILE
+from harness.results.files.digests import write_result_json
+from harness.results.files.folder_kind import LOCK_FILE
 from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
 

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from harness.results.digests import insert_digest
+from harness.results.files.digests import insert_digest
+from harness.results.files.integrity import compute_digests
 from harness.results.index import CellIndex
-from harness.results.integrity import compute_digests
 
 
 def read_json(path: Path) -> dict[str, Any]:

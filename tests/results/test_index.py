@@ -13,7 +13,7 @@ from harness.core import files
 from harness.errors import BadFile, BadInput
 from harness.results import index as index_module
 from harness.results.cell import as_row, cell_folder, write_cell
-from harness.results.folder_kind import folder_lock, is_running
+from harness.results.files.folder_kind import folder_lock, is_running
 from harness.results.index import INDEX_FILE, CellCounts, CellIndex
 from harness.results.storage import read_cells
 from harness.results.table import SUMMARY_METRICS, TIME_COLUMNS, compute_group_statistics, write_table

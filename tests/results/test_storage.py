@@ -19,10 +19,10 @@ from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
 from harness.results.cell import as_row, cell_folder, read_row
-from harness.results.digests import file_digest
-from harness.results.folder_kind import LOCK_FILE
+from harness.results.files.digests import file_digest
+from harness.results.files.folder_kind import LOCK_FILE
+from harness.results.files.integrity import check_row
 from harness.results.index import CellIndex
-from harness.results.integrity import check_row
 from tests.results.finish import finish_run, folder_bytes, make_run, write_run
 from tests.results.rewrite import read_json, rewrite_json, write_json
 
@@ -399,7 +399,7 @@ WRITE_FOR_EVER = """
 import dataclasses, itertools, pathlib, sys
 from harness.results import storage
 from harness.results.cell import as_row
-from harness.results.digests import file_digest
+from harness.results.files.digests import file_digest
 run, key = pathlib.Path(sys.argv[1]), sys.argv[2]
 cell = storage.read_cell(run / "cells" / key)
 for n in itertools.count():

@@ -18,9 +18,9 @@ from harness.experiment.status import read_status
 from harness.report.figures.conditions import read_conditions
 from harness.report.run.data import read_run, read_summary_only
 from harness.results.cell import read_row
-from harness.results.digests import file_digest
+from harness.results.files.digests import file_digest
+from harness.results.files.integrity import check_cells, check_folder
 from harness.results.index import INDEX_FILE, CellIndex
-from harness.results.integrity import check_cells, check_folder
 from harness.results.reader import load_results, load_run
 from harness.results.storage import read_cells
 from tests.command import Command

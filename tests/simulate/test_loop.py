@@ -8,7 +8,7 @@ import pytest
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.motion import BodyMotion
-from harness.simulate.loop import looping_trajectory, simulate_loop
+from harness.simulate.loop import loop_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.is900.codec.items import SHORT_LIST
@@ -83,7 +83,7 @@ def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, BodyMotion]) -> No
 def test_a_round_of_the_looping_trajectory_is_a_whole_number_of_frames(boxer: tuple[Body, BodyMotion]) -> None:
     """It leaves the time for stop, way back and start, and comes back to the first position and velocity."""
     body, take = boxer
-    trajectory, frames = looping_trajectory(body, take, 40.0)
+    trajectory, frames = loop_trajectory(body, take, 40.0)
     loop_s = frames / 40.0
     assert trajectory.duration_s + 1.7 <= loop_s < trajectory.duration_s + 1.7 + 1.0 + 1.0 / 40.0
     assert trajectory.ends_s > loop_s + 0.5

@@ -14,7 +14,7 @@ from harness.simulate.components.soft_tissue import SoftTissueArtefact
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import ConstellationSettings
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.room import Room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sound import Sound

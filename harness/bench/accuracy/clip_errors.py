@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.core import files
 from harness.errors import BadFile, BadInput
-from harness.results.digests import insert_digest, read_result_json
+from harness.results.files.digests import insert_digest, read_result_json
 from harness.results.reader import BASELINES
 
 SCHEMA = 1

@@ -28,13 +28,14 @@ from harness.bench.accuracy.conditions import (
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.bench.common import fresh_methods, run_benchmark_cells
+from harness.bench.limits import outcome_of
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION
 from harness.experiment.methods.remote_method import resolve_method
 from harness.experiment.scenarios.scenario import Scenario
-from harness.results.benchmark_statement import BenchmarkStatement, outcome_of
 from harness.results.cell import cell_folder, read_cell
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.manifest import current_circumstances
 
 _QUICK = "the quick form has one seed and few clips"
@@ -57,7 +58,7 @@ class AccuracyReport:
     statements: Sequence[BenchmarkStatement] = ()
     """The targets, the comparisons with other methods, and the clips that are worse."""
     no_lag: str = ""
-    """Why there are no cells with a lag; "" where there are."""
+    """Why there are no cells with later frames; "" where there are."""
     rankings: Mapping[tuple[str, str], MethodRanking] = field(default_factory=dict)
 
     @property
@@ -77,8 +78,8 @@ def measure_accuracy(
 ) -> AccuracyReport:
     """Run or resume the cells in `out`, and compare `method` with the stored errors and today's other methods.
 
-    `options` are those of `run_benchmark_cells`, whose errors are raised. BadInput for a method with a lag, and when
-    clips or seeds differ from the stored ones.
+    `options` are those of `run_benchmark_cells`, whose errors are raised. BadInput for a method that is not causal, and
+    when clips or seeds differ from the stored ones.
     """
     refuse_lag(method)
     seeds = seeds[:1] if quick else seeds
@@ -90,12 +91,12 @@ def measure_accuracy(
     if results.failures:
         return AccuracyReport(method, stored.title, quick, results.failures)
     by_method = collect_errors(results.rows, out)
-    lag = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
+    later = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
     if quick:
         earlier = _same_clips(earlier, by_method[method])
     statements = [
         *evaluate_targets(earlier, by_method[method]),
-        *(evaluate_lag(with_lag(method), lag, earlier.get(LAGGED_CONDITION, {})) if lag else ()),
+        *(evaluate_lag(with_lag(method), later, earlier.get(LAGGED_CONDITION, {})) if later else ()),
         *compare_methods(method, by_method),
         *find_worse_clips(method, by_method, stored.title, earlier),
     ]
@@ -115,7 +116,7 @@ def clean_commit() -> str:
 
 
 def _plan_supported_lag(method: str, seeds: Sequence[int], quick: bool) -> tuple[list[Scenario], str]:
-    """The scenarios with a fixed lag; none, and why, for a method without that option."""
+    """The scenarios with later frames; none, and why, for a method without that option."""
     resolve_method(method, DEFAULT_ISOLATION)
     try:
         resolve_method(with_lag(method), DEFAULT_ISOLATION)
@@ -154,7 +155,7 @@ def collect_errors(rows: Iterable[Mapping[str, Any]], out: Path) -> dict[str, Er
 
 
 def condition_of(row: Mapping[str, Any]) -> Condition:
-    """The condition of a cell's row; cells with a lag have the condition of those without."""
+    """The condition of a cell's row; cells with later frames have the condition of those without."""
     scenario = "boxing" if row["scenario"] == "boxing_lagged" else row["scenario"]
     return Condition(scenario, row["noise"], row["inputs"], row["varied"].get("disturbance.station", ""))
 

@@ -12,9 +12,10 @@ import numpy as np
 from harness.bench.accuracy.clip_errors import ANGLE, SILENT_ANGLE, ErrorsByCondition
 from harness.bench.accuracy.conditions import COMPARED_METHODS, LIMITING_METHODS, PRESETS, TABLE_SCENARIOS
 from harness.bench.accuracy.targets import require_mean
+from harness.bench.limits import state_verdict
 from harness.compare.paired_statistics import compare_paired
 from harness.compare.ranking import MethodRanking, rank_methods
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 LARGEST_RATIO = 1.05
 """Largest ratio of an error to that of a limiting method on one clip."""

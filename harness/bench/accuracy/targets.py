@@ -15,9 +15,10 @@ from harness.bench.accuracy.clip_errors import (
     ClipErrors,
     ErrorsByCondition,
 )
+from harness.bench.limits import state_verdict
 from harness.core.number_format import format_fixed
 from harness.errors import BadInput
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 
 @dataclass(frozen=True)

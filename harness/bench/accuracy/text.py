@@ -6,10 +6,10 @@ from typing import Any
 from harness.bench.accuracy.clip_errors import JITTER, POSITION, SKATE, TRUE_JITTER, TRUE_SKATE, ErrorsByCondition
 from harness.bench.accuracy.measurement import AccuracyReport
 from harness.bench.accuracy.targets import mean_of
+from harness.bench.limits import count_missed
 from harness.core.number_format import count_noun
 from harness.core.text_table import Table
 from harness.report.kit.statement_lines import statement_lines
-from harness.results.benchmark_statement import count_missed
 
 
 def format_report(report: AccuracyReport) -> str:

@@ -11,8 +11,8 @@ from harness.bench.lab.validated_captures import registration_errors, validate_p
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError
 from harness.experiment.workers.executors import TaskExecutor
-from harness.measure.departures import Departure
-from harness.results.digests import check_key, read_record, write_record
+from harness.measure.reports.departures import Departure
+from harness.results.files.digests import check_key, read_record, write_record
 from harness.results.manifest import source_hash
 from harness.stream.recording.station_readings import CaptureReader
 from harness.study.trust.characterization import characterize_capture

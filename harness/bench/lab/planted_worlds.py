@@ -10,10 +10,11 @@ from itertools import combinations
 import numpy as np
 
 from harness.bench.lab.captures import needed_captures
+from harness.bench.limits import state_verdict
 from harness.bench.stored_errors import METRICS, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_equivalence, judge_pairs
 
 CLIPS = 12

@@ -16,12 +16,13 @@ from harness.bench.lab.captures import (
     planted_scenario,
     station_offset_m,
 )
+from harness.bench.limits import state_verdict
 from harness.body.kinematics import bone_poses
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.measure.pose_series import TruthPoses
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.components.stationary import Clock, SpeedError
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.stream.recording.station_readings import CaptureReader

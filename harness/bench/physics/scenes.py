@@ -17,12 +17,12 @@ from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics.constellation import load_constellation
 from harness.simulate.physics.filter_state import RangingModel, range_variance
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
 from harness.simulate.physics.ranging import Ranges
 from harness.simulate.physics.room import Box, PlacedRoom
 from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sight import Sight
 from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
 
@@ -120,12 +120,12 @@ def track_free_station(
     """Errors of a free station. `make_source` makes equal sources; all emitters are covered in `covered_s` [s]."""
     placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, _ORIGIN_M)
     shade = physics.room.shadow and bool(physics.room.furniture)
-    constellation, sight = load_constellation(physics.constellation), Sight(None, placed) if shade else None
+    constellation, sight = load_constellation(physics.constellation), LineOfSight(None, placed) if shade else None
     tracker = PhysicalTracker(make_source(), physics, constellation, placed, sight, seed=seed, take=STATION)
     if covered_s is not None:
         tracker.ranging = _CoveredEmitters(tracker.ranging, covered_s, tracker.schedule.slot_s)
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
-    readings, true = tracker.measure(time_s[:, None]), make_source().advance(time_s)
+    readings, true = tracker.measure_take(time_s[:, None]), make_source().sample_motion(time_s)
     turns = readings.tracker_from_station, true.tracker_from_station
     return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
 
@@ -141,8 +141,8 @@ class _CoveredEmitters:
     def __init__(self, ranging: RangeSource, covered_s: tuple[float, float], slot_s: float) -> None:
         self._ranging, self._covered_s, self._slot_s = ranging, covered_s, slot_s
 
-    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
-        ranges = self._ranging.measure(first_slot, motion, qpos)
+    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        ranges = self._ranging.measure_ranges(first_slot, motion, qpos)
         time_s = (first_slot + np.arange(len(ranges.emitter))) * self._slot_s
         covered = (time_s >= self._covered_s[0]) & (time_s < self._covered_s[1])
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))

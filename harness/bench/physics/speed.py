@@ -15,6 +15,7 @@ import numpy as np
 
 from harness.bench import common
 from harness.bench.cpu_time import time_cpu
+from harness.bench.limits import hold_to_limit
 from harness.bench.peak_memory import peak_bytes
 from harness.body import retargeting
 from harness.body.humanoid import Body
@@ -22,7 +23,7 @@ from harness.body.mounts import DEFAULT_MOUNTS, Mount
 from harness.core.child_process import run_python
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
-from harness.results.benchmark_statement import BenchmarkStatement, hold_to_limit
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.components.stationary import Clock
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.physics import physical_tracker

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from harness.bench.limits import state_verdict
 from harness.bench.physics.scenes import (
     BOARD,
     BYSTANDER,
@@ -30,7 +31,7 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.measure.episodes import find_excursions
-from harness.results.benchmark_statement import BenchmarkStatement, state_verdict
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.sound import speed_of_sound_m_s
 from harness.simulate.readings import GRAVITY_M_S2
@@ -238,7 +239,7 @@ def _at_speed(seed: int, speed_m_s: float) -> StationErrors:
     if speed_m_s:
         seconds = _PATH_M / speed_m_s
         return track_free_station(lambda: free_source(seed, seconds, speed_m_s, physics), seconds, physics, seed)
-    path = free_source(seed, _PATH_M, 1.0, physics).advance(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
+    path = free_source(seed, _PATH_M, 1.0, physics).sample_motion(np.linspace(0.0, _PATH_M, _PLACES, endpoint=False))
     parts = []
     for place in range(_PLACES):
         pose = path.position_m[place, 0], path.tracker_from_station[place, 0]

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from harness.body.mounts import Mount
-from harness.compare.expected_orders import ExpectedOrder
+from harness.compare.run_summary.expected_orders import ExpectedOrder
 from harness.core.fields import replace_fields
 from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields
 from harness.core.split import StatisticalUnit
@@ -110,12 +110,12 @@ class Scenario:
     """Errors from their causes instead of the statistical ones (docs/is900.md 16): the table [physics], which may be
     empty. The noise preset then selects the causes."""
     disturbance: Disturbance = field(default_factory=Disturbance)
-    """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.compare.recovery`)."""
+    """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.compare.run_summary`)."""
     vary: dict[Text, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]. Everything runs with each value,
     or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
-    """Rankings that papers state (see `harness.compare.expected_orders`)."""
+    """Rankings that papers state (see `harness.compare.run_summary.expected_orders`)."""
     unit: StatisticalUnit = "performer"
     """What statistics of the results count. Clips of one performer are not independent. `clip` is for test clips of too
     few performers: every page then says that its statements hold for these performers only."""

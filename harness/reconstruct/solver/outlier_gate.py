@@ -2,7 +2,7 @@
 
 A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. A reading jumps when it is far
 from two predictions at constant velocity, one of the estimated body and one of the station's own readings. Neither
-suffices alone. The body may lag behind a punch, and readings that were left out predict nothing.
+suffices alone. The body may be late in a punch, and readings that were left out predict nothing.
 
 True motion at 40 Hz is more than 10 cm from its own prediction in 27 of 215,790 readings of CMU's library. So after a
 first jump the next reading decides. A punch goes on with the velocity of the jump; an echo goes on with the velocity

@@ -13,10 +13,10 @@ from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.error_lines import CONTROL, Highlights, choose_highlights, find_series
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
-from harness.report.run.data import Row, RunData, Trace, lag_of, last_varied, read_traces, series_name
+from harness.report.run.data import Row, RunData, Trace, last_varied, read_traces, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
-from harness.results.cell import varied_text
-from harness.results.integrity import check_cells, check_folder
+from harness.results.cell import lag_of, varied_text
+from harness.results.files.integrity import check_cells, check_folder
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.results.storage import read_summary
@@ -31,7 +31,8 @@ RANKING_METRICS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class RunCondition:
-    """One combination of varied values, known or new performers, and one lag: its cells are ranked together."""
+    """One combination of varied values, known or new performers, and one number of later
+    frames: its cells are ranked together."""
 
     setting: Mapping[str, Any]
     group: RankingGroup
@@ -125,7 +126,7 @@ def read_conditions(folder: Path) -> ConditionSet:
             keys.append(key)
     groups = {group for _, group in keys}
     several = [len({getattr(group, name) for group in groups}) > 1 for name in RankingGroup._fields]
-    keys.sort(key=lambda key: key[1].lag)
+    keys.sort(key=lambda key: key[1].lag_frames)
     conditions = (_condition(*key, several, summary) for key in keys)
     return ConditionSet(folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"])
 
@@ -135,11 +136,11 @@ def _condition(
 ) -> RunCondition:
     several_performers, several_lags = several
     performers = f"{group.performer} performers" if several_performers and group.performer else ""
-    lag = (name_lag(group.lag) if group.lag else "no lag") if several_lags else ""
+    later = name_lag(group.lag_frames) if several_lags else ""
     return RunCondition(
         varied,
         group,
-        tuple(part for part in (varied_text(varied), performers, lag) if part),
+        tuple(part for part in (varied_text(varied), performers, later) if part),
         tuple(row for row in summary["cells"] if (row["varied"], _group_of(row)) == (varied, group)),
         tuple(row for row in summary["methods"] if row["performer"] == group.performer),
         Sampling.of_summary(summary),
@@ -195,7 +196,7 @@ def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondit
             clips = dict.fromkeys(clip for each in run.conditions for clip in each.clips)
             raise UnknownName("clip of the run", selection.clip, clips)
     last = chosen[-1].setting
-    return next(each for each in chosen if each.setting == last and each.group.lag == chosen[0].group.lag)
+    return next(each for each in chosen if each.setting == last and each.group.lag_frames == chosen[0].group.lag_frames)
 
 
 def rank_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:

@@ -13,8 +13,9 @@ from harness.compare.units import Sampling, average_units, count_clips
 from harness.core.number_format import format_number
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
+from harness.report.kit.ranking import LAG_COLUMN
 from harness.results.cell import varied_text
-from harness.results.folder_kind import require_kind
+from harness.results.files.folder_kind import require_kind
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -69,7 +70,7 @@ class ResultsTable:
     """A table of a run."""
 
     condition_names: tuple[str, ...]
-    """What distinguishes conditions: keys that vary, performers, lag, behaviour; empty if there is one condition."""
+    """What distinguishes conditions: keys that vary, performers, later frames, behaviour; empty for one condition."""
     metrics: tuple[str, ...]
     rows: tuple[ResultsRow, ...]
     """The rows of a condition follow each other."""
@@ -121,7 +122,7 @@ def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
     groups = {each.group for each in run.conditions}
     further = {
         "performers": len({group.performer for group in groups}) > 1,
-        "lag": len({group.lag for group in groups}) > 1,
+        LAG_COLUMN: len({group.lag_frames for group in groups}) > 1,
         "behaviour": by_behaviour,
     }
     return (*keys, *(name for name, shown in further.items() if shown))
@@ -130,7 +131,7 @@ def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
 def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -> str:
     texts = {
         "performers": condition.group.performer,
-        "lag": str(condition.group.lag),
+        LAG_COLUMN: str(condition.group.lag_frames),
         "behaviour": (behaviour or "").replace("_", " "),
     }
     return texts[name] if name in texts else varied_text({name: condition.setting[name]}).removeprefix(f"{name}=")

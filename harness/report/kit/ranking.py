@@ -18,12 +18,16 @@ BOLD_NOTE = " Bold: better than every other method, by the rules of harness comp
 """End of the caption of a table with bold cells."""
 LAG_NOTE = "Methods that wait for later frames are ranked apart from causal ones, each lag for itself."
 """Sentence of pages and tables with methods of several lags."""
+LAG_COVERAGE = " A method with a lag leaves the last frames of a take unanswered."
+"""End of the caption of a table of coverage with such methods."""
+LAG_COLUMN = "lag"
+"""Heading of a column with the lags of methods [frames]."""
 _MOST_NAMED = 4
 
 
-def name_lag(lag: int) -> str:
+def name_lag(frames: int) -> str:
     """A lag in words, such as "a lag of 2 frames"."""
-    return f"a lag of {count_noun(lag, 'frame')}"
+    return f"a lag of {count_noun(frames, 'frame')}" if frames else "no lag"
 
 
 def describe_ranking(ranking: MethodRanking, where: str, format_error: Callable[[float], str]) -> str:

@@ -9,7 +9,7 @@ from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, Figure, series_colour
 from harness.report.kit.text import metric_label, metric_name
-from harness.results.trust_findings import (
+from harness.results.findings.trust_findings import (
     Equivalence,
     EquivalenceVerdict,
     ErrorDistance,

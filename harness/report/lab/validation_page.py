@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed, format_number, format_share
-from harness.measure.validation_report import ResidualSeries, ValidationReport
+from harness.measure.reports.validation_report import ResidualSeries, ValidationReport
 from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section

@@ -13,8 +13,8 @@ from harness.report.figures.print_figure import PrintFigure
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale, note_size
 from harness.report.kit.text import metric_name
 from harness.report.placement.wording import measured_errors, set_name
-from harness.results.folder_kind import FINDINGS
-from harness.results.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
 
 _BEST, _TIED = COLOURS[1], COLOURS[0]
 _LETTERS_PER_IN, _FEWEST_LETTERS, _AXES_SHARE = 11.2, 8, 0.75

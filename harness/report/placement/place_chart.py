@@ -13,7 +13,7 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import FAINT, Chart, Figure
 from harness.report.placement.body_map import label_places, render_body
 from harness.report.placement.wording import plain_name
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 
 _HEIGHT_IN = 4.6
 

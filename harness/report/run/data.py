@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.run_statistics import GROUP_KEYS
+from harness.compare.run_summary.run_statistics import GROUP_KEYS
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import training_note
 from harness.report.kit.style import STYLES
-from harness.results.cell import OPTIONAL_COLUMNS, Cell, as_row, cell_folder, setting_text
-from harness.results.integrity import SUMMARY, check_cells, check_folder, check_row
+from harness.results.cell import Cell, as_row, cell_folder, lag_of, setting_text
+from harness.results.files.integrity import SUMMARY, check_cells, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.score.angles import hinge_errors_deg, local_errors_deg
@@ -106,7 +106,7 @@ class RunData:
 
     @cached_property
     def lags(self) -> Mapping[str, int]:
-        """Series -> lag of its method [frames]."""
+        """Series -> number of later frames that its method uses."""
         return {self.series_of(row): lag_of(row) for row in self.summary["methods"]}
 
     @cached_property
@@ -161,15 +161,10 @@ def _cell_of_row(run: RunData, row: Row) -> Cell:
     return cell
 
 
-def lag_of(row: Row) -> int:
-    """Lag of the method of a row [frames]; rows of versions without lags are of causal methods."""
-    return int(row.get("lag", OPTIONAL_COLUMNS["lag"]))
-
-
 def series_name(row: Row, rows: Sequence[Row]) -> str:
     """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary.
 
-    It states the lag of the method if the method's own name does not, and training data other than the examples.
+    It states how many later frames the method uses if its own name does not, and training data other than the examples.
     """
     note = note_of(row, rows)
     parts = [note] if note else []

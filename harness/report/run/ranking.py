@@ -14,8 +14,8 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.ranking import LAG_NOTE, RankingPanel, describe_ranking, draw_ranking, explain_marks, name_lag
 from harness.report.kit.style import Chart
 from harness.report.kit.text import metric_name
-from harness.report.run.data import Row, RunData, lag_of, last_varied, series_name
-from harness.results.cell import setting_text
+from harness.report.run.data import Row, RunData, last_varied, series_name
+from harness.results.cell import lag_of, setting_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -24,14 +24,14 @@ class RankingGroup(NamedTuple):
     """Series that are ranked together. Known and new performers have different clips; lags are different tasks."""
 
     performer: str
-    lag: int
+    lag_frames: int
     """Lag of the methods [frames]."""
 
 
 GroupedValues = Mapping[RankingGroup, Mapping[str, ClipValues]]
-"""Group -> series -> metric -> clip -> mean over its cells; causal methods are before those with a lag."""
+"""Group -> series -> metric -> clip -> mean over its cells; causal methods come first."""
 UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
-"""Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
+"""Metrics whose lowest value is not the best: the truth has jitter too, and `lag_ms` has a sign."""
 _WIDTH_IN, _MOST_ROWS = 6.4, 14
 """Width of a chart [in]; most methods of a chart, those with the lowest errors."""
 
@@ -110,10 +110,10 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
             f" by {group.performer} performers" if several and group.performer else ""
         )
         where += f", with {setting}" if setting else ""
-        where += f", with {name_lag(group.lag)}" if group.lag else ""
+        where += f", with {name_lag(group.lag_frames)}" if group.lag_frames else ""
         text = describe_ranking(ranking, where, lambda error: f"{error:.2f}°")
         found.append((text, ranking.lowest))
-    if len({group.lag for group in groups}) > 1:
+    if len({group.lag_frames for group in groups}) > 1:
         found.append((LAG_NOTE, None))
     return found
 
@@ -129,7 +129,7 @@ def ranking_charts(run: RunData) -> list[Chart]:
 
 def _chart_title(group: RankingGroup, several: bool) -> str:
     parts = [f"{group.performer} performers"] if several and group.performer else []
-    return ", ".join([*parts, *([name_lag(group.lag)] if group.lag else [])])
+    return ", ".join([*parts, *([name_lag(group.lag_frames)] if group.lag_frames else [])])
 
 
 def _ranking_chart(number: int, title: str, ranking: MethodRanking) -> Chart:

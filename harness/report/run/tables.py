@@ -9,7 +9,7 @@ from harness.compare.units import Sampling
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import NOT_MEASURED, count_noun, format_number, format_share
 from harness.report.kit.page import Block, BrowserOnly, Code, DataTable, Prose, Stack, Strong
-from harness.report.kit.ranking import BOLD_NOTE, LAG_NOTE
+from harness.report.kit.ranking import BOLD_NOTE, LAG_COVERAGE, LAG_NOTE
 from harness.report.kit.text import format_statistic, last_line
 from harness.report.run.data import Row, RunData, Trace
 from harness.report.run.metric_columns import SIGMA_COLUMNS, format_sigma_scores
@@ -42,7 +42,6 @@ _COVERAGE = (
     "Bridged: there was no reading. Not finite: the estimate is no number and counts as not matched. The last column "
     "is the share of fallbacks where every station has reported for 0.5 s."
 )
-_LAG_COVERAGE = " A method with a lag leaves the last frames of a take unanswered."
 _SIGMA = (
     "Standard deviations that methods state for the hinge angles, pooled over the scored frames and the hinges of each "
     "behaviour. Normal errors with the stated deviations would lie within one in 68 % and within two in 95 %. The log "
@@ -81,8 +80,8 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Group
     notes = {run.series_of(row): _fallback_note(row) for row in run.summary["methods"]}
     rows = [[Stack(name, notes.get(name, "")), *(cell(name, column) for column in values)] for name in run.ranked]
     bold = BOLD_NOTE if any(best.values()) else ""
-    lag = f" {LAG_NOTE}" if len({group.lag for of in values.values() for group in of}) > 1 else ""
-    caption = f"{DEFINITIONS[metric].text}. Mean ± sd over n sequences.{bold}{lag}"
+    apart = f" {LAG_NOTE}" if len({group.lag_frames for of in values.values() for group in of}) > 1 else ""
+    caption = f"{DEFINITIONS[metric].text}. Mean ± sd over n sequences.{bold}{apart}"
     return DataTable(["method", *titles], rows, f"{metric} [{unit}]:", caption, metric)
 
 
@@ -154,7 +153,7 @@ def _coverage_table(run: RunData) -> DataTable:
         rows.append([run.series_of(row), row["sequences"], matched, expected, share, *others, undisturbed])
     head = ["method", "sequences", "frames matched", "expected", "share", "held", "lost", "fallback", "bridged"]
     head += ["not finite", "fallback, undisturbed"]
-    caption = _COVERAGE + (_LAG_COVERAGE if any(run.lags.values()) else "")
+    caption = _COVERAGE + (LAG_COVERAGE if any(run.lags.values()) else "")
     return DataTable(head, rows, caption=caption, label="coverage")
 
 

@@ -10,11 +10,11 @@ from harness.core.text_table import Table
 from harness.report.kit.page_text import block_lines
 from harness.report.kit.text import last_line, name_motion
 from harness.report.run.calibration import calibration_tables
-from harness.report.run.data import lag_of, note_of
+from harness.report.run.data import note_of
 from harness.report.run.expectations import expected_orders, recovery_table
 from harness.report.run.metric_columns import TABLE_COLUMNS, sigma_lines
 from harness.report.run.ranking import describe_rankings
-from harness.results.cell import varied_text
+from harness.results.cell import lag_of, varied_text
 from harness.results.reported_metrics import (
     MAX_FALLBACK_SHARE,
     PRIMARY_METRIC,

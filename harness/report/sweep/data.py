@@ -16,9 +16,9 @@ from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import name_with_lag
 from harness.core.split import training_note
-from harness.results.cell import varied_text
+from harness.results.cell import lag_of, varied_text
+from harness.results.files.integrity import check_folder
 from harness.results.index import CellIndex
-from harness.results.integrity import check_folder
 from harness.results.manifest import Manifest
 from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
@@ -154,7 +154,7 @@ def read_sweep(out: Path) -> SweepData:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
             index.columns(*_COLUMNS),
-            lags=(values["lag"] for values in index.optional()),
+            lags=map(lag_of, index.optional()),
             name=str(facts.get("name", out.name)),
             planned=counts.planned,
             failures=failures,
@@ -177,16 +177,16 @@ def collect_cells(
 ) -> SweepData:
     """The data of a sweep from its cells, each a row of the index's columns.
 
-    `lags` has the lag of the method of each cell [frames], by default 0. `sampling` and `training_data` are
-    those of the manifest.
+    `lags` has the number of later frames that the method of each cell uses, by default 0. `sampling` and
+    `training_data` are those of the manifest.
     """
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
     figures: list[Sequence[float | None]] = []
     lag_of_group: dict[int, int] = {}
-    for (scenario, clip, method, *others), lag in zip(cells, repeat(0) if lags is None else lags, strict=False):
-        group = (name_with_lag(method, lag), *others[: len(_GROUP_COLUMNS)])
-        lag_of_group.setdefault(groups.code(group), lag)
+    for (scenario, clip, method, *others), frames in zip(cells, repeat(0) if lags is None else lags, strict=False):
+        group = (name_with_lag(method, frames), *others[: len(_GROUP_COLUMNS)])
+        lag_of_group.setdefault(groups.code(group), frames)
         varied, *metrics = others[len(_GROUP_COLUMNS) :]
         clip_code = clips.code(f"{scenario}: {clip}")
         codes.append((scenarios.code(scenario), clip_code, groups.code(group), values.code(varied)))

@@ -194,7 +194,7 @@ def _mean_text(statistic: Statistic, metric: str, column_clips: int) -> str:
 
 
 def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]]) -> set[int]:
-    """The rows that are better than every other one, for each kind of performer and each lag.
+    """The rows that are better than every other one, for each kind of performer and each number of later frames.
 
     A row is a series and its cells.
     """

@@ -30,7 +30,7 @@ def progress_sentence(sweep: SweepData) -> str:
 
 
 def _best(sweep: SweepData) -> str:
-    """The sentences on the best series, separately for known and new performers and for each lag."""
+    """The sentences on the best series, separately for known and new performers and for each number of later frames."""
     groups: dict[str, dict[str, ClipValues]] = {}
     for n, (name, performer) in enumerate(zip(sweep.series, sweep.performers, strict=True)):
         values = sweep.clip_values(sweep.select(series=n), GATED_METRICS)
@@ -39,16 +39,16 @@ def _best(sweep: SweepData) -> str:
     if not groups:
         return "Nothing was measured." if len(sweep) else ""
     lags = dict(zip(sweep.series, sweep.lags, strict=True))
-    parts = [(lag, values) for group in groups.values() for lag, values in split_by_lag(group, lags).items()]
-    sentences = [_best_of(values, lag, sweep.sampling) for lag, values in sorted(parts, key=lambda part: part[0])]
-    return " ".join([*sentences, *([LAG_NOTE] if len({lag for lag, _ in parts}) > 1 else [])])
+    parts = [part for group in groups.values() for part in split_by_lag(group, lags).items()]
+    sentences = [_best_of(values, frames, sweep.sampling) for frames, values in sorted(parts, key=lambda part: part[0])]
+    return " ".join([*sentences, *([LAG_NOTE] if len({frames for frames, _ in parts}) > 1 else [])])
 
 
-def _best_of(values: Mapping[str, ClipValues], lag: int, sampling: Sampling) -> str:
+def _best_of(values: Mapping[str, ClipValues], frames: int, sampling: Sampling) -> str:
     ranking = rank_methods(values, PRIMARY_METRIC, sampling)
     if ranking is None:
         return f"{list_first(list(values))} share no measured clip, so they are not ranked."
-    where = count_clips(ranking.clips, sampling) + (f", with {name_lag(lag)}" if lag else "")
+    where = count_clips(ranking.clips, sampling) + (f", with {name_lag(frames)}" if frames else "")
     return describe_ranking(ranking, where, _format_error)
 
 

@@ -31,7 +31,7 @@ class LostStation:
         left = np.clip((self.from_s - readings.time_s[:, row]) / max(self.fade_s, 1e-9), 1.0 / 255.0, 1.0)
         fading = readings.time_s[:, row] < self.from_s
         readings.quality[fading, row] = np.minimum(readings.quality[fading, row], left[fading])
-        readings.lose(lost)
+        readings.hold_last_valid(lost)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from harness.core.ranges import CheckedFields, Range
 from harness.core.skeleton import Skeleton
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
-_FASTER_INWARD = 2.0
+_NORMAL_FREQUENCY_RATIO = 2.0
 """Ratio of the natural frequency normal to the skin to that along it: above 1 by Wakeling & Nigg 2001 [choice]."""
 
 
@@ -56,7 +56,7 @@ class SoftTissueArtefact(CheckedFields):
 def natural_frequency_rad_s(component: SoftTissueArtefact, tissue_m: Floats) -> Floats:
     """(S, 3) natural frequency along each axis of stations on tissue of these thicknesses (S,) [rad/s]."""
     frequency_hz = component.frequency_hz * np.sqrt(component.reference_tissue_m / tissue_m)
-    out: Floats = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
+    out: Floats = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _NORMAL_FREQUENCY_RATIO])
     return out
 
 

@@ -24,7 +24,7 @@ class WhiteNoise(CheckedFields):
     def apply(self, readings: SimulatedReadings) -> None:
         draws = [readings.take_rng("white", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]
         noise: Floats = np.stack(draws, axis=1)
-        readings.move(self.position_m * noise[..., :3])
+        readings.translate(self.position_m * noise[..., :3])
         readings.rotate(self.orientation_rad * noise[..., 3:])
 
 
@@ -49,12 +49,12 @@ class DriftNoise(CheckedFields):
     def apply(self, readings: SimulatedReadings) -> None:
         draws = [readings.take_rng("slow", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]
         wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (readings.rate_hz * self.correlation_s))))
-        readings.move(self.position_m * wander[..., :3])
+        readings.translate(self.position_m * wander[..., :3])
         readings.rotate(np.array([self.pitch_roll_rad, self.pitch_roll_rad, self.yaw_rad]) * wander[..., 3:])
 
 
 def gauss_markov(white: Floats, correlation: float) -> Floats:
-    """Gauss-Markov sequences (N, ...) of unit variance and the given lag-1 correlation, from white noise."""
+    """Gauss-Markov sequences (N, ...) of unit variance and the given correlation of neighbours, from white noise."""
     out: Floats = white * np.sqrt(1.0 - correlation**2)
     out[:1] = white[:1]
     for previous, row in pairwise(out.reshape(len(out), -1)):
@@ -92,7 +92,7 @@ class SpeedError(CheckedFields):
     """Time by which positions run ahead of the record's time stamp [s]; negative lags."""
 
     def apply(self, readings: SimulatedReadings) -> None:
-        readings.move(self.ahead_s * readings.velocity_m_s)
+        readings.translate(self.ahead_s * readings.velocity_m_s)
 
 
 @dataclass(frozen=True)

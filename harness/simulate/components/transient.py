@@ -9,11 +9,11 @@ from harness.core.arrays import Floats
 from harness.core.ranges import CheckedFields, Range, check_fields
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
-MOST_AT_ONCE = 1000.0
+MOST_EXCURSIONS = 1000.0
 """Most excursions of one station at once, on average [choice]; each is drawn."""
 _WARM_UP = 64
 """Readings simulated before the take, so that it may begin inside a burst."""
-MOST_PER_S = 100.0
+MOST_GAPS_PER_S = 100.0
 """Most gaps of one station in a second, on average [choice]; each is drawn."""
 
 
@@ -37,7 +37,7 @@ class Excursion:
     def __post_init__(self) -> None:
         check_fields(self)
         longest_min = (self.stay_s[1] + self.ramp_s) / 60.0
-        check_fields(self, onsets_per_min=Range(0.0, MOST_AT_ONCE / max(longest_min, 1e-3)))
+        check_fields(self, onsets_per_min=Range(0.0, MOST_EXCURSIONS / max(longest_min, 1e-3)))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)
@@ -131,7 +131,7 @@ class Dropout:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        check_fields(self, share=Range(0.0, MOST_PER_S * 0.5 * sum(self.gap_s)))
+        check_fields(self, share=Range(0.0, MOST_GAPS_PER_S * 0.5 * sum(self.gap_s)))
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = np.zeros(readings.time_s.shape, bool)
@@ -149,7 +149,7 @@ class Dropout:
                 coasting[:, row] |= coast
                 lost[:, row] |= (time_s >= begin_s) & (time_s < end_s)
                 sighted_s = end_s
-        readings.lose(lost)
+        readings.hold_last_valid(lost)
         readings.affected["coast"] = coasting & ~lost
 
     def gaps(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:

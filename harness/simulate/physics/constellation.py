@@ -118,11 +118,11 @@ class Constellation:
         """The reply to `MCF`."""
         return b"".join(emitter.line() for emitter in self.emitters)
 
-    def shifted(self, offset_m: Floats) -> "Constellation":
+    def translate(self, offset_m: Floats) -> "Constellation":
         """The constellation moved by an offset (3,) in the tracker's axes [m]."""
         return replace(self, position_m=self.position_m + offset_m)
 
-    def surveyed(self, sd_m: float, seed: int, session: str) -> "Constellation":
+    def with_survey_error(self, sd_m: float, seed: int, session: str) -> "Constellation":
         """The constellation at its true positions, which differ from the surveyed ones that the device knows.
 
         Errors are normal, of `sd_m` along each axis [m], for a whole session. Each emitter has its own generator.
@@ -140,11 +140,11 @@ def load_constellation(settings: ConstellationSettings) -> Constellation:
     """
     if settings.file and not settings.emitters:
         raise BadInput(f"constellation.file = {settings.file!r} has not been read.", "Load the scenario from its file.")
-    emitters = settings.emitters or read_mcf(shipped_constellation(settings.name))
+    emitters = settings.emitters or read_mcf(constellation_path(settings.name))
     return Constellation.of_emitters(emitters, float(np.deg2rad(settings.cone_deg)), settings.range_m)
 
 
-def shipped_constellation(name: str) -> Path:
+def constellation_path(name: str) -> Path:
     """The file of a shipped constellation; UnknownName."""
     shipped = {path.stem: path for path in sorted((data_folder("models") / "constellations").glob(f"*{MCF_SUFFIX}"))}
     if name not in shipped:

@@ -11,12 +11,12 @@ from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation, middle_of_path_m
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.room import Room, place_room
-from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.sound import Sound, level_db, threshold_db
 from harness.simulate.trajectory import Trajectory
 
-ENOUGH = 3
+FIX_RANGES = 3
 """Number of ranges that a position needs."""
 LARGEST_DILUTION = 10.0
 """Largest dilution of precision that counts as a fix [choice]: 4 mm of a range then make 4 cm."""
@@ -24,7 +24,7 @@ PLAN_POINTS = 121
 """Places along each axis of a plan view [choice]."""
 _MARGIN_M = 2.0
 """Width of the strip around the emitters in a plan view [m] [choice]."""
-_NO_FIX = 1e-9
+_SINGULAR = 1e-9
 """Determinant of the normal matrix below which ranges fix no position: the emitters lie in a plane with the station."""
 MOST_SAMPLES = 600
 """Most instants of a clip that are looked at [choice]."""
@@ -42,7 +42,7 @@ def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
     (xx, xy, xz), (yy, yz), (zz,) = ([np.sum(g[..., a] * g[..., b], axis=-1) for b in range(a, 3)] for a in range(3))
     minors = xx * yy - xy**2 + xx * zz - xz**2 + yy * zz - yz**2
     determinant = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    fixed = (np.sum(heard, axis=-1) >= ENOUGH) & (determinant > _NO_FIX)
+    fixed = (np.sum(heard, axis=-1) >= FIX_RANGES) & (determinant > _SINGULAR)
     out: Floats = np.sqrt(np.where(fixed, minors, np.nan) / np.where(fixed, determinant, 1.0))
     return out
 
@@ -50,7 +50,7 @@ def dilution_of_precision(unit: Floats, heard: Bools) -> Floats:
 class EmitterCoverage(NamedTuple):
     """Coverage at N places without a body; a station there faces each emitter."""
 
-    heard: Ints
+    emitters: Ints
     """(N,) number of emitters heard."""
     dilution: Floats
     """(N,) dilution of precision; NaN without a fix."""
@@ -58,17 +58,17 @@ class EmitterCoverage(NamedTuple):
     @property
     def share(self) -> float:
         """Share of the places where three emitters or more are heard."""
-        return float(np.mean(self.heard >= ENOUGH))
+        return float(np.mean(self.emitters >= FIX_RANGES))
 
     @property
-    def fixed_share(self) -> float:
+    def fix_share(self) -> float:
         """Share of the places where these ranges fix a position, with a dilution of at most `LARGEST_DILUTION`."""
         return float(np.mean(self.dilution <= LARGEST_DILUTION))
 
     @property
-    def median_heard(self) -> float:
+    def median_emitters(self) -> float:
         """Median number of emitters heard."""
-        return float(np.median(self.heard))
+        return float(np.median(self.emitters))
 
     @property
     def median_dilution(self) -> float:
@@ -110,22 +110,24 @@ class StationCoverage:
     """Coverage of S stations at N instants of a clip."""
 
     stations: tuple[str, ...]
-    heard: Ints
+    emitters: Ints
     """(N, S) number of emitters that one of the station's microphones hears."""
     dilution: Floats
     """(N, S) dilution of precision at the station's origin; NaN without a fix."""
 
     def __post_init__(self) -> None:
-        freeze(self, np.int64, heard=("N", len(self.stations)))
-        freeze(self, dilution=(len(self.heard), len(self.stations)))
+        freeze(self, np.int64, emitters=("N", len(self.stations)))
+        freeze(self, dilution=(len(self.emitters), len(self.stations)))
 
     def shares(self, station: int) -> tuple[float, float, float, float]:
         """Shares of the time in which a station hears no emitter, one, two, and three or more."""
-        counts = np.bincount(np.minimum(self.heard[:, station], ENOUGH), minlength=ENOUGH + 1) / len(self.heard)
+        counts = np.bincount(np.minimum(self.emitters[:, station], FIX_RANGES), minlength=FIX_RANGES + 1) / len(
+            self.emitters
+        )
         none, one, two, enough = map(float, counts)
         return none, one, two, enough
 
-    def fixed_share(self, station: int) -> float:
+    def fix_share(self, station: int) -> float:
         """Share of the time in which a station has a fix, with a dilution of at most `LARGEST_DILUTION`."""
         return float(np.mean(self.dilution[:, station] <= LARGEST_DILUTION))
 
@@ -160,19 +162,19 @@ def station_coverage(
     centred, placed = place_room(room, constellation, centre_m, calibration)
     position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
     turned = rotations.multiply(tracker_from_world, stations.world_from_station)
-    sight = Sight(body, placed) if room.shadow else None
+    sight = LineOfSight(body, placed) if room.shadow else None
     heard = np.empty((count, len(calibration.stations), len(constellation)), dtype=bool)
     for n in range(count):
         if sight is not None:
-            sight.set(qpos[n])
-        heard[n] = heard_emitters(centred, position_m[n], turned[n], sound, sight)
+            sight.pose_body(qpos[n])
+        heard[n] = audible_emitters(centred, position_m[n], turned[n], sound, sight)
     ray_m = position_m[:, :, None] - centred.position_m
     unit = ray_m / np.sqrt(np.sum(ray_m**2, axis=-1, keepdims=True))
     return StationCoverage(calibration.stations, heard.sum(axis=-1), dilution_of_precision(unit, heard))
 
 
-def heard_emitters(
-    constellation: Constellation, position_m: Floats, turned: Floats, sound: Sound, sight: Sight | None
+def audible_emitters(
+    constellation: Constellation, position_m: Floats, turned: Floats, sound: Sound, sight: LineOfSight | None
 ) -> Bools:
     """(S, J) which emitters a microphone of each station hears.
 
@@ -194,6 +196,6 @@ def heard_emitters(
             level = level_db(distance_m[each], emitter_cos[each], station_cos[each], sound.absorption_db_per_m)
             near[each] = level >= least_db
         if sight is not None and near.any():
-            near[near] = ~sight.blocked(at_m, microphones_m[near])
+            near[near] = ~sight.occlusion(at_m, microphones_m[near])
         out[:, emitter] = near.any(axis=1)
     return out

@@ -47,7 +47,7 @@ class EmitterFault(NamedTuple):
 def find_emitter_fault(emitters: Sequence[Emitter]) -> EmitterFault | None:
     """The first fault of J emitters; None if they can be used."""
     for index, emitter in enumerate(emitters):
-        if fault := _own_fault(index, emitter) or _repetition(index, emitter, emitters[:index]):
+        if fault := _emitter_fault(index, emitter) or _duplicate_fault(index, emitter, emitters[:index]):
             return fault
         if index == MOST:
             return EmitterFault(index, f"more than {MOST} emitters", f"{FEWEST} to {MOST}")
@@ -57,7 +57,7 @@ def find_emitter_fault(emitters: Sequence[Emitter]) -> EmitterFault | None:
     return None
 
 
-def _own_fault(index: int, emitter: Emitter) -> EmitterFault | None:
+def _emitter_fault(index: int, emitter: Emitter) -> EmitterFault | None:
     if not 1 <= emitter.number <= _LARGEST_NUMBER or not 0 <= emitter.identity <= _LARGEST_NUMBER:
         found = f"emitter {emitter.number} with the identity {emitter.identity}"
         return EmitterFault(index, found, f"a number from 1 and an identity from 0, up to {_LARGEST_NUMBER:,}")
@@ -71,7 +71,7 @@ def _own_fault(index: int, emitter: Emitter) -> EmitterFault | None:
     return None
 
 
-def _repetition(index: int, emitter: Emitter, before: Sequence[Emitter]) -> EmitterFault | None:
+def _duplicate_fault(index: int, emitter: Emitter, before: Sequence[Emitter]) -> EmitterFault | None:
     for other in before:
         if other.number == emitter.number:
             return EmitterFault(index, f"a second emitter {emitter.number}", "a number of its own for each emitter")

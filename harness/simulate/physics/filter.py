@@ -10,29 +10,29 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate
-from harness.simulate.physics.acquisition import add_force, fix, level_attitude
-from harness.simulate.physics.filter_record import MODES, add_to_offset, write_record
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, Scratch, range_variance
+from harness.simulate.physics.acquisition import integrate_path, level_attitude, solve_position
+from harness.simulate.physics.filter_record import MODES, add_to_offset, decay_slot, write_record
+from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, Workspace, range_variance
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.strapdown import (
     ERRORS,
     MOTION_ERRORS,
-    add_noise,
+    add_process_noise,
     add_tick,
     attitude,
     attitude_sigma_rad,
     integrate,
+    joseph_update,
     position_sigma_m,
     project,
-    propagate,
+    propagate_covariance,
     reset_attitude,
     set_attitude,
-    update,
 )
-from harness.simulate.physics.tracking_state import CONFIRMING, LOST, finish_slot
+from harness.simulate.physics.tracking_status import LOST, TENTATIVE, update_status
 from harness.simulate.readings import GRAVITY_M_S2
 
-_CLIPPED_SHARE = 0.3
+_SATURATION_SHARE = 0.3
 """Standard deviation of what a sensor at its limit leaves out, as a share of the limit [choice]."""
 _CORRELATION_S = 0.2
 """Time over which a motion keeps its direction, and so the error of scale and misalignment its sign [s] [choice]."""
@@ -43,7 +43,7 @@ _ATTEMPT_SLOTS = 8
 
 
 @compiled
-def advance(
+def filter_stations(
     model: FilterModel,
     state: FilterState,
     first_slot: int,
@@ -52,8 +52,8 @@ def advance(
     range_m: Floats,
     outputs: Outputs,
 ) -> None:
-    """Advance all stations over a block of slots; see `FusionFilter.advance`."""
-    scratch = Scratch(
+    """Advance all stations over a block of slots; see `FusionFilter.filter_block`."""
+    work = Workspace(
         np.zeros((9, 9)),
         np.empty((MOTION_ERRORS, ERRORS)),
         np.empty((4, ERRORS)),
@@ -70,24 +70,25 @@ def advance(
             state.motion[s, 0] = state.motion[s, TICKS_PER_SLOT]
             first_turn = as_vector(state.turn_rad_s[s])
             first_acceleration = as_vector(state.acceleration_m_s2[s])
-            predict_slot(model, state, s, inertia, scratch)
+            predict_slot(model, state, s, inertia, work)
             while record < len(outputs.tick) and outputs.tick[record, s] < (slot + 1) * TICKS_PER_SLOT:
                 k = outputs.tick[record, s] - slot * TICKS_PER_SLOT
                 turn, acceleration = first_turn, first_acceleration
                 if k > 0:
-                    by, angles = 1.0 / model.tick_s, scratch.angles
+                    by, angles = 1.0 / model.tick_s, work.angles
                     turn = by * angles[k - 1, 0], by * angles[k - 1, 1], by * angles[k - 1, 2]
                     before, after = state.motion[s, k - 1], state.motion[s, k]
                     acceleration = by * (after[3] - before[3]), by * (after[4] - before[4]), by * (after[5] - before[5])
                 write_record(model, state, s, k, turn, acceleration, outputs, record)
                 record += 1
-            propagate(state.covariance[s], scratch.transition, TICKS_PER_SLOT * model.tick_s, scratch.product)
-            add_slot_noise(model, state.covariance[s], inertia, scratch)
+            propagate_covariance(state.covariance[s], work.transition, TICKS_PER_SLOT * model.tick_s, work.product)
+            add_slot_noise(model, state.covariance[s], inertia, work)
             if state.status[s, 0] == LOST:
-                search_slot(model, state, s, slot, range_m[f, s], scratch)
+                acquire_slot(model, state, s, slot, range_m[f, s], work)
             else:
-                correct(model, state, s, slot, range_m[f, s], scratch)
-            finish_slot(model, state, s, slot)
+                update_slot(model, state, s, slot, range_m[f, s], work)
+            update_status(model, state, s, slot)
+            decay_slot(model, state, s)
 
 
 @compiled
@@ -98,13 +99,13 @@ def as_vector(array: Floats) -> Vector:
 
 @compiled
 def predict_slot(
-    model: FilterModel, state: FilterState, s: int, inertia: tuple[Floats, Floats], scratch: Scratch
+    model: FilterModel, state: FilterState, s: int, inertia: tuple[Floats, Floats], work: Workspace
 ) -> None:
     """Integrate the increments of a slot, (5, 3) each; sets its transition, corrected angles and mean force."""
     angle_rad, velocity_m_s = inertia
-    angles, force = scratch.angles, scratch.force
+    angles, force = work.angles, work.force
     bias, dt, lost = state.bias[s], model.tick_s, state.status[s, 0] == LOST
-    scratch.transition[:] = 0.0
+    work.transition[:] = 0.0
     force[:] = 0.0
     for k in range(TICKS_PER_SLOT):
         before, after = state.motion[s, k], state.motion[s, k + 1]
@@ -118,9 +119,9 @@ def predict_slot(
         gained = integrate(before, as_vector(angles[k]), velocity, dt, after)
         if state.status[s, 1] == 1:
             after[:6] = before[:6]
-        add_tick(scratch.transition, attitude(before), gained, dt)
+        add_tick(work.transition, attitude(before), gained, dt)
         if lost:
-            add_force(state.search.path[s], gained[0], gained[1], gained[2], dt)
+            integrate_path(state.acquisition.path[s], gained[0], gained[1], gained[2], dt)
         for i in range(3):
             force[i] += gained[i] / (TICKS_PER_SLOT * dt)
             state.turn_rad_s[s, i] = angles[k, i] / dt
@@ -128,14 +129,14 @@ def predict_slot(
 
 
 @compiled
-def add_slot_noise(model: FilterModel, covariance: Floats, inertia: tuple[Floats, Floats], scratch: Scratch) -> None:
+def add_slot_noise(model: FilterModel, covariance: Floats, inertia: tuple[Floats, Floats], work: Workspace) -> None:
     """Add the noise of the sensors, and that of scale and misalignment, which grows with the motion of the slot.
 
     A sensor at its limit measures too little, by an unknown part of the limit.
     Such an error keeps its sign while the motion goes on, so its density is its variance times a correlation time.
     Where the station turns, gravity changes its place among the axes, and so the accelerometers' apparent bias.
     """
-    duration, angles, force = TICKS_PER_SLOT * model.tick_s, scratch.angles, scratch.force
+    duration, angles, force = TICKS_PER_SLOT * model.tick_s, work.angles, work.force
     turn, change = 0.0, force[0] ** 2 + force[1] ** 2 + (force[2] + GRAVITY_M_S2) ** 2
     for i in range(3):
         total = 0.0
@@ -149,13 +150,13 @@ def add_slot_noise(model: FilterModel, covariance: Floats, inertia: tuple[Floats
     density[1] += scale * change
     density[3] += scale * turn * GRAVITY_M_S2**2
     for sensor in range(2):
-        clipped = count_at_limit(inertia[sensor], model.limit[sensor] * model.tick_s) / TICKS_PER_SLOT
-        density[sensor] += clipped * duration * (_CLIPPED_SHARE * model.limit[sensor]) ** 2
-    add_noise(covariance, duration, density)
+        clipped = count_saturated(inertia[sensor], model.limit[sensor] * model.tick_s) / TICKS_PER_SLOT
+        density[sensor] += clipped * duration * (_SATURATION_SHARE * model.limit[sensor]) ** 2
+    add_process_noise(covariance, duration, density)
 
 
 @compiled
-def count_at_limit(increments: Floats, limit: float) -> int:
+def count_saturated(increments: Floats, limit: float) -> int:
     """Number of increments (5, 3) with an axis at its limit."""
     total = 0
     for k in range(len(increments)):
@@ -167,7 +168,9 @@ def count_at_limit(increments: Floats, limit: float) -> int:
 
 
 @compiled
-def arrival(model: FilterModel, motion: Floats, angles: Floats, distance_m: float, arm_m: Floats, at: Floats) -> float:
+def state_at_arrival(
+    model: FilterModel, motion: Floats, angles: Floats, distance_m: float, arm_m: Floats, at: Floats
+) -> float:
     """Set `at` (10,) to position of the inertial unit, microphone from it, and z axis, when a sound arrives.
 
     `motion` (6, 10) has the slot's ticks, `angles` (5, 3) the turns between them. Returns the time until the slot's end
@@ -190,10 +193,10 @@ def arrival(model: FilterModel, motion: Floats, angles: Floats, distance_m: floa
 
 
 @compiled
-def correct(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, scratch: Scratch) -> None:
+def update_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, work: Workspace) -> None:
     """Correct a station with the ranges (2,) of a slot, one after the other; NaN where nothing was heard."""
-    ranging, covariance, motion, force = model.ranging, state.covariance[s], state.motion[s], scratch.force
-    emitter, vectors = slot % len(ranging.emitter_m), scratch.vectors
+    ranging, covariance, motion, force = model.ranging, state.covariance[s], state.motion[s], work.force
+    emitter, vectors = slot % len(ranging.emitter_m), work.vectors
     error, slope, column, rest = vectors[0], vectors[1], vectors[2], vectors[3]
     error[:] = 0.0
     received, rejected = 0, 0
@@ -202,7 +205,7 @@ def correct(model: FilterModel, state: FilterState, s: int, slot: int, range_m: 
         if np.isnan(range_m[m]):
             continue
         received += 1
-        lag = arrival(model, motion, scratch.angles, range_m[m], model.ranging.arm_m[m], at)
+        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[m], at)
         x = at[0] + at[3] - ranging.emitter_m[emitter, 0]
         y = at[1] + at[4] - ranging.emitter_m[emitter, 1]
         z = at[2] + at[5] - ranging.emitter_m[emitter, 2]
@@ -210,8 +213,8 @@ def correct(model: FilterModel, state: FilterState, s: int, slot: int, range_m: 
         x, y, z = x / distance, y / distance, z / distance
         noise = range_variance(ranging, emitter, distance, x, y, z, -(at[6] * x + at[7] * y + at[8] * z))
         slope[0], slope[1], slope[2] = x, y, z
-        slope[3], slope[4], slope[5] = -lag * x, -lag * y, -lag * z
-        half = 0.5 * lag * lag
+        slope[3], slope[4], slope[5] = -remaining_s * x, -remaining_s * y, -remaining_s * z
+        half = 0.5 * remaining_s * remaining_s
         ax, ay, az = at[3] - half * force[0], at[4] - half * force[1], at[5] - half * force[2]
         slope[6], slope[7], slope[8] = ay * z - az * y, az * x - ax * z, ax * y - ay * x
         innovation = range_m[m] - distance
@@ -225,14 +228,14 @@ def correct(model: FilterModel, state: FilterState, s: int, slot: int, range_m: 
         state.nis[s, 1] += 1.0
         for i in range(ERRORS):
             error[i] += column[i] * (innovation / total)
-        update(covariance, slope, column, total, noise, rest)
-    count(state, s, slot, received, rejected)
+        joseph_update(covariance, slope, column, total, noise, rest)
+    count_ranges(state, s, slot, received, rejected)
     if received > rejected:
-        inject(model, state, s, error)
+        apply_error_state(model, state, s, error)
 
 
 @compiled
-def count(state: FilterState, s: int, slot: int, received: int, rejected: int) -> None:
+def count_ranges(state: FilterState, s: int, slot: int, received: int, rejected: int) -> None:
     """Enter the ranges of a slot."""
     place = slot % state.counts.shape[2]
     state.counts[0, s, place] = received
@@ -244,7 +247,7 @@ def count(state: FilterState, s: int, slot: int, received: int, rejected: int) -
 
 
 @compiled
-def inject(model: FilterModel, state: FilterState, s: int, error: Floats) -> None:
+def apply_error_state(model: FilterModel, state: FilterState, s: int, error: Floats) -> None:
     """Move a station's estimate by an error (15,); the offsets of the enhancement modes keep the output in place."""
     now, lever = state.motion[s, TICKS_PER_SLOT], model.lever_m
     moved = np.empty(3)
@@ -261,35 +264,35 @@ def inject(model: FilterModel, state: FilterState, s: int, error: Floats) -> Non
 
 
 @compiled
-def search_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, scratch: Scratch) -> None:
+def acquire_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, work: Workspace) -> None:
     """Collect the ranges (2,) of a slot for a station that is lost, and try a fix."""
-    search, force, slot_s = state.search, scratch.force, TICKS_PER_SLOT * model.tick_s
-    motion, path = state.motion[s], search.path[s]
+    acquisition, force, slot_s = state.acquisition, work.force, TICKS_PER_SLOT * model.tick_s
+    motion, path = state.motion[s], acquisition.path[s]
     at = np.empty(9)
     received = 0
     for m in range(len(range_m)):
         if np.isnan(range_m[m]):
             continue
         received += 1
-        lag = arrival(model, motion, scratch.angles, range_m[m], model.ranging.arm_m[m], at)
-        row = search.heard[s, search.stored[s] % search.heard.shape[1]]
-        row[0], row[1], row[11] = path[6] - lag, range_m[m], slot % len(model.ranging.emitter_m)
+        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[m], at)
+        row = acquisition.ranges[s, acquisition.range_count[s] % acquisition.ranges.shape[1]]
+        row[0], row[1], row[11] = path[6] - remaining_s, range_m[m], slot % len(model.ranging.emitter_m)
         for k in range(3):
             # The path at the arrival, back from the slot's end by the slot's mean force.
-            row[2 + k] = path[k] - path[3 + k] * lag + 0.5 * force[k] * lag * lag
+            row[2 + k] = path[k] - path[3 + k] * remaining_s + 0.5 * force[k] * remaining_s * remaining_s
         row[5:11] = at[3:9]
-        search.stored[s] += 1
-    count(state, s, slot, received, 0)
-    level_attitude(search, s, motion[TICKS_PER_SLOT], force[0], force[1], force[2], slot_s)
+        acquisition.range_count[s] += 1
+    count_ranges(state, s, slot, received, 0)
+    level_attitude(acquisition, s, motion[TICKS_PER_SLOT], force[0], force[1], force[2], slot_s)
     covariance = state.covariance[s]
     drift = covariance[9, 9] + covariance[10, 10] + covariance[11, 11]
-    search.tilt_variance[s] += slot_s * (model.noise[0] + drift * slot_s * search.gravity[s, 4])
+    acquisition.tilt_variance[s] += slot_s * (model.noise[0] + drift * slot_s * acquisition.gravity[s, 4])
     if received == 0 or state.status[s, 5] < _ATTEMPT_SLOTS:
         return
     state.status[s, 5] = 0
     now = motion[TICKS_PER_SLOT].copy()
     trial = covariance.copy()
-    if not fix(model.ranging, search, s, model.window_s, now, trial):
+    if not solve_position(model.ranging, acquisition, s, model.window_s, now, trial):
         return
     if position_sigma_m(trial) > _FIX_SIGMA_M or attitude_sigma_rad(trial) > _FIX_SIGMA_RAD:
         return
@@ -299,4 +302,4 @@ def search_slot(model: FilterModel, state: FilterState, s: int, slot: int, range
     state.nis[s] = 0.0
     status = state.status[s]
     status[:] = 0
-    status[0] = CONFIRMING
+    status[0] = TENTATIVE

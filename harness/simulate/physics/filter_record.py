@@ -11,6 +11,7 @@ from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate, rotation_vector
 from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs
+from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.physics.strapdown import attitude
 
 MODES = 3
@@ -74,10 +75,20 @@ def add_to_offset(offset: Floats, moved: Floats, x: float, y: float, z: float) -
 
 
 @compiled
-def decay(offsets: Floats, duration_s: float, speed_m_s: float, turn_rad_s: float) -> None:
+def decay_offsets(offsets: Floats, duration_s: float, speed_m_s: float, turn_rad_s: float) -> None:
     """Let the offsets (2, 6) of modes 1 and 2 decay."""
     for mode in range(2):
         rate = 1.0 / _DECAY_S if mode == 0 else min(speed_m_s / _DECAY_M + turn_rad_s / _DECAY_RAD, 1.0 / _SLOWEST_S)
         factor = np.exp(-rate * duration_s)
         for i in range(6):
             offsets[mode, i] *= factor
+
+
+@compiled
+def decay_slot(model: FilterModel, state: FilterState, s: int) -> None:
+    """Let the offsets of a station decay over a slot, at the speed and turn rate of its end."""
+    motion, turn = state.motion[s, TICKS_PER_SLOT], state.turn_rad_s[s]
+    speed = np.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
+    decay_offsets(
+        state.offset[s], TICKS_PER_SLOT * model.tick_s, speed, np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    )

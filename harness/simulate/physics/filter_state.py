@@ -45,21 +45,21 @@ class FilterModel(NamedTuple):
     sigma_limit_m: float
     reject_share: float
     coast_slots: int
-    judged_slots: int
+    reject_slots: int
     """Slots in a second."""
-    confirm_slots: int
+    confirmation_slots: int
     window_s: float
     """Time whose ranges make a fix."""
     best_sigma_m: float
     """Standard deviation of the position up to which the quality is 1."""
 
 
-class Search(NamedTuple):
+class AcquisitionState(NamedTuple):
     """What S lost stations have collected."""
 
-    heard: Floats
+    ranges: Floats
     """(S, N, 12) ranges in a ring, the latest of the window: three turns of emitters, within the limits above."""
-    stored: Ints
+    range_count: Ints
     """(S,) ranges stored since the loss."""
     path: Floats
     """(S, 7) double and single integral of the specific force since the loss [m], [m/s], and its duration [s]."""
@@ -85,26 +85,27 @@ class FilterState(NamedTuple):
     offset: Floats
     """(S, 2, 6) offsets of enhancement modes 1 and 2."""
     status: Ints
-    """(S, 6) LOST, CONFIRMING, TRACKING or DOUBTED; whether the position is frozen; slots since an accepted range;
-    accepted and rejected ranges since the fix or the doubt; slots since then, or since the last attempt of a fix."""
+    """(S, 6) LOST, TENTATIVE, TRACKING or SUSPECT; whether the position is frozen; slots since an accepted range;
+    accepted and rejected ranges since the fix, or since it became suspect; slots since then, or since the last
+    attempt of a fix."""
     counts: Ints
     """(2, S, slots of a second) ranges received and rejected, in a ring."""
     report: Floats
     """(S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
     nis: Floats
     """(S, 2) sum of normalised squared innovations of accepted ranges since the fix, and their number."""
-    search: Search
+    acquisition: AcquisitionState
 
 
-class Scratch(NamedTuple):
+class Workspace(NamedTuple):
     """Memory for one slot of one station."""
 
     transition: Floats
     """(9, 9) of the slot, see `strapdown.add_tick`."""
     product: Floats
-    """(9, 15) for `strapdown.propagate`."""
+    """(9, 15) for `strapdown.propagate_covariance`."""
     vectors: Floats
-    """(4, 15) error, slope, column and rest, see `strapdown.update`."""
+    """(4, 15) error, slope, column and rest, see `strapdown.joseph_update`."""
     angles: Floats
     """(5, 3) corrected turns between the slot's ticks [rad]."""
     force: Floats

@@ -10,7 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.resting_ends import STOP_S, with_rest_after, with_rest_before
+from harness.simulate.rest_pieces import STOP_S, with_rest_after, with_rest_before
 
 FACING_UP: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """`tracker_from_station` of a station whose z axis points up; the tracker's points down."""
@@ -43,7 +43,7 @@ class FreeMotionSource:
         self._spline = with_rest_after(with_rest_before(taken, warm_up_s), _REST_S)
         self.begins_s, self.ends_s = float(self._spline.x[0]), float(self._spline.x[-1])
 
-    def advance(self, time_s: Floats) -> TrackerMotion:
+    def sample_motion(self, time_s: Floats) -> TrackerMotion:
         """Motion at the ticks (T+1,) of the next block [s]; BadInput outside `begins_s` to `ends_s`."""
         if not (time_s.min() >= self.begins_s - 1e-9 and time_s.max() <= self.ends_s + 1e-9):
             raise BadInput(

@@ -5,55 +5,26 @@ from a fix, never from the truth.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Annotated
 
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.core.ranges import CheckedFields, Name, Range
 from harness.errors import ShapeError
-from harness.simulate.physics.acquisition import FIRST_TILT_VARIANCE, HEARD, LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS
-from harness.simulate.physics.filter import advance
+from harness.simulate.physics.acquisition import (
+    FIRST_TILT_VARIANCE,
+    LEAST_WINDOW_SLOTS,
+    LONGEST_WINDOW_SLOTS,
+    RANGE_FIELDS,
+)
+from harness.simulate.physics.filter import filter_stations
 from harness.simulate.physics.filter_record import MODES
-from harness.simulate.physics.filter_state import FilterModel, FilterState, Outputs, RangingModel, Search
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.filter_state import AcquisitionState, FilterModel, FilterState, Outputs, RangingModel
 from harness.simulate.physics.inertial import Inertial, InertialErrors
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
 from harness.simulate.physics.strapdown import ERRORS, STATE
-from harness.simulate.physics.tracking_state import CONFIRMING_SLOTS, freeze, set_bias_covariance
-
-
-@dataclass(frozen=True)
-class Fusion(CheckedFields):
-    """What the device's filter assumes, when it gives a station up, and the settings of each station."""
-
-    gate: Annotated[float, Range(0.5, 100.0)] = 4.0
-    """Largest innovation of an accepted range, in its standard deviations. InterSense's header gives a factor of 4
-    (docs/is900.md 13.2)."""
-    range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.002
-    """Assumed standard deviation of a range at 2 m on the axis [m]; it grows with distance and angle as in `sound`. The
-    value is that of `sound` [choice]."""
-    range_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
-    """Assumed standard deviation of the scale of a range, from temperature and air [choice]."""
-    survey_m: Annotated[float, Range(0.0, 1.0)] = 0.001
-    """Assumed standard deviation of an emitter's position [m] [choice]."""
-    inertial_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
-    """Assumed standard deviation of scale and misalignment of the inertial sensors [choice]."""
-    sigma_limit_m: Annotated[float, Range(1e-3, 10.0)] = 0.03
-    """Standard deviation of the position beyond which the station is doubted and has quality 0 [m] [choice]."""
-    reject_share: Annotated[float, Range(0.0, 1.0)] = 0.6
-    """Share of rejected ranges in a second beyond which the station is lost [choice]."""
-    coast_s: Annotated[float, Range(0.05, 60.0)] = 1.5
-    """Longest time without an accepted range before the station is lost [s] [choice]."""
-    quality_sigma_m: Annotated[float, Range(1e-5, 1.0)] = 0.003
-    """Standard deviation of the position up to which the quality is 1 [m] [choice]."""
-    warm_up_s: Annotated[float, Range(0.5, 600.0)] = 3.0
-    """Time that the device runs before a take while the performer stands in its first pose [s] [choice]."""
-    prediction_ms: dict[Name, Annotated[int, Range(0, 50)]] = field(default_factory=dict)
-    """Station -> prediction (`Mp`) [ms]; 0 for the others (docs/is900.md 4.2)."""
-    enhancement: dict[Name, Annotated[int, Range(0, 2)]] = field(default_factory=dict)
-    """Station -> perceptual enhancement (`MF`); 0 for the others (docs/is900.md 4.2)."""
+from harness.simulate.physics.tracking_status import CONFIRMATION_SLOTS, freeze_position, set_bias_covariance
 
 
 class FusionFilter:
@@ -103,17 +74,17 @@ class FusionFilter:
             sigma_limit_m=fusion.sigma_limit_m,
             reject_share=fusion.reject_share,
             coast_slots=int(fusion.coast_s / slot_s),
-            judged_slots=second,
-            confirm_slots=min(max(emitters, CONFIRMING_SLOTS), LONGEST_WINDOW_SLOTS),
+            reject_slots=second,
+            confirmation_slots=min(max(emitters, CONFIRMATION_SLOTS), LONGEST_WINDOW_SLOTS),
             window_s=(window + 0.5) * slot_s,
             best_sigma_m=fusion.quality_sigma_m,
         )
         self.state = _initial_state(len(self.stations), max(second, LEAST_WINDOW_SLOTS), MICROPHONES * (window + 1))
         for s in range(len(self.stations)):
             set_bias_covariance(self.model, self.state.covariance[s])
-            freeze(self.state, s)
+            freeze_position(self.state, s)
 
-    def advance(
+    def filter_block(
         self, first_slot: int, angle_rad: Floats, velocity_m_s: Floats, range_m: Floats, outputs: Outputs
     ) -> None:
         """Advance over F slots, and fill those outputs whose ticks lie in them; the others stay as they are.
@@ -130,11 +101,11 @@ class FusionFilter:
             if array.shape != shape:
                 raise ShapeError("FusionFilter", name, array.shape, str(shape))
         angle, velocity, ranges = (np.ascontiguousarray(a, dtype=float) for a in (angle_rad, velocity_m_s, range_m))
-        advance(self.model, self.state, first_slot, angle, velocity, ranges, outputs)
+        filter_stations(self.model, self.state, first_slot, angle, velocity, ranges, outputs)
 
 
 def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
-    """Outputs of records at ticks (E, S) and parts of a tick (E, S), to be filled by `FusionFilter.advance`."""
+    """Outputs of records at ticks (E, S) and parts of a tick (E, S), to be filled by `FusionFilter.filter_block`."""
     shape = tick.shape
     return Outputs(
         np.ascontiguousarray(tick, dtype=np.int64),
@@ -170,9 +141,9 @@ def _initial_state(stations: int, slots: int, ranges: int) -> FilterState:
         counts=np.zeros((2, stations, slots), dtype=np.int64),
         report=np.zeros((stations, 4)),
         nis=np.zeros((stations, 2)),
-        search=Search(
-            heard=np.zeros((stations, ranges, HEARD)),
-            stored=np.zeros(stations, dtype=np.int64),
+        acquisition=AcquisitionState(
+            ranges=np.zeros((stations, ranges, RANGE_FIELDS)),
+            range_count=np.zeros(stations, dtype=np.int64),
             path=np.zeros((stations, 7)),
             gravity=np.zeros((stations, 5)),
             tilt_variance=np.full(stations, FIRST_TILT_VARIANCE),

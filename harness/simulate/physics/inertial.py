@@ -92,12 +92,12 @@ def true_increments(motion: TrackerMotion, lever_m: Floats) -> tuple[Floats, Flo
     _, velocity_m_s = motion.points(lever_m)
     turn, shape = motion.tracker_from_station, (len(motion.time_s) - 1, *velocity_m_s.shape[1:])
     angle_rad, gain_m_s = np.empty(shape), np.empty(shape)
-    _difference(motion.time_s, turn, velocity_m_s, angle_rad, gain_m_s)
+    _increments(motion.time_s, turn, velocity_m_s, angle_rad, gain_m_s)
     return angle_rad, gain_m_s
 
 
 @compiled
-def _difference(time_s: Floats, turn: Floats, velocity_m_s: Floats, angle_rad: Floats, gain_m_s: Floats) -> None:
+def _increments(time_s: Floats, turn: Floats, velocity_m_s: Floats, angle_rad: Floats, gain_m_s: Floats) -> None:
     for k in range(len(time_s) - 1):
         fall_m_s = GRAVITY_M_S2 * (time_s[k + 1] - time_s[k])
         for s in range(turn.shape[1]):
@@ -136,13 +136,13 @@ class InertialUnit:
                 self._matrix[triad, s] = scale[:, None] * axes / length
                 self._bias[0, triad, s] = errors.bias_instability * self._rng[s].standard_normal(3)
 
-    def measure(self, angle_rad: Floats, velocity_m_s: Floats) -> tuple[Floats, Floats]:
+    def measure_increments(self, angle_rad: Floats, velocity_m_s: Floats) -> tuple[Floats, Floats]:
         """Measured increments for true ones, (T, S, 3) each [rad], [m/s]."""
         out = np.empty_like(angle_rad), np.empty_like(velocity_m_s)
         for s, rng in enumerate(self._rng):
             draws = rng.standard_normal((len(angle_rad), 2, 3, 3))
             for triad, (errors, true) in enumerate(zip(self._triads, (angle_rad, velocity_m_s), strict=True)):
-                _measure(
+                _sensor_increments(
                     true[:, s],
                     draws[:, triad],
                     self._matrix[triad, s],
@@ -156,7 +156,7 @@ class InertialUnit:
 
 
 @compiled
-def _measure(
+def _sensor_increments(
     true: Floats,
     draws: Floats,
     matrix: Floats,

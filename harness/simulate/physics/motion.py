@@ -51,7 +51,7 @@ class TrackerMotionSource(Protocol):
     @property
     def stations(self) -> tuple[str, ...]: ...
 
-    def advance(self, time_s: Floats) -> TrackerMotion:
+    def sample_motion(self, time_s: Floats) -> TrackerMotion:
         """Motion at the ticks (T+1,) of the next block [s]. Blocks follow one another; the result may depend on all."""
         ...
 
@@ -122,12 +122,12 @@ def station_states(
     shape = len(time_s), len(chain.station_bone)
     position_m, velocity_m_s, turn_rad_s, acceleration_m_s2 = (np.empty((*shape, 3)) for _ in range(4))
     out = TrackerMotion(time_s, position_m, np.empty((*shape, 4)), velocity_m_s, turn_rad_s)
-    _follow(chain, pieces, knots_s, out, acceleration_m_s2)
+    _chain_states(chain, pieces, knots_s, out, acceleration_m_s2)
     return out, acceleration_m_s2
 
 
 @compiled
-def _follow(
+def _chain_states(
     chain: StationChain, pieces: Floats, knots_s: Floats, out: TrackerMotion, acceleration_m_s2: Floats
 ) -> None:
     time_s = out.time_s

@@ -1,7 +1,9 @@
 """A physical tracker: from the true motion of stations to what the device's filter reports of each.
 
-A take is simulated in blocks of slots, so that memory does not grow with the rate of the inertial sensors. Every part
-carries its state from block to block, and results do not depend on the size of the blocks.
+The modules follow the signal: `schedule` and `constellation` say which emitter fires, `ranging` what is heard of it,
+`inertial` what the sensors measure, `fusion` and `filter` what the device computes, `tracking_status` whether it is
+trusted. A take is simulated in blocks of slots, so that memory does not grow with the rate of the inertial sensors.
+Every part carries its state from block to block, and results do not depend on the size of the blocks.
 """
 
 import math
@@ -14,12 +16,12 @@ from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import InertialUnit, true_increments
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource
 from harness.simulate.physics.ranging import Ranges, Ranging
 from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sight import Sight
 from harness.simulate.readings import FilterReadings
 
 BLOCK_SLOTS = 160
@@ -29,7 +31,7 @@ BLOCK_SLOTS = 160
 class RangeSource(Protocol):
     """What measures the ranges of block after block of slots; see `Ranging`."""
 
-    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges: ...
+    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges: ...
 
 
 class PhysicalTracker:
@@ -41,7 +43,7 @@ class PhysicalTracker:
         physics: Physics,
         constellation: Constellation,
         placed: PlacedRoom,
-        sight: Sight | None,
+        sight: LineOfSight | None,
         *,
         seed: int,
         take: str,
@@ -53,7 +55,7 @@ class PhysicalTracker:
         """
         stations, inertial = source.stations, physics.inertial
         self.schedule = Schedule(inertial.rate_hz, len(constellation))
-        true = constellation.surveyed(physics.constellation.survey_sd_m, seed, session or take)
+        true = constellation.with_survey_error(physics.constellation.survey_sd_m, seed, session or take)
         self.ranging: RangeSource = Ranging(
             physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
@@ -71,18 +73,19 @@ class PhysicalTracker:
         self._first_slot = -lead_in_slots(physics)
         self._with_body = sight is not None
 
-    def measure(self, time_s: Floats) -> FilterReadings:
+    def measure_take(self, time_s: Floats) -> FilterReadings:
         """Readings at the times (E, S) of a take, ascending for each station and not before 0 [s]."""
         tick_hz = self.schedule.tick_hz
         tick = np.floor(time_s * tick_hz).astype(np.int64)
         outputs = empty_outputs(tick, time_s * tick_hz - tick)
-        hearing = _Hearing(self.schedule.emitters, time_s.shape[1])
+        statistics = _RangeStatistics(self.schedule.emitters, time_s.shape[1])
         end = int(tick.max()) // TICKS_PER_SLOT + 1
         for first in range(self._first_slot, end, BLOCK_SLOTS):
-            motion, ranges = self._advance_true(first, min(BLOCK_SLOTS, end - first))
-            angle_rad, velocity_m_s = self.unit.measure(*true_increments(motion, self._lever_m))
-            self.fusion.advance(first, angle_rad, velocity_m_s, ranges.range_m, outputs)
-            hearing.add(first, ranges)
+            motion, qpos = self._true_motion(first, min(BLOCK_SLOTS, end - first))
+            ranges = self.ranging.measure_ranges(first, motion, qpos)
+            angle_rad, velocity_m_s = self.unit.measure_increments(*true_increments(motion, self._lever_m))
+            self.fusion.filter_block(first, angle_rad, velocity_m_s, ranges.range_m, outputs)
+            statistics.add(first, ranges)
         quality, _, received, rejected = np.moveaxis(outputs.report, -1, 0)
         position_m, turned = (
             np.ascontiguousarray(np.moveaxis(modes, 2, 0))
@@ -92,15 +95,14 @@ class PhysicalTracker:
             *(position_m[0], turned[0], np.ascontiguousarray(quality)),
             *(received.astype(np.int64), rejected.astype(np.int64)),
             *(outputs.velocity_m_s, outputs.turn_rad_s, position_m[1:], turned[1:]),
-            *hearing.shares(),
+            *statistics.shares(),
         )
 
-    def _advance_true(self, first: int, slots: int) -> tuple[TrackerMotion, Ranges]:
-        """True motion and ranges of a block."""
+    def _true_motion(self, first: int, slots: int) -> tuple[TrackerMotion, Floats | None]:
+        """True motion at the ticks of a block, and the body's configurations (F, 55) at its slots."""
         ticks_s = self.schedule.ticks_s(first, slots)
-        motion = self._source.advance(ticks_s)
-        qpos = self._source.qpos(ticks_s[:-1:TICKS_PER_SLOT]) if self._with_body else None
-        return motion, self.ranging.measure(first, motion, qpos)
+        motion = self._source.sample_motion(ticks_s)
+        return motion, self._source.qpos(ticks_s[:-1:TICKS_PER_SLOT]) if self._with_body else None
 
 
 def lead_in_slots(physics: Physics) -> int:
@@ -113,7 +115,7 @@ def lead_in_s(physics: Physics) -> float:
     return lead_in_slots(physics) * TICKS_PER_SLOT / physics.inertial.rate_hz
 
 
-class _Hearing:
+class _RangeStatistics:
     """Counts how many emitters each station hears directly, and how many ranges are echoes, from time 0 on."""
 
     def __init__(self, emitters: int, stations: int) -> None:

@@ -15,10 +15,10 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.simulate.physics.constellation import Constellation
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.motion import TrackerMotion
 from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
-from harness.simulate.physics.sight import Sight
 from harness.simulate.physics.sound import (
     MICROPHONES,
     Bursts,
@@ -50,7 +50,7 @@ class Ranges:
     """(F, S, 2) whether it is that of an echo. It is neither where a burst of noise triggered the microphone."""
 
 
-class _Law(NamedTuple):
+class _Acoustics(NamedTuple):
     """What decides whether sound is heard, for the compiled loops."""
 
     tick_s: float
@@ -61,9 +61,10 @@ class _Law(NamedTuple):
     reflection_db: float
 
 
-_Paths = tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats, _Law]
+_Paths = tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats, _Acoustics]
 """For compiled loops: emitter of each slot (F,), positions and normals of the emitters (J, 3), positions and velocities
-of the microphones at the ticks (T+1, S, 2, 3), the stations' z axes (F, S, 3), speed of sound (F, S), and the law."""
+of the microphones at the ticks (T+1, S, 2, 3), the stations' z axes (F, S, 3), speed of sound (F, S), and what decides
+whether it is heard."""
 
 
 class Ranging:
@@ -75,7 +76,7 @@ class Ranging:
         constellation: Constellation,
         schedule: Schedule,
         placed: PlacedRoom,
-        sight: Sight | None,
+        sight: LineOfSight | None,
         stations: tuple[str, ...],
         *,
         seed: int,
@@ -92,7 +93,7 @@ class Ranging:
         reflection = placed.room.reflection
         self._planes = placed.planes() if placed.room.echoes and reflection > 0.0 else np.zeros((0, 4))
         self._images_m = mirror_images(self._planes, self._position_m)
-        self._law = _Law(
+        self._acoustics = _Acoustics(
             tick_s=1.0 / schedule.tick_hz,
             cone_cos=math.cos(constellation.cone_rad),
             range_m=constellation.range_m,
@@ -111,7 +112,7 @@ class Ranging:
         self._chance = [generator(seed, "physics", take, "range faults", station) for station in stations]
         self._air_m_s = np.full((schedule.emitters, len(stations)), np.nan)
 
-    def measure(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
         """The ranges of the next block of F slots.
 
         `motion` covers the block's ticks. `qpos` (F, 55) is the body's configuration at the beginning of each slot, for
@@ -126,7 +127,7 @@ class Ranging:
         normals = np.stack([rng.standard_normal((slots, MICROPHONES + 1)) for rng in self._noise], axis=1)
         uniforms = np.stack([rng.random((slots, MICROPHONES, 2)) for rng in self._chance], axis=1)
         turn = self._schedule.emitters * self._schedule.slot_s
-        _drift(
+        _air_speeds(
             self._air_m_s,
             emitter,
             normals[..., MICROPHONES],
@@ -135,19 +136,19 @@ class Ranging:
             air := np.empty((slots, len(self._noise))),
         )
         speed_m_s = self._speed_m_s + air
-        paths = (emitter, self._position_m, self._normal, position_m, velocity_m_s, facing, speed_m_s, self._law)
+        paths = (emitter, self._position_m, self._normal, position_m, velocity_m_s, facing, speed_m_s, self._acoustics)
         time_s, level = _direct_sound(paths)
         at_m = position_m[begins]
-        self._block_direct(emitter, at_m, qpos, time_s)
+        self._occlude_direct(emitter, at_m, qpos, time_s)
         direct = ~np.isnan(time_s)
         if len(self._planes):
             reflected_s, reflected_db, bounce_m = _reflected_sound(self._planes, self._images_m, time_s, paths)
-            self._block_reflected(emitter, at_m, qpos, reflected_s, bounce_m)
-            _earliest(reflected_s, reflected_db, time_s, level)
+            self._occlude_reflected(emitter, at_m, qpos, reflected_s, bounce_m)
+            _first_arrival(reflected_s, reflected_db, time_s, level)
         echo = ~np.isnan(time_s) & ~direct
         ticks_s = self._schedule.ticks_s(first_slot, slots)[::TICKS_PER_SLOT]
-        burst = self._bursts.touch(ticks_s[:-1], ticks_s[1:])
-        range_m = _measure(time_s, level, normals, uniforms, burst, self._assumed_m_s, self._sound_errors())
+        burst = self._bursts.overlaps(ticks_s[:-1], ticks_s[1:])
+        range_m = _range_measurements(time_s, level, normals, uniforms, burst, self._assumed_m_s, self._sound_errors())
         undisturbed = ~burst[:, None, None]
         return Ranges(emitter, range_m, direct & undisturbed, echo & undisturbed)
 
@@ -155,19 +156,19 @@ class Ranging:
         sound = self._sound
         return sound.range_noise_m, sound.wrong_cycle_share, sound.frequency_hz, sound.absorption_db_per_m
 
-    def _block_direct(self, emitter: Ints, at_m: Floats, qpos: Floats | None, time_s: Floats) -> None:
+    def _occlude_direct(self, emitter: Ints, at_m: Floats, qpos: Floats | None, time_s: Floats) -> None:
         """Set the times to NaN where the straight path is blocked."""
         if self._sight is None:
             return
         candidates = ~np.isnan(time_s)
         for slot in np.nonzero(candidates.any(axis=(1, 2)))[0]:
             if qpos is not None:
-                self._sight.set(qpos[slot])
+                self._sight.pose_body(qpos[slot])
             heard = candidates[slot]
-            blocked = self._sight.blocked(self._position_m[emitter[slot]], at_m[slot][heard])
+            blocked = self._sight.occlusion(self._position_m[emitter[slot]], at_m[slot][heard])
             time_s[slot][heard] = np.where(blocked, np.nan, time_s[slot][heard])
 
-    def _block_reflected(
+    def _occlude_reflected(
         self, emitter: Ints, at_m: Floats, qpos: Floats | None, time_s: Floats, bounce_m: Floats
     ) -> None:
         """Set the times (F, S, 2, P) to NaN where the path to the plane, or from it, is blocked."""
@@ -176,18 +177,18 @@ class Ranging:
         candidates = ~np.isnan(time_s)
         for slot in np.nonzero(candidates.any(axis=(1, 2, 3)))[0]:
             if qpos is not None:
-                self._sight.set(qpos[slot])
+                self._sight.pose_body(qpos[slot])
             at, j = candidates[slot], emitter[slot]
-            at[at] = ~self._sight.blocked(self._position_m[j], bounce_m[slot][at])
+            at[at] = ~self._sight.occlusion(self._position_m[j], bounce_m[slot][at])
             for plane in np.nonzero(at.any(axis=(0, 1)))[0]:
                 own = at[..., plane]
                 # No geom lies outside the room, so that the part of the ray beyond the plane hits nothing.
-                own[own] = ~self._sight.blocked(self._images_m[j, plane], at_m[slot][own])
+                own[own] = ~self._sight.occlusion(self._images_m[j, plane], at_m[slot][own])
             time_s[slot][~at] = np.nan
 
 
 @compiled
-def _drift(state: Floats, emitter: Ints, normals: Floats, correlation: float, sd: float, out: Floats) -> None:
+def _air_speeds(state: Floats, emitter: Ints, normals: Floats, correlation: float, sd: float, out: Floats) -> None:
     """Speed of the air along each path (F, S): a Gauss-Markov step at each firing of the path's emitter."""
     fresh = sd * math.sqrt(1.0 - correlation * correlation)
     for slot in range(len(emitter)):
@@ -201,24 +202,26 @@ def _drift(state: Floats, emitter: Ints, normals: Floats, correlation: float, sd
 
 
 @compiled
-def _path_level(source_m: Floats, leaves: Floats, normal: Floats, at_m: Floats, facing: Floats, law: _Law) -> float:
+def _path_level(
+    source_m: Floats, leaves: Floats, normal: Floats, at_m: Floats, facing: Floats, acoustics: _Acoustics
+) -> float:
     """Level of sound that leaves an emitter along `leaves` and arrives from a source [dB]; NaN outside the cone."""
     length = math.sqrt(leaves[0] ** 2 + leaves[1] ** 2 + leaves[2] ** 2)
     emitter_cos = (leaves[0] * normal[0] + leaves[1] * normal[1] + leaves[2] * normal[2]) / length
-    if not emitter_cos >= law.cone_cos:
+    if not emitter_cos >= acoustics.cone_cos:
         return np.nan
     distance_m, station_cos = 0.0, 0.0
     for axis in range(3):
         distance_m += (source_m[axis] - at_m[axis]) ** 2
         station_cos += (source_m[axis] - at_m[axis]) * facing[axis]
     distance_m = math.sqrt(distance_m)
-    return level_db(distance_m, emitter_cos, station_cos / distance_m, law.absorption_db_per_m)
+    return level_db(distance_m, emitter_cos, station_cos / distance_m, acoustics.absorption_db_per_m)
 
 
 @compiled
 def _direct_sound(paths: _Paths) -> tuple[Floats, Floats]:
     """Time of flight (F, S, 2) and level of the direct sound; NaN where it is not heard, were nothing in its way."""
-    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, law = paths
+    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, acoustics = paths
     slots, stations, microphones = len(emitter), position_m.shape[1], position_m.shape[2]
     time_s = np.full((slots, stations, microphones), np.nan)
     level = np.full((slots, stations, microphones), np.nan)
@@ -228,13 +231,15 @@ def _direct_sound(paths: _Paths) -> tuple[Floats, Floats]:
         for s in range(stations):
             for m in range(microphones):
                 leaves = position_m[first, s, m] - source_m
-                if leaves[0] ** 2 + leaves[1] ** 2 + leaves[2] ** 2 > law.range_m**2:
+                if leaves[0] ** 2 + leaves[1] ** 2 + leaves[2] ** 2 > acoustics.range_m**2:
                     continue
-                loud = _path_level(source_m, leaves, axis, position_m[first, s, m], facing[slot, s], law)
-                if loud >= law.threshold_db:
+                loud = _path_level(source_m, leaves, axis, position_m[first, s, m], facing[slot, s], acoustics)
+                if loud >= acoustics.threshold_db:
                     track_m, track_m_s = position_m[first:end, s, m], velocity_m_s[first:end, s, m]
                     level[slot, s, m] = loud
-                    time_s[slot, s, m] = time_of_flight_s(source_m, track_m, track_m_s, law.tick_s, speed_m_s[slot, s])
+                    time_s[slot, s, m] = time_of_flight_s(
+                        source_m, track_m, track_m_s, acoustics.tick_s, speed_m_s[slot, s]
+                    )
     return time_s, level
 
 
@@ -243,14 +248,14 @@ def _reflected_sound(
     planes: Floats, images_m: Floats, direct_s: Floats, paths: _Paths
 ) -> tuple[Floats, Floats, Floats]:
     """Time (F, S, 2, P), level and point of reflection (F, S, 2, P, 3) of each echo where no direct sound is heard."""
-    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, law = paths
+    emitter, emitter_m, normal, position_m, velocity_m_s, facing, speed_m_s, acoustics = paths
     shape = (*direct_s.shape, len(planes))
     time_s, level, bounce_m = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros((*shape, 3))
     for slot in range(shape[0]):
         first, end = slot * TICKS_PER_SLOT, (slot + 1) * TICKS_PER_SLOT + 1
         j = emitter[slot]
         for s in range(shape[1]):
-            longest_m = 1.1 * speed_m_s[slot, s] * law.tick_s * TICKS_PER_SLOT
+            longest_m = 1.1 * speed_m_s[slot, s] * acoustics.tick_s * TICKS_PER_SLOT
             for m in range(shape[2]):
                 if not np.isnan(direct_s[slot, s, m]):
                     continue
@@ -263,18 +268,20 @@ def _reflected_sound(
                     if far > longest_m**2 or not reflection_point(planes[plane], image_m, at_m, bounce):
                         continue
                     leaves = bounce - emitter_m[j]
-                    loud = law.reflection_db + _path_level(image_m, leaves, normal[j], at_m, facing[slot, s], law)
-                    if loud >= law.threshold_db:
+                    loud = acoustics.reflection_db + _path_level(
+                        image_m, leaves, normal[j], at_m, facing[slot, s], acoustics
+                    )
+                    if loud >= acoustics.threshold_db:
                         track_m, track_m_s = position_m[first:end, s, m], velocity_m_s[first:end, s, m]
                         level[slot, s, m, plane] = loud
                         time_s[slot, s, m, plane] = time_of_flight_s(
-                            image_m, track_m, track_m_s, law.tick_s, speed_m_s[slot, s]
+                            image_m, track_m, track_m_s, acoustics.tick_s, speed_m_s[slot, s]
                         )
     return time_s, level, bounce_m
 
 
 @compiled
-def _earliest(reflected_s: Floats, reflected_db: Floats, time_s: Floats, level: Floats) -> None:
+def _first_arrival(reflected_s: Floats, reflected_db: Floats, time_s: Floats, level: Floats) -> None:
     """Where no direct sound is heard, put in the echo that arrives first."""
     slots, stations, microphones, planes = reflected_s.shape
     for slot in range(slots):
@@ -290,7 +297,7 @@ def _earliest(reflected_s: Floats, reflected_db: Floats, time_s: Floats, level: 
 
 
 @compiled
-def _measure(
+def _range_measurements(
     time_s: Floats,
     level: Floats,
     normals: Floats,

@@ -84,7 +84,9 @@ def place_room(
     """A constellation in the tracker's frame above a point (2,) of the world's floor [m], and the room around it."""
     placed = PlacedRoom(room, centre_m, calibration.world_from_tracker, calibration.tracker_origin_m)
     offset_m = np.array([*(centre_m - calibration.tracker_origin_m[:2]), 0.0])
-    return constellation.shifted(rotations.rotate(rotations.inverse(calibration.world_from_tracker), offset_m)), placed
+    return constellation.translate(
+        rotations.rotate(rotations.inverse(calibration.world_from_tracker), offset_m)
+    ), placed
 
 
 def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> None:

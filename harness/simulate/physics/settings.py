@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from harness.errors import BadInput
 from harness.simulate.physics.constellation import ConstellationSettings
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.inertial import Inertial, InertialErrors
 from harness.simulate.physics.room import Room
 from harness.simulate.physics.schedule import TICKS_PER_SLOT

@@ -25,7 +25,7 @@ NOISE_AT_M = 2.0
 _LEAST_NOISE, _LARGEST_NOISE = 0.5, 4.0
 """Limits of the factor on the noise of a range [choice]."""
 _LEAST_AMPLITUDE = 1e-6
-_SETTLED_S = 1e-14
+_CONVERGENCE_S = 1e-14
 _MOST_STEPS = 50
 _MINUTE_S = 60.0
 
@@ -127,7 +127,7 @@ def time_of_flight_s(source_m: Floats, position_m: Floats, velocity_m_s: Floats,
             if before_s == last * tick_s:
                 return np.nan
             time_s = last * tick_s
-        elif abs(time_s - before_s) <= _SETTLED_S:
+        elif abs(time_s - before_s) <= _CONVERGENCE_S:
             break
     return time_s
 
@@ -169,7 +169,7 @@ class Bursts:
         first, last = (int(np.floor(at_s / _MINUTE_S)) for at_s in (from_s - self._duration_s[1], to_s))
         return np.concatenate([self._in_minute(minute) for minute in range(first, last + 1)])
 
-    def touch(self, from_s: Floats, to_s: Floats) -> Bools:
+    def overlaps(self, from_s: Floats, to_s: Floats) -> Bools:
         """(F,) whether a burst touches each of F ascending intervals [s]."""
         out = np.zeros(len(from_s), dtype=bool)
         if self._per_min > 0.0 and len(from_s):

@@ -101,7 +101,7 @@ def add_tick(transition: Floats, q: Quaternion, velocity: Vector, duration_s: fl
 
 
 @compiled
-def propagate(covariance: Floats, transition: Floats, duration_s: float, product: Floats) -> None:
+def propagate_covariance(covariance: Floats, transition: Floats, duration_s: float, product: Floats) -> None:
     """Replace P (15, 15) by F P F^T for a transition of `add_tick`; `product` (9, 15) is scratch memory."""
     for j in range(ERRORS):
         for i in range(3):
@@ -134,7 +134,7 @@ def propagate(covariance: Floats, transition: Floats, duration_s: float, product
 
 
 @compiled
-def add_noise(covariance: Floats, duration_s: float, density: Floats) -> None:
+def add_process_noise(covariance: Floats, duration_s: float, density: Floats) -> None:
     """Add the noise of a slot: densities (4,) of gyroscopes, accelerometers and their two biases, x^2 per second."""
     turn, velocity = duration_s * density[0], duration_s * density[1]
     for i in range(3):
@@ -162,7 +162,7 @@ def project(covariance: Floats, slope: Floats, column: Floats) -> float:
 
 
 @compiled
-def update(covariance: Floats, slope: Floats, column: Floats, total: float, noise: float, rest: Floats) -> None:
+def joseph_update(covariance: Floats, slope: Floats, column: Floats, total: float, noise: float, rest: Floats) -> None:
     """Update P (15, 15) with a scalar measurement, in Joseph's form; the gain is `column` / `total`.
 
     `slope` (9,) and `column` (15,) are those of `project`, `total` is the innovation's variance, `noise` the

@@ -100,12 +100,12 @@ class Recording:
         notes = [block for block in self.blocks() if block.kind == NOTE]
         return self.parse_json(notes[-1]) if notes else {}
 
-    def noted_values(self, name: str) -> tuple[str, ...]:
+    def note_values(self, name: str) -> tuple[str, ...]:
         """The different values that the notes have under a name, in file order.
 
         "" stands for a note without the name, and for blocks that come before the first note.
         """
-        return _noted_values(self, self.blocks(), name)
+        return _note_values(self, self.blocks(), name)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -193,8 +193,8 @@ def read_marks(path: Path) -> list[dict[str, Any]]:
         return Recording(path, b"").timed_contents(MARK, _whole_blocks(file))
 
 
-def _noted_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
-    """As `Recording.noted_values`, of these blocks."""
+def _note_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
+    """As `Recording.note_values`, of these blocks."""
     values: dict[str, None] = {}
     for block in blocks:
         if block.kind == NOTE:
@@ -407,7 +407,7 @@ class RecordingWriter:
                 _seek_first_block(self.path, file)
                 parser, blocks = Recording(self.path, b""), _whole_blocks(file)
                 kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
-            self._check_plan(_noted_values(parser, kept, PLAN))
+            self._check_plan(_note_values(parser, kept, PLAN))
             return [parser.format_of(block) for block in kept if block.kind == CONFIGURED]
         except FileNotFoundError:
             if not self.path.parent.is_dir():

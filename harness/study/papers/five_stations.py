@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
-from harness.compare.claims import Errors, claim_lower_error
 from harness.compare.paired_statistics import compare_paired
-from harness.results.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.findings import FindingsTable, PaperExperiment
+from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading, StatementKind
+from harness.results.findings.paper_findings import FindingsTable, PaperExperiment
 from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import SummaryRow, errors_by_unit, mean_table

@@ -8,7 +8,6 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.compare.claims import correct_claims
 from harness.compare.units import Sampling, count_units
 from harness.core.object_state import describe_state
 from harness.core.package_data import data_folder
@@ -23,8 +22,9 @@ from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.results import manifest
 from harness.results.cell import varied_text
-from harness.results.findings import FindingsTable, PaperExperiment, PaperFindings, write_findings
+from harness.results.findings.paper_findings import FindingsTable, PaperExperiment, PaperFindings, write_findings
 from harness.results.storage import open_study
+from harness.study.papers.claims import correct_claims
 from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios, shorten_scenario
 
 PAPERS = ("liu2011", "kim2012")
@@ -140,7 +140,7 @@ def reproduce(
 
 
 def correct_experiments(experiments: Sequence[PaperExperiment]) -> tuple[PaperExperiment, ...]:
-    """Apply Holm's correction over the printed statements of all experiments (see `compare.claims.correct_claims`)."""
+    """Apply Holm's correction over the printed statements of all experiments (see `claims.correct_claims`)."""
     claims = iter(correct_claims([claim for experiment in experiments for claim in experiment.claims]))
     return tuple(replace(each, claims=tuple(islice(claims, len(each.claims)))) for each in experiments)
 

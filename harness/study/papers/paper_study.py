@@ -22,7 +22,7 @@ from harness.experiment.tasks import cell_names
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
-from harness.results.digests import check_key, read_result_json, write_result_json
+from harness.results.files.digests import check_key, read_result_json, write_result_json
 from harness.results.storage import read_summary
 
 CLIPS, LONGEST_S = 2, 3.0

@@ -20,8 +20,8 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.findings import BarChart, FindingsTable, PaperExperiment
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.paper_findings import BarChart, FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import DATABASE_SHARE, PaperStudy
 from harness.study.speed import benchmark_clips
 from harness.study.speed.benchmark_clips import BenchmarkClip

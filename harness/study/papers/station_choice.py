@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from harness.compare.claims import Errors, claim_lower_error
-from harness.results.benchmark_statement import BenchmarkStatement, Reading
-from harness.results.findings import FindingsTable, PaperExperiment
+from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading
+from harness.results.findings.paper_findings import FindingsTable, PaperExperiment
 from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.station_sets import (

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.run_statistics import GROUP_KEYS
+from harness.compare.run_summary.run_statistics import GROUP_KEYS
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.results.cell import Cell
-from harness.results.findings import BarChart, FindingsTable, LineChart
+from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 SummaryRow = Mapping[str, Any]
@@ -39,7 +39,7 @@ def errors_by_unit(rows: Iterable[SummaryRow], metric: str = PRIMARY_METRIC) -> 
     """Errors of rows that differ only in the clip (see `PaperStudy.rows`).
 
     A unit of which a clip was not measured is left out, so that means of one unit can be paired. BadInput for two rows
-    of one clip, and for rows that must not be pooled (see `compare.run_statistics.GROUP_KEYS`).
+    of one clip, and for rows that must not be pooled (see `compare.run_summary.run_statistics.GROUP_KEYS`).
     """
     of_clip: dict[str, SummaryRow] = {}
     kinds: dict[str, Any] = {}

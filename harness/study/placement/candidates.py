@@ -27,7 +27,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.ranges import Name, Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 
 Pair = Literal["", "each", "together"]
 CandidateGroup = tuple[CandidatePlace, ...]

@@ -22,9 +22,9 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.folder_kind import FINDINGS
-from harness.results.placement_findings import (
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.placement_findings import (
     BestSet,
     PlacementFindings,
     PlacementSearch,

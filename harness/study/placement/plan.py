@@ -17,7 +17,7 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (

@@ -18,7 +18,7 @@ from scipy import special
 
 from harness.compare.significance import SIGNIFICANCE, count_needed
 from harness.core.seeds import generator
-from harness.results.placement_findings import StatisticalPower
+from harness.results.findings.placement_findings import StatisticalPower
 from harness.study.placement.candidates import StationSet
 from harness.study.placement.ranking import Costs
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.compare.claims import claim_lower_error
 from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
 from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
 from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.placement_findings import (
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.placement_findings import (
     BestSet,
     ChangedOrder,
     PlacementCondition,
@@ -25,6 +24,7 @@ from harness.results.placement_findings import (
     StationNames,
     StationSetResult,
 )
+from harness.study.papers.claims import claim_lower_error
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
 

@@ -26,7 +26,7 @@ from harness.experiment.observed_take import ObservedTake
 from harness.experiment.recorded_take import checked_note, find_playback, recorded_take, registered_take
 from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
-from harness.results.digests import check_key, read_result_json, write_result_json
+from harness.results.files.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
 from harness.results.storage import cell_key
 from harness.score.loops import LoopFrames

@@ -15,11 +15,11 @@ from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.profile import UnitProfile, measure_profile
+from harness.measure.reports.departures import Departure, compare_with_expected
+from harness.measure.reports.unit_report import UnitReport, unit_report
 from harness.measure.unit_file import UnitFile
-from harness.measure.unit_report import UnitReport, unit_report
-from harness.results.digests import file_digest
+from harness.results.files.digests import file_digest
 from harness.simulate.noise import noise_preset
 from harness.stream.recording.recording import EXPECTED_FILE
 from harness.stream.recording.station_readings import CaptureReader

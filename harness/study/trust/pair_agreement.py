@@ -25,7 +25,7 @@ from harness.compare.ranking import shared_clips
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.trust_findings import (
+from harness.results.findings.trust_findings import (
     Equivalence,
     EquivalenceVerdict,
     PairAgreement,

@@ -20,7 +20,7 @@ from harness.core.arrays import Bools, Floats, Ints, find_runs
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.experiment.observed_take import ObservedTake
-from harness.results.trust_findings import StreamHealth
+from harness.results.findings.trust_findings import StreamHealth
 from harness.simulate.trajectory import Trajectory
 from harness.stream.station_counts import StationCounts
 

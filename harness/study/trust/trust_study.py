@@ -25,10 +25,9 @@ from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
-from harness.results.digests import write_result_json
-from harness.results.folder_kind import FINDINGS
-from harness.results.storage import open_study
-from harness.results.trust_findings import (
+from harness.results.files.digests import write_result_json
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.trust_findings import (
     Equivalence,
     ErrorDistance,
     PairAgreement,
@@ -36,6 +35,7 @@ from harness.results.trust_findings import (
     TrustCapture,
     TrustFindings,
 )
+from harness.results.storage import open_study
 from harness.stream.recording.recording import PLAN, read_recording
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
@@ -325,10 +325,10 @@ def _compare_station(results: Sequence[ArmResults], k: int, station: str, featur
 def _carried_plans(path: Path) -> tuple[str, ...]:
     """Digests of the plans that a capture's notes carry; BadFile for notes of different clips."""
     capture = read_recording(path)
-    if len(clips := capture.noted_values("clip")) > 1:
+    if len(clips := capture.note_values("clip")) > 1:
         found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
         raise BadFile(path, found, "one clip", "Record each clip into a file of its own.")
-    return capture.noted_values(PLAN)
+    return capture.note_values(PLAN)
 
 
 def _unit_keys(unit: UnitFile) -> dict[str, Any]:

@@ -12,18 +12,18 @@ from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
 from harness.experiment.recorded_take import registered_take
 from harness.measure.angular_speed import identify_stations, record_period_s
-from harness.measure.departures import Departure, compare_with_expected
 from harness.measure.pose_series import MeasuredPoses
 from harness.measure.registration import Registration, StationResiduals, register, require_stamps
-from harness.measure.unit_file import UnitFile
-from harness.measure.unit_report import CaptureSummary
-from harness.measure.validation_report import (
+from harness.measure.reports.departures import Departure, compare_with_expected
+from harness.measure.reports.unit_report import CaptureSummary
+from harness.measure.reports.validation_report import (
     StationAccuracy,
     ValidationReport,
     error_quantiles,
     estimated_poses,
     residual_series,
 )
+from harness.measure.unit_file import UnitFile
 from harness.stream.is900.codec.items import BITS_PER_BYTE, record_size
 from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.recording.replay import RecordingStream

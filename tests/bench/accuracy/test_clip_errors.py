@@ -11,7 +11,7 @@ from harness.bench.accuracy.conditions import CONDITIONS, SEEDS
 from harness.bench.accuracy.targets import evaluate_targets
 from harness.errors import BadFile, BadInput
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.digests import insert_digest
+from harness.results.files.digests import insert_digest
 from tests.bench.accuracy.planted import COMMIT, errors, stored
 
 ROOT = Path(clip_errors.__file__).parents[3]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.bench.physics import scenes, truth
-from harness.results.benchmark_statement import BenchmarkStatement
+from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.physics.settings import Physics
 
 SEEDS = tuple(range(101, 115))
@@ -71,7 +71,7 @@ def test_a_filter_that_never_gives_a_station_up_is_noticed(monkeypatch: pytest.M
 def test_a_station_is_lost_rather_than_wrong_while_an_accelerometer_is_at_its_limit() -> None:
     physics, seconds, speed_m_s = Physics(), 15.0, 4.0
     source = partial(scenes.free_source, 107, seconds, speed_m_s, physics)
-    motion = source().advance(np.arange(0.0, seconds, 1.0 / 400.0))
+    motion = source().sample_motion(np.arange(0.0, seconds, 1.0 / 400.0))
     force_m_s2 = np.gradient(motion.velocity_m_s[:, 0], 1.0 / 400.0, axis=0)
     assert np.abs(force_m_s2).max() > physics.inertial.accelerometer.limit
     errors = scenes.track_free_station(source, seconds, physics, 107)

@@ -8,10 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.claims import claim_lower_error, claim_published_value
 from harness.core.seeds import generator
-from harness.results.benchmark_statement import BenchmarkStatement
-from harness.results.findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings, write_findings
+from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings.paper_findings import (
+    BarChart,
+    FindingsTable,
+    LineChart,
+    PaperExperiment,
+    PaperFindings,
+    write_findings,
+)
+from harness.study.papers.claims import claim_lower_error, claim_published_value
 from harness.study.papers.station_sets import ranked_bars
 from harness.study.papers.tables import mean_bars, mean_table
 

@@ -29,8 +29,8 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
 from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
+from harness.results.files.integrity import compute_digests
 from harness.results.index import CellIndex
-from harness.results.integrity import compute_digests
 from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.planted import SweepPlan, planted_sweep
 from tests.report.drawing import texts_apart

@@ -7,12 +7,13 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
-from harness.simulate.physics.fusion import Fusion, FusionFilter, empty_outputs
+from harness.simulate.physics.fusion import FusionFilter, empty_outputs
 from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
-from harness.simulate.physics.tracking_state import TRACKING
+from harness.simulate.physics.tracking_status import TRACKING
 from harness.simulate.readings import GRAVITY_M_S2
 
 TICK_HZ = 400.0
@@ -151,7 +152,7 @@ def run(fusion_filter: FusionFilter, *measured: FreeStation, block: int = 10**6,
     outputs = records_every(ticks, len(heard), len(measured))
     for first in range(0, len(heard), block):
         span = slice(first * TICKS_PER_SLOT, (first + block) * TICKS_PER_SLOT)
-        fusion_filter.advance(first, angle[span], gain[span], heard[first : first + block], outputs)
+        fusion_filter.filter_block(first, angle[span], gain[span], heard[first : first + block], outputs)
     return outputs
 
 

@@ -5,10 +5,12 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.physics.acquisition import add_force, begin_search, fix, invert, level_attitude
-from harness.simulate.physics.filter_state import Search
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.acquisition import cholesky_inverse, integrate_path, level_attitude, solve_position
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.filter_state import AcquisitionState
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
+from harness.simulate.physics.tracking_status import reset_acquisition
 from harness.simulate.readings import GRAVITY_M_S2
 from tests.simulate.physics.free_station import (
     FreeStation,
@@ -27,7 +29,7 @@ def searching(station: FreeStation, slots: int = SLOTS) -> FusionFilter:
     fusion_filter = new_filter(fusion=Fusion(), inertial=exact_inertial())
     fusion_filter.model = fusion_filter.model._replace(window_s=0.0)
     measured = station.angle_rad[: 5 * slots, None], station.gain_m_s[: 5 * slots, None], station.range_m[:slots, None]
-    fusion_filter.advance(0, *measured, records_every(5, 0))
+    fusion_filter.filter_block(0, *measured, records_every(5, 0))
     return fusion_filter
 
 
@@ -35,7 +37,7 @@ def try_fix(fusion_filter: FusionFilter, window_s: float = 1.0) -> tuple[bool, F
     """Whether a fix was found, the motion, and P."""
     motion, covariance = fusion_filter.state.motion[0, -1].copy(), np.zeros((15, 15))
     return (
-        fix(fusion_filter.model.ranging, fusion_filter.state.search, 0, window_s, motion, covariance),
+        solve_position(fusion_filter.model.ranging, fusion_filter.state.acquisition, 0, window_s, motion, covariance),
         motion,
         covariance,
     )
@@ -91,23 +93,25 @@ def test_a_fix_uses_the_window_only() -> None:
 def test_gravity_levels_a_station_at_rest(rng: np.random.Generator) -> None:
     turn = rotations.exp(rng.standard_normal(3))  # of the true attitude; the kept one is the identity
     force = rotations.rotate(rotations.inverse(turn), np.array([0.0, 0.0, -GRAVITY_M_S2]))
-    search = Search(np.zeros((1, 4, 12)), np.zeros(1, dtype=np.int64), np.zeros((1, 7)), np.zeros((1, 5)), np.zeros(1))
-    begin_search(search, 0, 1.0)
+    acquisition = AcquisitionState(
+        np.zeros((1, 4, 12)), np.zeros(1, dtype=np.int64), np.zeros((1, 7)), np.zeros((1, 5)), np.zeros(1)
+    )
+    reset_acquisition(acquisition, 0, 1.0)
     motion = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    add_force(search.path[0], force[0], force[1], force[2], 1.0)
+    integrate_path(acquisition.path[0], force[0], force[1], force[2], 1.0)
     for _ in range(80):
         x, y, z = rotations.rotate(motion[6:], force)
-        level_attitude(search, 0, motion, x, y, z, 0.0125)
+        level_attitude(acquisition, 0, motion, x, y, z, 0.0125)
     kept = rotations.rotate(motion[6:], force)
     assert np.arctan2(np.hypot(kept[0], kept[1]), -kept[2]) < 0.01
-    assert np.sqrt(search.tilt_variance[0]) < 0.02
-    np.testing.assert_allclose(search.path[0, 3:6], kept, atol=1e-9)  # what was collected turns along
+    assert np.sqrt(acquisition.tilt_variance[0]) < 0.02
+    np.testing.assert_allclose(acquisition.path[0, 3:6], kept, atol=1e-9)  # what was collected turns along
 
 
 def test_invert_knows_matrices_that_are_not_definite(rng: np.random.Generator) -> None:
     root = rng.standard_normal((9, 9))
     matrix, inverse = root @ root.T, np.empty((9, 9))
-    assert invert(matrix, inverse)
+    assert cholesky_inverse(matrix, inverse)
     np.testing.assert_allclose(inverse @ matrix, np.eye(9), atol=1e-8)
-    assert not invert(matrix - 3.0 * np.trace(matrix) * np.eye(9), inverse)
-    assert not invert(np.zeros((9, 9)), inverse)
+    assert not cholesky_inverse(matrix - 3.0 * np.trace(matrix) * np.eye(9), inverse)
+    assert not cholesky_inverse(np.zeros((9, 9)), inverse)

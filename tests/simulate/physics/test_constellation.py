@@ -116,21 +116,23 @@ def test_a_constellation_without_sense_is_refused(change: dict[str, Any]) -> Non
 
 def test_shifting_moves_every_emitter() -> None:
     cave = load_constellation(ConstellationSettings(name="cave"))
-    moved = cave.shifted(np.array([1.0, -2.0, 0.5]))
+    moved = cave.translate(np.array([1.0, -2.0, 0.5]))
     np.testing.assert_allclose(moved.position_m - cave.position_m, np.tile([1.0, -2.0, 0.5], (9, 1)), atol=1e-12)
     np.testing.assert_array_equal(moved.normal, cave.normal)
 
 
 def test_each_emitter_has_its_own_survey_error() -> None:
     hall = load_constellation(ConstellationSettings(name="hall"))
-    true = hall.surveyed(0.01, 7, "morning")
+    true = hall.with_survey_error(0.01, 7, "morning")
     error_m = true.position_m - hall.position_m
     assert 0.007 < np.std(error_m) < 0.013
-    fewer = Constellation.of_emitters(hall.emitters[5:], hall.cone_rad, hall.range_m).surveyed(0.01, 7, "morning")
+    fewer = Constellation.of_emitters(hall.emitters[5:], hall.cone_rad, hall.range_m).with_survey_error(
+        0.01, 7, "morning"
+    )
     np.testing.assert_array_equal(fewer.position_m, true.position_m[5:])
-    np.testing.assert_array_equal(hall.surveyed(0.0, 7, "morning").position_m, hall.position_m)
-    assert np.all(hall.surveyed(0.01, 7, "evening").position_m != true.position_m)
-    assert np.all(hall.surveyed(0.01, 8, "morning").position_m != true.position_m)
+    np.testing.assert_array_equal(hall.with_survey_error(0.0, 7, "morning").position_m, hall.position_m)
+    assert np.all(hall.with_survey_error(0.01, 7, "evening").position_m != true.position_m)
+    assert np.all(hall.with_survey_error(0.01, 8, "morning").position_m != true.position_m)
 
 
 def test_a_scenario_names_a_file_in_its_folder(tmp_path: Path) -> None:

@@ -18,10 +18,10 @@ from harness.simulate.physics.coverage import (
     MOST_SAMPLES,
     PLAN_POINTS,
     StationCoverage,
+    audible_emitters,
     dilution_of_precision,
     emitter_coverage,
     grid_m,
-    heard_emitters,
     plan_axes_m,
     station_coverage,
 )
@@ -62,9 +62,9 @@ def test_dilution_of_known_arrangements() -> None:
 def test_places_are_heard_in_range_and_cone() -> None:
     places_m = np.array([[0.0, 0.0, 1.5], [0.0, 0.0, 4.0], [0.0, 0.0, 4.1], [0.0, 0.0, -0.5], [0.0, 0.0, 0.3]])
     found = emitter_coverage(cave(), places_m)
-    assert found.heard.tolist() == [9, 1, 0, 0, 3]
-    assert (found.share, found.fixed_share) == pytest.approx((0.4, 0.2))
-    assert found.median_heard == 1.0
+    assert found.emitters.tolist() == [9, 1, 0, 0, 3]
+    assert (found.share, found.fix_share) == pytest.approx((0.4, 0.2))
+    assert found.median_emitters == 1.0
     assert np.isfinite(found.dilution[0])
     assert np.isnan(found.dilution[1:]).all(), "three emitters of one bar and the place lie in a plane"
     assert found.median_dilution == pytest.approx(found.dilution[0])
@@ -72,25 +72,27 @@ def test_places_are_heard_in_range_and_cone() -> None:
 
 
 def test_a_place_at_an_emitter_is_no_error() -> None:
-    assert emitter_coverage(cave(), np.zeros((1, 3))).heard.tolist() == [0]
+    assert emitter_coverage(cave(), np.zeros((1, 3))).emitters.tolist() == [0]
 
 
 def test_a_narrower_cone_and_a_shorter_range_are_heard_less() -> None:
     grid = np.stack(np.meshgrid(*[np.linspace(-1.5, 1.5, 7)] * 2, np.linspace(0.5, 2.5, 5)), axis=-1).reshape(-1, 3)
-    whole = emitter_coverage(cave(), grid).heard
+    whole = emitter_coverage(cave(), grid).emitters
     for less in (cave(cone_deg=40.0), cave(range_m=2.5)):
-        heard = emitter_coverage(less, grid).heard
+        heard = emitter_coverage(less, grid).emitters
         assert np.all(heard <= whole)
         assert heard.sum() < whole.sum()
 
 
 def test_an_emitter_that_faces_away_is_not_heard() -> None:
     up = [Emitter(n, (0.1 * n, 0.02 * n * n, 0.0), (0.0, 0.0, -1.0), n) for n in (1, 2, 3)]
-    assert emitter_coverage(Constellation.of_emitters(up, 1.2, 4.0), np.array([[0.0, 0.0, 1.0]])).heard.tolist() == [0]
+    assert emitter_coverage(Constellation.of_emitters(up, 1.2, 4.0), np.array([[0.0, 0.0, 1.0]])).emitters.tolist() == [
+        0
+    ]
 
 
 def test_a_plan_view_shows_the_emitters_and_two_metres_around() -> None:
-    x_m, y_m = plan_axes_m(cave().shifted(np.array([1.0, 0.0, 0.0])))
+    x_m, y_m = plan_axes_m(cave().translate(np.array([1.0, 0.0, 0.0])))
     assert (len(x_m), len(y_m)) == (PLAN_POINTS, PLAN_POINTS)
     np.testing.assert_allclose([x_m[0], x_m[-1], y_m[0], y_m[-1]], [-1.9144, 3.9144, -2.6096, 2.6096])
 
@@ -107,11 +109,11 @@ FACING_UP = np.array([[0.0, 1.0, 0.0, 0.0]])
 
 def test_a_station_hears_what_it_faces() -> None:
     at_m = np.array([[0.0, 0.0, 1.5]])
-    assert heard_emitters(CAVE, at_m, FACING_UP, Sound(), None).all()
+    assert audible_emitters(CAVE, at_m, FACING_UP, Sound(), None).all()
     facing_down = np.array([[1.0, 0.0, 0.0, 0.0]])
-    assert not heard_emitters(CAVE, at_m, facing_down, Sound(), None).any()
+    assert not audible_emitters(CAVE, at_m, facing_down, Sound(), None).any()
     forward = np.array([[np.cos(np.pi / 4), 0.0, np.sin(np.pi / 4), 0.0]])
-    heard = heard_emitters(CAVE, np.array([[0.0, 0.0, 0.6]]), forward, Sound(), None)[0]
+    heard = audible_emitters(CAVE, np.array([[0.0, 0.0, 0.6]]), forward, Sound(), None)[0]
     assert heard[3:].sum() > heard[:6].sum(), "emitters in front are louder than those behind"
 
 
@@ -128,11 +130,11 @@ def test_the_body_and_furniture_shadow_a_station() -> None:
     free = station_coverage(CAVE, body, still(), calibration, room=open_room)
     worn = station_coverage(CAVE, body, still(), calibration, room=shadow)
     assert free.stations == ("chest", "back")
-    assert free.heard.shape == (11, 2)
-    assert np.all(worn.heard <= free.heard)
-    assert worn.heard.sum() < free.heard.sum()
+    assert free.emitters.shape == (11, 2)
+    assert np.all(worn.emitters <= free.emitters)
+    assert worn.emitters.sum() < free.emitters.sum()
     roof = Box(centre_m=(0.0, 0.0, 2.3), size_m=(4.0, 4.0, 0.1))
-    assert station_coverage(CAVE, body, still(), calibration, room=Room(furniture=(roof,))).heard.sum() == 0
+    assert station_coverage(CAVE, body, still(), calibration, room=Room(furniture=(roof,))).emitters.sum() == 0
 
 
 def test_the_constellation_stands_above_the_path() -> None:
@@ -142,7 +144,7 @@ def test_the_constellation_stands_above_the_path() -> None:
     qpos = np.array(motion.qpos)
     qpos[:, :2] += [30.0, -20.0]
     far = BodyMotion("far", "p1", "test", "boxing", 40.0, qpos)
-    near_heard, far_heard = (station_coverage(CAVE, body, each, calibration).heard for each in (motion, far))
+    near_heard, far_heard = (station_coverage(CAVE, body, each, calibration).emitters for each in (motion, far))
     np.testing.assert_array_equal(near_heard, far_heard)
     assert near_heard.min() > 0
 
@@ -150,7 +152,7 @@ def test_the_constellation_stands_above_the_path() -> None:
 def test_a_long_clip_is_sampled() -> None:
     body = build_body(synthetic.performer_skeleton("p1"))
     calibration = exact_calibration(body, [Mount("head", "head", 1.0, 0.0)], TrackerConfig())
-    assert len(station_coverage(CAVE, body, still(90.0), calibration).heard) == MOST_SAMPLES
+    assert len(station_coverage(CAVE, body, still(90.0), calibration).emitters) == MOST_SAMPLES
 
 
 def test_shares_sum_to_one() -> None:
@@ -160,7 +162,7 @@ def test_shares_sum_to_one() -> None:
     assert coverage.shares(1) == (0.0, 0.0, 0.0, 1.0)
     assert np.isnan(coverage.median_dilution(0))
     assert coverage.median_dilution(1) == 3.0
-    assert (coverage.fixed_share(0), coverage.fixed_share(1)) == (0.0, 0.75)
+    assert (coverage.fix_share(0), coverage.fix_share(1)) == (0.0, 0.75)
 
 
 def walker_coverage(seed: int) -> dict[str, StationCoverage]:
@@ -175,7 +177,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
             body, motion = retarget_to_own_body(synthetic.generate("walking", performer, take, seed=seed))
             first = BodyMotion(motion.name, performer, "test", "walking", motion.rate_hz, motion.qpos[:1201])
             parts.append(station_coverage(hall, body, first, exact_calibration(body, mounts, TrackerConfig())))
-        heard, dilution = (np.concatenate([getattr(part, name) for part in parts]) for name in ("heard", "dilution"))
+        heard, dilution = (np.concatenate([getattr(part, name) for part in parts]) for name in ("emitters", "dilution"))
         out[performer] = StationCoverage(parts[0].stations, heard, dilution)
     return out
 
@@ -188,4 +190,4 @@ def test_stations_of_walkers_hear_three_emitters_of_hall(seed: int) -> None:
     for performer, found in coverage.items():
         for row, station in enumerate(found.stations):
             assert found.shares(row)[3] >= 0.9, (performer, station)
-            assert found.fixed_share(row) >= 0.9, (performer, station)
+            assert found.fix_share(row) >= 0.9, (performer, station)

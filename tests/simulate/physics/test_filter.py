@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.sound import Sound
 from tests.simulate.physics.free_station import (
@@ -58,7 +59,9 @@ def test_equals_a_plain_filter_written_apart(fusion: Fusion, rng: np.random.Gene
     for slot, ranges in enumerate(station.range_m):
         span = slice(5 * slot, 5 * slot + 5)
         outputs = records_every(5, 0)
-        kernel.advance(slot, station.angle_rad[span, None], station.gain_m_s[span, None], ranges[None, None], outputs)
+        kernel.filter_block(
+            slot, station.angle_rad[span, None], station.gain_m_s[span, None], ranges[None, None], outputs
+        )
         plain.slot(station.angle_rad[span], station.gain_m_s[span], ranges, slot % 9)
         motion = kernel.state.motion[0, -1]
         np.testing.assert_allclose(motion[:3], plain.position, rtol=0.0, atol=1e-9)

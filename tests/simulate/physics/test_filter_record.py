@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.simulate.physics.filter_record import add_to_offset, decay
+from harness.simulate.physics.filter_record import add_to_offset, decay_offsets
 
 
 def test_an_offset_undoes_a_correction(rng: np.random.Generator) -> None:
@@ -21,12 +21,12 @@ def test_an_offset_undoes_a_correction(rng: np.random.Generator) -> None:
 def test_mode_2_corrects_only_while_moving(speed_m_s: float, turn_rad_s: float, moving: float) -> None:
     offsets = np.ones((2, 6))
     for _ in range(20):
-        decay(offsets, 0.0125, speed_m_s, turn_rad_s)
+        decay_offsets(offsets, 0.0125, speed_m_s, turn_rad_s)
     np.testing.assert_allclose(offsets[0], np.exp(-1.0))
     np.testing.assert_allclose(offsets[1], moving, atol=0.002)
 
 
 def test_offsets_decay_at_most_as_fast_as_the_limit() -> None:
     offsets = np.ones((2, 6))
-    decay(offsets, 0.0125, 100.0, 100.0)
+    decay_offsets(offsets, 0.0125, 100.0, 100.0)
     np.testing.assert_allclose(offsets[1], np.exp(-0.25))

@@ -7,7 +7,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
-from tests.simulate.physics.test_worn import central_differences, ticks_s
+from tests.simulate.physics.test_station_displacement import central_differences, ticks_s
 
 
 def tumbling(rate_hz: float = 50.0) -> tuple[Floats, FreeMotionSource]:
@@ -21,7 +21,7 @@ def tumbling(rate_hz: float = 50.0) -> tuple[Floats, FreeMotionSource]:
 
 def test_it_goes_through_its_samples() -> None:
     time_s, source = tumbling()
-    motion = source.advance(time_s)
+    motion = source.sample_motion(time_s)
     angle = time_s[:, None] * np.array([2.0, 3.0])
     np.testing.assert_allclose(motion.position_m[..., 0], np.cos(angle), atol=1e-12)
     true = rotations.exp(angle[..., None] * np.array([0.6, 0.0, 0.8]))
@@ -33,7 +33,7 @@ def test_it_goes_through_its_samples() -> None:
 
 def test_velocities_are_derivatives() -> None:
     _, source = tumbling()
-    motion = source.advance(1e-4 * np.arange(-5000.0, 45001.0))
+    motion = source.sample_motion(1e-4 * np.arange(-5000.0, 45001.0))
     slope, spin = central_differences(motion)
     assert np.abs(slope - motion.velocity_m_s[1:-1]).max() < 2e-3  # where acceleration jumps, at the ends
     assert np.median(np.abs(slope - motion.velocity_m_s[1:-1])) < 1e-7
@@ -45,10 +45,10 @@ def test_it_rests_before_and_after() -> None:
     _, source = tumbling()
     assert source.begins_s == -1.0
     assert source.ends_s > 4.3
-    before = source.advance(ticks_s(-1.0, -0.41))
+    before = source.sample_motion(ticks_s(-1.0, -0.41))
     assert not before.velocity_m_s.any()
     assert not before.turn_rad_s.any()
-    after = source.advance(ticks_s(4.31, 5.0))
+    after = source.sample_motion(ticks_s(4.31, 5.0))
     assert not after.velocity_m_s.any()
 
 
@@ -57,7 +57,7 @@ def test_a_random_motion_has_its_size_and_speed(speed_m_s: float) -> None:
     source = random_motion(
         1, "wand", seconds=30.0, size_m=1.0, speed_m_s=speed_m_s, warm_up_s=1.0, centre_m=(0.0, 0.5, 1.0)
     )
-    motion = source.advance(ticks_s(0.0, 30.0))
+    motion = source.sample_motion(ticks_s(0.0, 30.0))
     assert np.linalg.norm(motion.velocity_m_s[:, 0], axis=1).mean() == pytest.approx(speed_m_s, rel=0.01)
     assert np.abs(motion.position_m[:, 0] - [0.0, 0.5, 1.0]).max() < 0.5
     tilt = rotations.angle_between_rad(motion.tracker_from_station[:, 0], FACING_UP)
@@ -67,13 +67,15 @@ def test_a_random_motion_has_its_size_and_speed(speed_m_s: float) -> None:
 
 def test_another_speed_follows_the_same_path() -> None:
     slow, fast = (
-        random_motion(1, "wand", seconds=30.0, size_m=1.0, speed_m_s=speed, warm_up_s=1.0).advance(ticks_s(0.0, 30.0))
+        random_motion(1, "wand", seconds=30.0, size_m=1.0, speed_m_s=speed, warm_up_s=1.0).sample_motion(
+            ticks_s(0.0, 30.0)
+        )
         for speed in (0.2, 2.0)
     )
     apart_m = np.linalg.norm(slow.position_m[::100] - fast.position_m[:, 0], axis=-1)
     assert apart_m.min(axis=1).max() < 4e-3  # ticks of the fast one are 5 mm apart
     other = random_motion(2, "wand", seconds=30.0, size_m=1.0, speed_m_s=0.2, warm_up_s=1.0)
-    assert np.abs(other.advance(ticks_s(0.0, 1.0)).position_m[0] - slow.position_m[0]).max() > 0.01
+    assert np.abs(other.sample_motion(ticks_s(0.0, 1.0)).position_m[0] - slow.position_m[0]).max() > 0.01
 
 
 def test_what_is_no_motion_is_refused() -> None:
@@ -82,4 +84,4 @@ def test_what_is_no_motion_is_refused() -> None:
     with pytest.raises(BadInput, match="no motion"):
         FreeMotionSource(("a",), np.zeros(1), np.zeros((1, 1, 3)), np.ones((1, 1, 4)), warm_up_s=1.0)
     with pytest.raises(BadInput, match="outside the motion"):
-        tumbling()[1].advance(ticks_s(-2.0, 0.0))
+        tumbling()[1].sample_motion(ticks_s(-2.0, 0.0))

@@ -8,8 +8,9 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import ShapeError
+from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
-from harness.simulate.physics.fusion import Fusion, FusionFilter
+from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
 from tests.simulate.physics.free_station import (
     EMITTER_M,
@@ -92,7 +93,9 @@ def test_records_between_ticks_follow_the_motion() -> None:
     fusion_filter = new_filter(inertial=exact_inertial())
     start(fusion_filter, station, np.zeros(15))
     outputs = records_every(7, len(station.range_m), fraction=0.5)
-    fusion_filter.advance(0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m[:, None], outputs)
+    fusion_filter.filter_block(
+        0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m[:, None], outputs
+    )
     k = outputs.tick[1:, 0]
     between = 0.5 * (station.position_m[k] + station.position_m[k + 1])
     assert np.abs(outputs.position_m[1:, 0, 0] - between).max() < 2e-4
@@ -179,7 +182,7 @@ def test_the_spread_at_rest_is_the_published_one() -> None:
 def test_wrong_shapes_are_refused() -> None:
     station = free_station(1.0, 0)
     with pytest.raises(ShapeError, match="range_m"):
-        new_filter().advance(
+        new_filter().filter_block(
             0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m, records_every(5, 80)
         )
 

@@ -18,7 +18,7 @@ from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import TrackerConfig, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
-from tests.simulate.physics.test_worn import TICK_HZ, TISSUE, source_of, ticks_s
+from tests.simulate.physics.test_station_displacement import TICK_HZ, TISSUE, source_of, ticks_s
 
 LEVER_M = np.array([0.01, 0.015, -0.005])
 GRAVITY_M_S2 = np.array([0.0, 0.0, 9.81])
@@ -66,7 +66,7 @@ def test_increments_are_integrals_of_the_sensors_of_mujoco(boxer: tuple[Body, Bo
     compared = 0
     for first in range(40, 4 * len(take) - 8, 371):
         time_s = step_s * np.arange(first, first + 2.0)
-        motion = source_of(boxer, Noise(), (station,)).advance(time_s)
+        motion = source_of(boxer, Noise(), (station,)).sample_motion(time_s)
         angle_rad, gain_m_s = true_increments(motion, LEVER_M)
         axes_before = sensors.read(time_s[0])[2]
         moments_s = time_s[0] + 0.5 * step_s * (1.0 + GAUSS[0])
@@ -96,7 +96,7 @@ def test_force_and_rate_are_those_of_the_sensors_of_mujoco(boxer: tuple[Body, Bo
     station_from_world = rotations.inverse(true.world_from_station[:, 0])
     force = rotations.rotate(station_from_world, true.acceleration_m_s2[:, 0] + GRAVITY_M_S2)
     rate = rotations.rotate(station_from_world, true.turn_rad_s[:, 0])
-    motion = source_of(boxer, Noise(), (station,)).advance(time_s)
+    motion = source_of(boxer, Noise(), (station,)).sample_motion(time_s)
     velocity_m_s = motion.points(LEVER_M)[1][:, 0] * [1.0, -1.0, -1.0]
     np.testing.assert_allclose(velocity_m_s, true.velocity_m_s[:, 0], atol=1e-9)
     for row, moment_s in enumerate(time_s):
@@ -108,9 +108,9 @@ def test_force_and_rate_are_those_of_the_sensors_of_mujoco(boxer: tuple[Body, Bo
 @pytest.mark.parametrize("noise", [Noise(), TISSUE], ids=["bare", "tissue"])
 def test_dead_reckoning_without_noise(boxer: tuple[Body, BodyMotion], noise: Noise) -> None:
     """From the true first state, ten seconds of boxing stay within 2 mm and 0.01 deg."""
-    motion = source_of(boxer, noise).advance(ticks_s(-0.5, 11.0))
+    motion = source_of(boxer, noise).sample_motion(ticks_s(-0.5, 11.0))
     unit = InertialUnit(CLEAN, ("",) * 6, seed=1, take="t")
-    angle_rad, gain_m_s = unit.measure(*true_increments(motion, LEVER_M))
+    angle_rad, gain_m_s = unit.measure_increments(*true_increments(motion, LEVER_M))
     place_m, speed_m_s = (column[0] for column in motion.points(LEVER_M))
     turn = motion.tracker_from_station[0]
     for angle, gain in zip(angle_rad, gain_m_s, strict=True):
@@ -134,7 +134,7 @@ def test_a_station_at_rest_measures_gravity_alone() -> None:
 def test_without_errors_a_unit_measures_the_truth() -> None:
     rng = np.random.default_rng(2)
     true = rng.normal(size=(2, 50, 3, 3))
-    for one, other in zip(true, InertialUnit(CLEAN, "abc", seed=1, take="t").measure(*true), strict=True):
+    for one, other in zip(true, InertialUnit(CLEAN, "abc", seed=1, take="t").measure_increments(*true), strict=True):
         assert np.array_equal(one, other)
 
 
@@ -150,7 +150,7 @@ def with_errors(**errors: float) -> Inertial:
 def measured(settings: Inertial, true: Floats, stations: int) -> Floats:
     """Measured increments (2, T, S, 3) for the same true ones of both triads."""
     names = tuple(f"s{s}" for s in range(stations))
-    return np.array(InertialUnit(settings, names, seed=4, take="t", session="day").measure(true, true))
+    return np.array(InertialUnit(settings, names, seed=4, take="t", session="day").measure_increments(true, true))
 
 
 def test_values_beyond_the_limit_are_cut() -> None:
@@ -186,7 +186,9 @@ def test_constant_errors_belong_to_the_session() -> None:
     true = np.full((1, 2, 3), 0.01)
 
     def seen(take: str, session: str) -> Floats:
-        return np.array(InertialUnit(settings, ("a", "b"), seed=4, take=take, session=session).measure(true, true))
+        return np.array(
+            InertialUnit(settings, ("a", "b"), seed=4, take=take, session=session).measure_increments(true, true)
+        )
 
     assert np.array_equal(seen("one", "day"), seen("two", "day"))
     assert not np.isclose(seen("one", "day"), seen("one", "night")).any()

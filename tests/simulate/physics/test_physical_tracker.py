@@ -9,12 +9,12 @@ from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
 from harness.simulate.physics import physical_tracker
-from harness.simulate.physics.fusion import Fusion
+from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
 from harness.simulate.physics.ranging import Ranges
 from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sight import Sight
-from harness.simulate.physics.worn import BodyMotionSource, Worn
+from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.simulation import exact_calibration
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
@@ -49,29 +49,29 @@ def make_tracker() -> PhysicalTracker:
     constellation, placed = place_constellation(trajectory, calibration, physics)
     whole = trajectory.with_lead_in(lead_in_s(physics)).with_lead_out(0.5)
     skin = skin_below(body.skeleton, mounts, calibration)
-    component = Worn(Noise(), calibration.stations, skin, tick_hz=400.0, ends_s=3.0, seed=1, take="t")
+    component = StationDisplacement(Noise(), calibration.stations, skin, tick_hz=400.0, ends_s=3.0, seed=1, take="t")
     source = BodyMotionSource(whole, calibration, component)
-    return PhysicalTracker(source, physics, constellation, placed, Sight(body, placed), seed=1, take="t")
+    return PhysicalTracker(source, physics, constellation, placed, LineOfSight(body, placed), seed=1, take="t")
 
 
 def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted again by hand: three emitters heard within the last turn, and the share of echoes, from time 0 on."""
     tracker, seen = make_tracker(), dict[int, tuple[Ranges, int]]()
-    measure = tracker.ranging.measure
+    measure = tracker.ranging.measure_ranges
 
     def watched(first: int, motion: object, qpos: object) -> Ranges:
         found = measure(first, motion, qpos)  # type: ignore[arg-type]
         seen.update({first + k: (found, k) for k in range(len(found.emitter))})
         return found
 
-    monkeypatch.setattr(tracker.ranging, "measure", watched)
+    monkeypatch.setattr(tracker.ranging, "measure_ranges", watched)
     time_s = np.repeat(np.arange(0.0, 2.5, 0.025)[:, None], 2, axis=1)
-    found = tracker.measure(time_s)
+    found = tracker.measure_take(time_s)
     slots = range(int(np.floor(2.475 * 400.0)) // 5 + 1)
     for station in range(2):
         heard = {slot: bool(ranges.direct[k, station].any()) for slot, (ranges, k) in seen.items()}
         enough = [sum(heard.get(slot - back, False) for back in range(9)) >= 3 for slot in slots]
-        assert found.hearing_share[station] == pytest.approx(np.mean(enough))
+        assert found.coverage_share[station] == pytest.approx(np.mean(enough))
         received = sum(int(np.sum(~np.isnan(seen[slot][0].range_m[seen[slot][1], station]))) for slot in slots)
         echoes = sum(int(np.sum(seen[slot][0].echo[seen[slot][1], station])) for slot in slots)
         assert found.echo_share[station] == pytest.approx(echoes / received)
@@ -80,7 +80,7 @@ def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_part_of_the_records_has_their_values() -> None:
     """Values are those of the record's time, however many others are asked for."""
     time_s = np.repeat(np.arange(0.0, 2.5, 0.025)[:, None], 2, axis=1)
-    whole, some = make_tracker().measure(time_s), make_tracker().measure(time_s[7::13])
+    whole, some = make_tracker().measure_take(time_s), make_tracker().measure_take(time_s[7::13])
     np.testing.assert_array_equal(some.position_m, whole.position_m[7::13])
     np.testing.assert_array_equal(some.quality, whole.quality[7::13])
     np.testing.assert_array_equal(some.ranges_received, whole.ranges_received[7::13])

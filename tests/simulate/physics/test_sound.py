@@ -172,10 +172,10 @@ def test_number_and_duration_are_those_of_the_settings() -> None:
 
 def test_bursts_do_not_depend_on_when_the_simulation_begins() -> None:
     edges_s: Floats = 0.0125 * np.arange(-4000.0, 12_001.0)
-    whole = Bursts(30.0, (0.05, 2.0), seed=1, take="t").touch(edges_s[:-1], edges_s[1:])
+    whole = Bursts(30.0, (0.05, 2.0), seed=1, take="t").overlaps(edges_s[:-1], edges_s[1:])
     assert 0.1 < whole[:4000].mean() < 0.9
     for first in (1, 3999, 4000, 9000):
-        part = Bursts(30.0, (0.05, 2.0), seed=1, take="t").touch(edges_s[first:-1], edges_s[first + 1 :])
+        part = Bursts(30.0, (0.05, 2.0), seed=1, take="t").overlaps(edges_s[first:-1], edges_s[first + 1 :])
         np.testing.assert_array_equal(part, whole[first:])
 
 
@@ -183,8 +183,8 @@ def test_a_burst_touches_the_intervals_that_it_overlaps() -> None:
     bursts = Bursts(20.0, (0.5, 1.0), seed=3, take="t")
     begins_s, ends_s = bursts.intervals_s(0.0, 60.0)[0]
     edges_s = np.array([begins_s - 0.2, begins_s - 0.1, begins_s + 0.1, begins_s + 0.2])
-    np.testing.assert_array_equal(bursts.touch(edges_s[:-1], edges_s[1:]), [False, True, True])
-    assert bursts.touch(np.array([ends_s - 0.01]), np.array([ends_s + 5.0])).all()
+    np.testing.assert_array_equal(bursts.overlaps(edges_s[:-1], edges_s[1:]), [False, True, True])
+    assert bursts.overlaps(np.array([ends_s - 0.01]), np.array([ends_s + 5.0])).all()
 
 
 def test_a_burst_goes_on_over_the_minute() -> None:
@@ -193,7 +193,7 @@ def test_a_burst_goes_on_over_the_minute() -> None:
     assert over
     for _, ends_s in over:
         begin_s = np.array([ends_s // 60.0 * 60.0])
-        assert Bursts(30.0, (0.5, 2.0), seed=3, take="t").touch(begin_s, begin_s + 1e-6).all()
+        assert Bursts(30.0, (0.5, 2.0), seed=3, take="t").overlaps(begin_s, begin_s + 1e-6).all()
 
 
 def test_takes_and_seeds_differ() -> None:
@@ -204,4 +204,4 @@ def test_takes_and_seeds_differ() -> None:
 
 def test_no_bursts() -> None:
     edges_s = np.arange(0.0, 600.0, 0.0125)
-    assert not Bursts(0.0, (0.05, 0.3), seed=1, take="t").touch(edges_s[:-1], edges_s[1:]).any()
+    assert not Bursts(0.0, (0.05, 0.3), seed=1, take="t").overlaps(edges_s[:-1], edges_s[1:]).any()

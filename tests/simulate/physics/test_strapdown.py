@@ -8,9 +8,9 @@ from harness.simulate.physics.strapdown import (
     add_tick,
     attitude_sigma_rad,
     integrate,
+    joseph_update,
     position_sigma_m,
-    propagate,
-    update,
+    propagate_covariance,
 )
 from harness.simulate.readings import GRAVITY_M_S2
 from tests.simulate.physics.free_station import TICK_HZ, free_station
@@ -77,7 +77,7 @@ def test_the_transition_is_the_slope_of_the_integration() -> None:
     root = rng.standard_normal((15, 15))
     covariance = root @ root.T
     expected = whole @ covariance @ whole.T
-    propagate(covariance, transition, 5.0 * DT, np.empty((9, 15)))
+    propagate_covariance(covariance, transition, 5.0 * DT, np.empty((9, 15)))
     np.testing.assert_allclose(covariance, expected, rtol=1e-12, atol=1e-9)
 
 
@@ -89,7 +89,7 @@ def test_joseph_update_equals_the_dense_one_for_any_gain(rng: np.random.Generato
     total = 1.1 * float(slope @ column + noise)  # a gain that is not the best one
     rest = np.eye(15) - np.outer(column / total, slope)
     expected = rest @ covariance @ rest.T + noise * np.outer(column, column) / total**2
-    update(covariance, slope[:9], column, total, noise, np.empty(15))
+    joseph_update(covariance, slope[:9], column, total, noise, np.empty(15))
     np.testing.assert_allclose(covariance, expected, rtol=1e-10, atol=1e-10)
 
 

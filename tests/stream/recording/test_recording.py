@@ -430,7 +430,7 @@ def with_notes(path: Path, notes: list[dict[str, str] | None]) -> Path:
 def test_the_values_of_all_notes_and_of_data_before_them(
     tmp_path: Path, notes: list[dict[str, str] | None], values: tuple[str, ...]
 ) -> None:
-    assert read_recording(with_notes(tmp_path / "a.rec", notes)).noted_values("plan") == values
+    assert read_recording(with_notes(tmp_path / "a.rec", notes)).note_values("plan") == values
 
 
 @pytest.mark.parametrize("plan", ["", "b" * 64])
@@ -450,13 +450,13 @@ def test_a_plan_comes_before_the_first_data(tmp_path: Path, notes: list[dict[str
         RecordingWriter(path, {"plan": "a" * 64})
     with RecordingWriter(path) as writer:
         writer.on_sent(b"c", 2.0, 2.0)
-    assert read_recording(path).noted_values("plan") == ("",)
+    assert read_recording(path).note_values("plan") == ("",)
 
 
 def test_a_recording_of_a_plan_goes_on_under_it(tmp_path: Path) -> None:
     path = with_notes(tmp_path / "a.rec", [{"plan": "a" * 64}, None])
     with RecordingWriter(path, {"plan": "a" * 64}) as writer:
         writer.on_configured(FOUR, 2.0, 2.0)
-    assert read_recording(path).noted_values("plan") == ("a" * 64,)
+    assert read_recording(path).note_values("plan") == ("a" * 64,)
     (tmp_path / "empty.rec").touch()
     RecordingWriter(tmp_path / "empty.rec", {"plan": "a" * 64}).close()

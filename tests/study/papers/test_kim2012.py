@@ -11,7 +11,7 @@ from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.plan import check_names
 from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.findings import PaperFindings, read_findings, write_findings
+from harness.results.findings.paper_findings import PaperFindings, read_findings, write_findings
 from harness.results.storage import open_study
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
 from harness.study.papers.paper_study import PaperStudy, run_scenarios

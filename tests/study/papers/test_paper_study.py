@@ -16,9 +16,9 @@ from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.experiment.status import read_status
-from harness.results.digests import read_result_json, write_result_json
-from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
-from harness.results.folder_kind import folder_lock
+from harness.results.files.digests import read_result_json, write_result_json
+from harness.results.files.folder_kind import folder_lock
+from harness.results.findings.paper_findings import BarChart, LineChart, PaperExperiment, read_findings
 from harness.results.storage import open_study
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios

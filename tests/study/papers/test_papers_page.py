@@ -10,7 +10,7 @@ import pytest
 import harness
 from harness.report.kit.statement_lines import MARKS
 from harness.report.paper.page import KINDS
-from harness.results.findings import PaperExperiment
+from harness.results.findings.paper_findings import PaperExperiment
 from harness.study.papers.paper import PAPERS, load_paper
 from harness.study.papers.paper_study import PaperStudy
 
@@ -42,7 +42,8 @@ def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "notes" / "paper_experiments.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     imports = (
-        "from harness.results.findings import PaperExperiment\nfrom harness.compare.claims import claim_lower_error\n"
+        "from harness.results.findings.paper_findings import PaperExperiment\n"
+        "from harness.study.papers.claims import claim_lower_error\n"
         "from harness.study.papers.paper_study import PaperStudy\n"
         "from harness.study.papers.tables import errors_by_unit, mean_bars\n\n\n"
     )

@@ -9,7 +9,7 @@ import pytest
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.package_data import data_folder
 from harness.core.skeleton import Skeleton
-from harness.results.findings import PaperExperiment
+from harness.results.findings.paper_findings import PaperExperiment
 from harness.stream.inputs import make_inputs
 from harness.study.papers.bone_lengths import evaluate_bone_modes
 from harness.study.papers.kim2012 import PAPER as KIM

@@ -11,7 +11,7 @@ from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
-from harness.results.findings import BarChart
+from harness.results.findings.paper_findings import BarChart
 from harness.study.papers import published_speed as module
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import (

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.__main__ import main
-from harness.compare.claims import claim_lower_error
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.findings import PaperExperiment
+from harness.results.findings.paper_findings import PaperExperiment
 from harness.study.papers import paper as papers
+from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper import Paper
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import error_lines, errors_by_joint_group, errors_by_unit, mean_bars, mean_table

@@ -11,7 +11,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGrid,

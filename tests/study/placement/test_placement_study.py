@@ -14,8 +14,13 @@ from harness.compare.units import Sampling
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.status import read_status
-from harness.results.folder_kind import FINDINGS
-from harness.results.placement_findings import PlacementFindings, StatisticalPower, read_placement, write_placement
+from harness.results.files.folder_kind import FINDINGS
+from harness.results.findings.placement_findings import (
+    PlacementFindings,
+    StatisticalPower,
+    read_placement,
+    write_placement,
+)
 from harness.results.storage import open_study
 from harness.simulate.link import TrackerConfig
 from harness.study.placement import placement_study

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.compare.significance import SIGNIFICANCE, count_needed, sign_flip_p
-from harness.results.placement_findings import CandidatePlace
+from harness.results.findings.placement_findings import CandidatePlace
 from harness.study.placement.power import (
     POWER,
     choose_pilot,

@@ -18,9 +18,9 @@ from harness.experiment import evaluation
 from harness.experiment.methods.remote_method import run_over_frames
 from harness.experiment.playback import prepare_playback
 from harness.measure.unit_file import UnitFile, write_unit_file
-from harness.results.digests import read_result_json, write_result_json
-from harness.results.folder_kind import FINDINGS, folder_lock
-from harness.results.trust_findings import Equivalence, PairAgreement, SideDifference
+from harness.results.files.digests import read_result_json, write_result_json
+from harness.results.files.folder_kind import FINDINGS, folder_lock
+from harness.results.findings.trust_findings import Equivalence, PairAgreement, SideDifference
 from harness.stream.recording.blocks import NOTE, RecordingBlock, encode_block
 from harness.stream.recording.recording import record_capture
 from harness.study.trust.arm_results import Arm, TrustTask, read_cell_errors, run_capture

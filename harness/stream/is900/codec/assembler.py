@@ -80,9 +80,9 @@ class FrameAssembler:
 
         `now_s` is a time of the host clock [s].
         """
-        return self.finish() if self.has_waited(self.since_s, now_s) else []
+        return self.finish() if self.has_timed_out(self.since_s, now_s) else []
 
-    def has_waited(self, since_s: float | None, now_s: float) -> bool:
+    def has_timed_out(self, since_s: float | None, now_s: float) -> bool:
         """Whether a frame that began at `since_s` has waited 1.5 periods for its last stations."""
         return since_s is not None and now_s - since_s > TIMEOUT_PERIODS * self._period_s
 

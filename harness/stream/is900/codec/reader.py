@@ -171,7 +171,7 @@ class FrameReader:
             began_s = float(self._deferred[0][1][0])
         return (
             [*self._process_deferred(), *self._assembler.expire(now_s)]
-            if self._assembler.has_waited(began_s, now_s)
+            if self._assembler.has_timed_out(began_s, now_s)
             else []
         )
 

@@ -25,7 +25,7 @@ from harness.stream.is900.driver.connection import (
     detect_device,
     query_status,
 )
-from harness.stream.is900.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
+from harness.stream.is900.driver.session_settings import SessionSettings, read_settings, restore_settings, set_defaults
 from harness.stream.is900.driver.stations import StationSelection, restore_stations, select_stations
 from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.is900.driver.transport import UDP_SCHEME, LineLost
@@ -126,7 +126,7 @@ class Is900(Tracker):
         is_back = False
         with contextlib.suppress(LineLost):
             line.stop()
-            is_back = found is not None and put_back(line, found, keep, aligned, config.boresight)
+            is_back = found is not None and restore_settings(line, found, keep, aligned, config.boresight)
             for station in self._stations.others + self._stations.woken:
                 line.send(station_command("l", station, [station in self._stations.others]))
             # A port that is closed may drop bytes that have not left it, so wait until the device has answered.
@@ -175,7 +175,7 @@ class Is900(Tracker):
             self._line.send(commands.TRACKING)
         if 21 in self._wire.items and now_s - self._zeroed_s >= self._timing.rezero_s:
             self._zeroed_s = now_s
-            self._watchdog.note_zeroing()
+            self._watchdog.expect_clock_reset()
             self._line.send(commands.ZERO_CLOCK)
 
     def _handle(self, diagnosis: Diagnosis) -> None:

@@ -180,7 +180,9 @@ def set_defaults(port: str, line: DeviceConnection, found: SessionSettings, undo
                 )
 
 
-def put_back(line: DeviceConnection, found: SessionSettings, keep: bool, aligned: bool, boresight: bool) -> bool:
+def restore_settings(
+    line: DeviceConnection, found: SessionSettings, keep: bool, aligned: bool, boresight: bool
+) -> bool:
     """Give the device the settings that it had. Returns False when it does not answer.
 
     With `keep` only what every session changes is put back: format, units and lists. `aligned` and

@@ -74,8 +74,8 @@ class Watchdog:
         self._stations.start(wire, now_s)
         self._garbage_bytes, self._resets, self._expected_resets, self._complaints, self._connected = 0, 0, 0, {}, False
 
-    def note_zeroing(self) -> None:
-        """Note that the driver has set the device's clock to zero."""
+    def expect_clock_reset(self) -> None:
+        """The driver has set the device's clock to zero: its next reset is no fault."""
         self._expected_resets += 1
 
     def report(self, kind: LineEventKind, text: str, now_s: float, action: RecoveryAction = "none") -> Diagnosis:

@@ -110,7 +110,7 @@ class EmulatorConfig:
             if not possible:
                 raise BadInput(f"{name} = {getattr(self, name):g} is not possible.", advice)
 
-    def plugged(self, stations: int) -> str:
+    def station_characters(self, stations: int) -> str:
         """Return the characters of this many stations. Raises BadInput when they do not fit."""
         known = STATION_CHARACTERS.decode()
         characters = self.characters or known[:stations]

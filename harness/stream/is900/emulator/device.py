@@ -43,13 +43,13 @@ def _switch_station(device: DeviceState, argument: CommandArgument, now_s: float
         device.reply(now_s, *QUERIES["l"](device.settings, argument))
         return
     name, on = argument.station(), bool(argument.integer(0, 1))
-    station = replace(device.settings.station(name), active=on and name in device.rounds.plugged)
+    station = replace(device.settings.station(name), active=on and name in device.rounds.station_characters)
     device.settings = device.settings.with_station(name, station)
 
 
 def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
-    if name in device.rounds.plugged:
+    if name in device.rounds.station_characters:
         present = device.rounds.orientation(now_s, name, device.settings)
         station = boresight(device.settings.station(name), present, full)
         device.settings = device.settings.with_station(name, station)

@@ -69,7 +69,7 @@ class DeviceState:
         self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while the command log is open."""
-        self._factory = _factory_settings(samples, self.config, self.rounds.plugged)
+        self._factory = _factory_settings(samples, self.config, self.rounds.station_characters)
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0
@@ -97,7 +97,7 @@ class DeviceState:
     @property
     def active(self) -> str:
         """Characters of the stations that report."""
-        return "".join(name for name in self.rounds.plugged if self.settings.station(name).active)
+        return "".join(name for name in self.rounds.station_characters if self.settings.station(name).active)
 
     def set_lost_stations(self, stations: Iterable[str]) -> None:
         """Lose exactly these stations from now on, in addition to what the samples say."""
@@ -124,7 +124,7 @@ class DeviceState:
     def poll(self, now_s: float) -> None:
         """Send one record of each active station, ascending, with its latest reading."""
         for name in "" if self.suspended else self.active:
-            number = self.rounds.player.latest(now_s, self.rounds.plugged.index(name))
+            number = self.rounds.player.latest(now_s, self.rounds.station_characters.index(name))
             self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
 
     def suspend(self, now_s: float) -> None:
@@ -161,7 +161,7 @@ class DeviceState:
 
     def _play(self, now_s: float) -> None:
         """Send the readings until now."""
-        player, plugged = self.rounds.player, self.rounds.plugged
+        player, plugged = self.rounds.player, self.rounds.station_characters
         while self.streaming:
             number, row = self._next
             taken_s = player.time_s(number, row)

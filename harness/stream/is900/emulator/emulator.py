@@ -187,7 +187,7 @@ class Emulator:
         names = self.device.samples.stations
         episodes = (episode for episode in self._active if episode.fault.kind == "lost_station")
         lost = (episode.fault.station or names[0] for episode in episodes if episode.from_s <= at_s < episode.to_s)
-        self.device.set_lost_stations(self.device.rounds.plugged[names.index(name)] for name in lost)
+        self.device.set_lost_stations(self.device.rounds.station_characters[names.index(name)] for name in lost)
 
     def _queue_messages(self, now_s: float) -> None:
         """Pass the device's messages until now to the line, at the device's baud rate."""

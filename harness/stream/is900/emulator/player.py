@@ -85,7 +85,7 @@ class RoundEncoder:
 
     def __init__(self, player: SamplePlayer, config: EmulatorConfig) -> None:
         self.player, self._pattern, self._stylus_bytes = player, CONTROL_PATTERNS[config.controls], config.stylus_bytes
-        self.plugged = config.plugged(len(player.samples.stations))
+        self.station_characters = config.station_characters(len(player.samples.stations))
         """Characters of the stations that are plugged in."""
         self._lost: frozenset[str] = frozenset()
         self._cache: tuple[int, DeviceSettings, tuple[float, float], dict[str, bytes]] | None = None
@@ -101,7 +101,7 @@ class RoundEncoder:
 
     def quality(self, now_s: float, station: str, settings: DeviceSettings) -> float:
         """Return the quality of the station's latest reading, 0 to 1."""
-        row = self.plugged.index(station)
+        row = self.station_characters.index(station)
         instant = self.player.instant_of(self.player.latest(now_s, row))
         return (
             0.0
@@ -111,7 +111,7 @@ class RoundEncoder:
 
     def orientation(self, now_s: float, station: str, settings: DeviceSettings) -> Floats:
         """Return the quaternion (4,) of the station's latest reading, before its geometry is applied."""
-        row = self.plugged.index(station)
+        row = self.station_characters.index(station)
         out: Floats = self._poses(self.player.instant_of(self.player.latest(now_s, row)), settings)[1][row]
         return out
 
@@ -120,7 +120,7 @@ class RoundEncoder:
 
         Samples without a filter give as many as the quality suggests, and none is ever rejected.
         """
-        filtered, row = self.player.samples.filter, self.plugged.index(station)
+        filtered, row = self.player.samples.filter, self.station_characters.index(station)
         if filtered is None:
             return int(np.ceil(MAX_RANGES * self.quality(now_s, station, settings))), 0
         if self._is_lost(station, settings):
@@ -142,7 +142,7 @@ class RoundEncoder:
         quality = samples.quality[instant].copy()
         # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
         buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
-        for row, (name, station) in enumerate(zip(self.plugged, self._stations(settings), strict=True)):
+        for row, (name, station) in enumerate(zip(self.station_characters, self._stations(settings), strict=True)):
             if not station.plain:
                 position_m[row], orientation[row] = apply_station_settings(position_m[row], orientation[row], station)
             if self._is_lost(name, settings):
@@ -162,7 +162,7 @@ class RoundEncoder:
 
     def _stations(self, settings: DeviceSettings) -> list[StationSettings]:
         """Return the settings of the stations that are plugged in."""
-        return [settings.station(name) for name in self.plugged]
+        return [settings.station(name) for name in self.station_characters]
 
     def _encode(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
         values = self.values(number, settings)
@@ -172,10 +172,10 @@ class RoundEncoder:
         out, number_format = {}, replace(record_format(settings), stylus_bytes=self._stylus_bytes)
         for items, rows in rows_of.items():
             part = values.rows(rows)
-            characters = np.array([ord(self.plugged[row]) for row in rows], np.uint8)
+            characters = np.array([ord(self.station_characters[row]) for row in rows], np.uint8)
             table = encode_records(items, characters, part, number_format)
             for index, row in enumerate(rows):
-                out[self.plugged[row]] = to_bytes(items, table[index : index + 1], number_format)
+                out[self.station_characters[row]] = to_bytes(items, table[index : index + 1], number_format)
         return out
 
 

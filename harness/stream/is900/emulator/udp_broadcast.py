@@ -89,9 +89,9 @@ class UdpBroadcast:
         device, packets = self._device, list[bytes]()
         while self._next is not None and self.next_s <= now_s:
             number, row = self._next
-            if device.settings.station(device.rounds.plugged[row]).active:
+            if device.settings.station(device.rounds.station_characters[row]).active:
                 packets.append(self._packet(number, row))
-            self._next = (number, row + 1) if row + 1 < len(device.rounds.plugged) else (number + 1, 0)
+            self._next = (number, row + 1) if row + 1 < len(device.rounds.station_characters) else (number + 1, 0)
         return packets
 
     def _follow_device(self, now_s: float) -> None:
@@ -112,7 +112,7 @@ class UdpBroadcast:
         return Datagram(
             sequence=self._sequence,
             model=TRACKER_MODEL,
-            station=1 + STATION_NAMES.index(self._device.rounds.plugged[row]),
+            station=1 + STATION_NAMES.index(self._device.rounds.station_characters[row]),
             quality=round(255 * min(max(float(values.quality[row]), 0.0), 1.0)),
             buttons=0 if isinstance(one.buttons, int) else int(one.buttons[0]),
             analogue=(*joystick, *[0] * (_ANALOGUE_CHANNELS - 2)),
