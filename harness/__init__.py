@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from harness.errors import HarnessError
     from harness.experiment.clip_simulation import simulate_clip
     from harness.experiment.engine import run
-    from harness.experiment.scenario import load_scenario
+    from harness.experiment.scenarios.scenario_reader import load_scenario
     from harness.mocap.clip_file import read_clip
     from harness.reconstruct.registry import methods
     from harness.results.reader import load_run as load

@@ -13,7 +13,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args, get_origin, get_type_hints
 
-from harness.experiment.scenario import CalibrationSettings, Scenario, ScenarioMotion, Station
+from harness.experiment.scenarios.scenario import CalibrationSettings, Scenario, Station
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.score.metrics import DEFINITIONS
 from harness.score.uncertainty import SIGMA_DEFINITIONS
 from harness.simulate.disturbance import Disturbance

@@ -17,11 +17,11 @@ from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
 from harness.experiment import cells
-from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import Evaluation
-from harness.experiment.method_run import MethodAnswers
+from harness.experiment.methods.method_run import MethodAnswers
 from harness.experiment.observed_take import ObservedTake
+from harness.experiment.tasks import PlannedCell
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.mean_pose import MeanPose

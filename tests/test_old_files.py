@@ -15,7 +15,7 @@ from harness.calibrate.calibration_file import read_calibration
 from harness.cli import main
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
-from harness.experiment.fitted_unit import read_fitted_unit
+from harness.experiment.scenarios.fitted_unit import read_fitted_unit
 from harness.measure.unit_file import read_unit_file
 from harness.results.findings.paper_findings import read_findings
 from harness.results.findings.placement_findings import read_placement

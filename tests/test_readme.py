@@ -16,7 +16,7 @@ from harness.commands.catalogue import build_catalogue
 from harness.core.options import expand_alternatives
 from harness.errors import Outcome
 from harness.experiment import engine
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
 from harness.results.storage import read_summary

@@ -14,10 +14,11 @@ from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.experiment.cells import check_names, clear_caches
+from harness.experiment.cells import clear_caches
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.remote_method import close_methods
-from harness.experiment.scenario import Scenario
+from harness.experiment.methods.remote_method import close_methods
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results.storage import open_study
 from harness.simulate.link import TrackerConfig

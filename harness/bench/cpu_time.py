@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.bench.limits import hold_to_limit
 from harness.core.arrays import Floats
-from harness.experiment.method_run import ReferenceWorkload
+from harness.experiment.methods.method_run import ReferenceWorkload
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 REFERENCE_RUNS = 1000

@@ -24,8 +24,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.progress import ProgressBar, ProgressCallback
-from harness.experiment.clip_evaluation import mounts_of
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
@@ -219,7 +218,7 @@ def _mink_contender(clip: BenchmarkClip) -> TimedStep:
     from harness.bench.ik import mink_solver
 
     calibration = clip.simulation.calibration
-    body = humanoid.build_body(trackers=mounts_of(load_scenario(benchmark_clips.DEFAULT_SCENARIO)))
+    body = humanoid.build_body(trackers=load_scenario(benchmark_clips.DEFAULT_SCENARIO).nominal_mounts)
     solve = mink_solver(body, in_world(calibration))
 
     def timed_step(frame: TrackerFrame, previous_truth: Floats) -> tuple[Floats, float]:

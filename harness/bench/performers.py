@@ -24,9 +24,10 @@ from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import ClipTask, evaluate_cell
+from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import ScenarioMotion
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.tasks import ClipTask
 from harness.mocap import synthetic
 from harness.mocap.sources import (
     MOCAP_VARIABLE,

@@ -22,9 +22,12 @@ from harness.bench.limits import hold_to_limit
 from harness.core.arrays import Floats
 from harness.core.child_process import run_python
 from harness.core.split import ClipPart
-from harness.experiment.cells import ClipTask, evaluate_cell, open_scenario_motion
+from harness.experiment.cells import evaluate_cell
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.tasks import ClipTask
 from harness.reconstruct import registry
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.index import CellIndex

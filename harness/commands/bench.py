@@ -142,7 +142,7 @@ def _bench_physics_truth(args: argparse.Namespace) -> Outcome:
 def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
     """Print the truth table of the lab's verbs."""
     from harness.bench.lab.truth import SEEDS, lab_truth_rows
-    from harness.experiment.executors import process_executor
+    from harness.experiment.workers.executors import process_executor
 
     seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / LAB
     with long_work(out, "captures") as progress, process_executor(args.jobs or 1) as executor:
@@ -180,7 +180,7 @@ def _bench_ranking(args: argparse.Namespace) -> Outcome:
 @contextmanager
 def _cells(args: argparse.Namespace, name: str) -> Iterator[dict[str, Any]]:
     """Options with which a benchmark runs the cells of scenarios in its folder."""
-    from harness.experiment.executors import process_executor
+    from harness.experiment.workers.executors import process_executor
 
     jobs, out = args.jobs or 1, args.out or Path("results") / name
     with long_work(out, "cells") as bar, process_executor(jobs) as executor:

@@ -133,7 +133,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
     """The calibration, and the command that uses it."""
     from harness.experiment.calibration_session import CalibrationSession
     from harness.experiment.playback import select_stations
-    from harness.experiment.scenario import load_scenario
+    from harness.experiment.scenarios.scenario_reader import load_scenario
     from harness.live.pose_terminal import PoseTerminal
     from harness.live.viewer import ViewerOutput
     from harness.stream.is900.driver import DriverConfig, open_tracker

@@ -9,9 +9,10 @@ from harness.body.places import NAMED_PLACES
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
 from harness.core.split import declared_training_data, training_note
-from harness.experiment.cells import cell_names
-from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
-from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep, shipped_sweeps
+from harness.experiment.tasks import cell_names
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.report.figures.writer import KINDS
@@ -85,9 +86,9 @@ def _describe_sweep(path: Path) -> str:
 
 
 def _describe_noise(scenario: Scenario) -> str:
-    """What is varied; without that the noise."""
-    varied = dict.fromkeys(key for combination, _ in variants(scenario) for key in combination)
-    return f"varies {', '.join(varied)}" if varied else f"noise {scenario.noise}"
+    """What varies; without that the noise."""
+    keys = dict.fromkeys(key for combination, _ in scenario.variants() for key in combination)
+    return f"varies {', '.join(keys)}" if keys else f"noise {scenario.noise}"
 
 
 def _describe_takes(names: tuple[str, ...]) -> str:

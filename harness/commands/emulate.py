@@ -26,7 +26,7 @@ from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.experiment.scenario import Scenario
+    from harness.experiment.scenarios.scenario import Scenario
     from harness.stream.is900.emulator.config import EmulatorConfig
 
 

@@ -140,10 +140,10 @@ def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tup
 
 def _mounts(name: str) -> "list[Mount]":
     """The nominal mounts of a set of stations; UnknownName."""
-    from harness.experiment.clip_evaluation import mount_of
-    from harness.experiment.scenario import Station, read_station_sets
+    from harness.experiment.scenarios.scenario import Station
+    from harness.experiment.scenarios.scenario_reader import read_station_sets
 
     sets = read_station_sets()
     if name not in sets:
         raise UnknownName("set of stations", name, sets)
-    return [mount_of(station, Station(**table)) for station, table in sets[name].items()]
+    return [Station(**table).nominal_mount(station) for station, table in sets[name].items()]

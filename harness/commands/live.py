@@ -86,8 +86,8 @@ def run_live(args: argparse.Namespace) -> Outcome:
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.guided_calibration import TPoseCalibrator
     from harness.commands import live_summary
-    from harness.experiment.isolation import DEFAULT_ISOLATION
-    from harness.experiment.remote_method import resolve_method
+    from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+    from harness.experiment.methods.remote_method import resolve_method
     from harness.live.outputs import OutputOptions, open_outputs
     from harness.live.pose import SessionSetup
     from harness.live.scheduling_jitter import JitterProbe

@@ -58,7 +58,7 @@ def parse_sizes(text: str) -> tuple[int, int]:
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.executors import process_executor
+    from harness.experiment.workers.executors import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
     from harness.report.placement.wording import placement_sentence
     from harness.results.files.folder_kind import FINDINGS

@@ -8,7 +8,7 @@ from harness.commands.flags import is_whole_number, parse_device_names
 
 if TYPE_CHECKING:
     from harness.experiment.playback import Playback
-    from harness.experiment.scenario import Scenario
+    from harness.experiment.scenarios.scenario import Scenario
     from harness.mocap.library import LibraryFolders
 
 DEFAULT_STATION_COUNT = 4
@@ -42,7 +42,7 @@ class PlaybackOptions:
 def open_playback(options: PlaybackOptions) -> "Playback":
     """The playback that the options ask for; UnknownName, BadFile and BadInput as for a run of the scenario."""
     from harness.experiment.playback import prepare_playback
-    from harness.experiment.scenario import load_scenario
+    from harness.experiment.scenarios.scenario_reader import load_scenario
 
     stations = options.stations
     if stations is None and not options.every_station:

@@ -39,7 +39,8 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     from dataclasses import replace
 
     from harness.experiment import engine
-    from harness.experiment.scenario import check_scenario, load_scenario
+    from harness.experiment.scenarios.scenario_checks import check_scenario
+    from harness.experiment.scenarios.scenario_reader import load_scenario
     from harness.report.run.text import run_table
     from harness.results.storage import read_summary
 

@@ -24,7 +24,7 @@ def add_trust(verbs: Verbs) -> None:
 
 
 def run_trust(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.executors import process_executor
+    from harness.experiment.workers.executors import process_executor
     from harness.report.kit.page_html import write_page
     from harness.report.kit.page_text import page_text
     from harness.report.lab.trust_page import trust_page

@@ -17,6 +17,8 @@ LOST_AFTER_ADVICE = f"Leave it out: an estimate is LOST after {LOST_AFTER_S:g} s
 """For `RENAMED_KEYS` of methods, where it was an option."""
 QPOS_SIZE = 55
 """Size of a configuration of the body."""
+HINGE_COUNT = QPOS_SIZE - 7
+"""Number of hinge angles in it."""
 MAX_POSE_VALUE, MIN_QUATERNION = 1e6, 1e-6
 """Values of poses [m, rad] from the first on, and sums of a quaternion's absolute values up to the second, are no
 pose [choice]."""

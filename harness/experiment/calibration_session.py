@@ -22,10 +22,10 @@ from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core.arrays import Floats
 from harness.core.package_data import VERSION
 from harness.core.split import ClipPart
-from harness.experiment.cells import open_scenario_motion
-from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
-from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
 from harness.stream.frame import TrackerFrame
@@ -72,7 +72,7 @@ class CalibrationSession:
     @property
     def mounts(self) -> tuple[Mount, ...]:
         """Nominal mounts of the stations."""
-        return mounts_of(self.resolved_scenario)
+        return self.resolved_scenario.nominal_mounts
 
     @cached_property
     def body(self) -> Body:

@@ -12,10 +12,9 @@ from typing import Self
 import numpy as np
 
 from harness.body import humanoid, retargeting
-from harness.body.mounts import Mount, locate_mount
+from harness.body.mounts import locate_mount
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
-from harness.core.fields import replace_fields
-from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.humanoid24 import select_bones, standard_skeleton
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
@@ -23,8 +22,9 @@ from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_
 from harness.core.stream_health import poor_hearing
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
-from harness.experiment.remote_method import method_identity
-from harness.experiment.scenario import Scenario, ScenarioMotion, Station
+from harness.experiment.methods.remote_method import NamedMethod
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,
@@ -41,47 +41,9 @@ from harness.reconstruct.contract import Method, Reconstructor
 from harness.results import manifest, storage
 from harness.score.loops import WARM_UP_S
 from harness.score.metrics import VERSIONS
-from harness.simulate import noise as noises
 from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
+from harness.simulate.simulation import Simulation, simulate_tracker
 from harness.simulate.trajectory import Trajectory
-
-
-def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
-    """Nominal mounts of the stations that are worn."""
-    return tuple(mount_of(name, station) for name, station in scenario.worn_stations.items())
-
-
-def mount_of(name: str, station: Station) -> Mount:
-    """Nominal mount of a station."""
-    return Mount(name, station.bone, station.along, float(np.deg2rad(station.around_deg)), station.stand_off_m)
-
-
-def tracker_of(scenario: Scenario) -> TrackerConfig:
-    """The device of a scenario.
-
-    Sampling in turn is an error of the clock. With the preset `clean` all stations are therefore sampled at one moment,
-    unless the scenario sets `tracker.slot_s` (docs/is900.md 13.5).
-    """
-    simultaneous = scenario.noise == "clean" and scenario.tracker.slot_s is None
-    return replace(scenario.tracker, slot_s=0.0) if simultaneous else scenario.tracker
-
-
-def noise_of(scenario: Scenario) -> Noise:
-    """The noise preset with the scenario's changes to single components; UnknownName, BadInput.
-
-    With a table [physics] the preset selects causes of errors, and of the statistical components the clock remains.
-    """
-    if "physics" in scenario.components:
-        raise BadInput("components.physics is no component.", "Write the table [physics] beside [components].")
-    preset = noises.noise_preset(scenario.noise)
-    if scenario.physics is not None:
-        preset = Noise(clock=preset.clock, physics=scenario.physics.with_preset(scenario.noise))
-    try:
-        return replace_fields(preset, scenario.components, "components")
-    except (TypeError, ValueError) as error:
-        raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +75,7 @@ class Subject:
     def body(self) -> humanoid.Body:
         """The performer's true body."""
         if self.motion.body == "own":
-            return humanoid.build_body(self.clip.skeleton.subset(BONES)[0])
+            return humanoid.build_body(select_bones(self.clip.skeleton)[0])
         return humanoid.build_body(standard_skeleton())
 
     @cached_property
@@ -256,12 +218,12 @@ class Observation:
     @cached_property
     def session(self) -> TrackerSession:
         """The truth about one wearing of the trackers."""
-        scenario, settings, nominal = self.scenario, self.scenario.calibrating, mounts_of(self.scenario)
+        scenario, settings, nominal = self.scenario, self.scenario.calibrating, self.scenario.nominal_mounts
         turned_rad, name = float(np.deg2rad(settings.turned_deg)), str(self.subject.part)
         true_mounts = perturb_mounts(
             nominal, beside_m=settings.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name
         )
-        tracker, noise = tracker_of(scenario), noise_of(scenario)
+        tracker, noise = scenario.device, scenario.noise_model
         return TrackerSession(name, scenario.seed, self.subject.body, nominal, true_mounts, tracker, noise)
 
     @cached_property
@@ -291,7 +253,7 @@ class Observation:
     def simulation(self) -> Simulation:
         """The stream of the take, and the truth; BadInput when the take is no longer than the warm-up."""
         scenario, tracker, take = self.scenario, self.session.tracker, self.subject.take
-        noise = scenario.disturbance.add_to(self.session.noise, tuple(scenario.worn_stations))
+        noise = scenario.disturbed_noise
         mounts = self.session.true_mounts
         simulation = simulate_tracker(self.subject.body, take, mounts, tracker, noise, seed=scenario.seed)
         if len(simulation.truth_s) <= WARM_UP_S * tracker.rate_hz:
@@ -303,7 +265,7 @@ class Observation:
     def conditions(self) -> dict[str, object]:
         """The conditions that all methods and inputs share, as JSON content."""
         scenario, subject = self.scenario, self.subject
-        content, components = scenario.content(), asdict(noise_of(scenario))
+        content, components = scenario.content(), asdict(scenario.noise_model)
         if (physics := components.pop("physics")) is not None:
             content["physics"] = physics  # with what the noise preset leaves out
         for key in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
@@ -321,7 +283,7 @@ class Observation:
         with_prior = scenario.calibration in ("poses", "liu2011")
         return {
             **content,
-            "tracker": tracker_of(scenario).as_dict(),
+            "tracker": scenario.device.as_dict(),
             "components": components,
             "disturbance": scenario.disturbance.as_dict(),
             "clip": str(subject.part),
@@ -443,11 +405,11 @@ class ClipEvaluation:
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
         return (*notes, note + soles)
 
-    def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
-        """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
+    def key(self, method: Method, name: str, inputs: str, identity: Mapping[str, object]) -> str:
+        """Key of a cell; `identity` is what else the cell states, see `PlannedCell`."""
         if name not in self._methods:
-            self._methods[name] = method_identity(method, name)
-        content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
+            self._methods[name] = NamedMethod(name, method).identity
+        content = {**self.conditions_of(method, inputs), **identity}
         return storage.cell_key(content, self._methods[name], manifest.source_hash())
 
 

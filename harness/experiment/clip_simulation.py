@@ -4,8 +4,8 @@ from pathlib import Path
 
 from harness.body.retargeting import retarget_to_own_body
 from harness.core.motion import Clip
-from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.simulation import Simulation, simulate_tracker
 
 
@@ -19,5 +19,5 @@ def simulate_clip(clip: Clip, scenario: Scenario | Path | str = "demo") -> Simul
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     body, motion = retarget_to_own_body(clip)
     return simulate_tracker(
-        body, motion, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
+        body, motion, scenario.nominal_mounts, scenario.device, scenario.noise_model, seed=scenario.seed
     )

@@ -16,11 +16,11 @@ from harness.core.estimate import name_with_lag
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.method_run import NO_ANSWERS, MethodAnswers, describe_failure
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.method_run import NO_ANSWERS, MethodAnswers, describe_failure
+from harness.experiment.methods.remote_method import resolve_method, run_over_frames
 from harness.experiment.observed_take import ObservedTake
-from harness.experiment.remote_method import resolve_method, run_over_frames
 from harness.reconstruct.contract import Method
 from harness.score.loops import LoopScores, score_loops
 from harness.score.metrics import FRAME_METRICS

@@ -19,9 +19,11 @@ from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.errors import BadInput, UnknownName, shorten
-from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
 from harness.mocap.library import LibraryFolders
 from harness.simulate.loop import simulate_loop
@@ -46,7 +48,7 @@ class Playback:
 
     @property
     def tracker(self) -> TrackerConfig:
-        return tracker_of(self.scenario)
+        return self.scenario.device
 
     @property
     def body(self) -> Body:
@@ -56,7 +58,7 @@ class Playback:
     @property
     def mounts(self) -> tuple[Mount, ...]:
         """Nominal mounts of the stations."""
-        return mounts_of(self.scenario)
+        return self.scenario.nominal_mounts
 
     @property
     def performer_calibration(self) -> PerformerCalibration:
@@ -116,7 +118,7 @@ class Playback:
     def samples(self) -> DeviceSamples:
         """Samples of the device, loop after loop. The first loop equals `simulation` until the motion turns back."""
         session, scenario = self.clip_evaluation.session, self.scenario
-        noise = scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.stations))
+        noise = scenario.disturbed_noise
         noise, name = (session.calibration_noise, session.name) if self.posing else (noise, "")
         return simulate_loop(
             self.body, self.take, session.true_mounts, self.tracker, noise, seed=scenario.seed, session=name
@@ -146,7 +148,7 @@ def prepare_playback(
     if rate_hz is not None:
         asked = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz))
     if noise is not None:
-        asked = replace(asked, noise=noise)  # type: ignore[arg-type]  # `noise_of` refuses other names
+        asked = replace(asked, noise=noise)  # type: ignore[arg-type]  # `Scenario.noise_model` refuses other names
     if seed is not None:
         asked = replace(asked, seed=seed)
     asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")

@@ -19,7 +19,8 @@ from harness.core.fields import check_entries
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.playback import Playback, prepare_playback, select_stations
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.registration import Registration
 from harness.mocap.library import LibraryFolders
 from harness.score.loops import WARM_UP_S, LoopFrames

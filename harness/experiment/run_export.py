@@ -7,8 +7,7 @@ from harness.body.anatomy import body_geoms
 from harness.body.mounts import locate_mount
 from harness.core.fields import build
 from harness.errors import BadInput
-from harness.experiment.clip_evaluation import mount_of
-from harness.experiment.scenario import Station
+from harness.experiment.scenarios.scenario import Station
 from harness.mocap.write.body_model import BodyModel, MountedStation
 from harness.mocap.write.export import export
 from harness.mocap.write.posed_motion import PosedMotion
@@ -43,7 +42,7 @@ def body_model(cell: Cell, motion: PosedMotion) -> BodyModel:
     except (KeyError, AttributeError, TypeError, ValueError) as error:
         found = f"The cell {cell.key} does not say where its stations sit ({error})."
         raise BadInput(found, "Run the scenario again with this version.") from error
-    mounts = [mount_of(name, station) for name, station in stations.items()]
+    mounts = [station.nominal_mount(name) for name, station in stations.items()]
     places = [(mount, locate_mount(motion.skeleton, mount)) for mount in mounts]
     return BodyModel(
         body_geoms(motion.skeleton),

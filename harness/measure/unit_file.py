@@ -106,7 +106,7 @@ def read_unit_file(path: Path | str) -> UnitFile:
 def _require_all(path: Path, unit: UnitFile, content: Mapping[str, Any]) -> None:
     """BadFile when a file without a digest lacks what was always written: it was cut or lost lines.
 
-    `experiment.fitted_unit` also looks for every field of each component.
+    `experiment.scenarios.fitted_unit` also looks for every field of each component.
     """
     lost = [key for key in (*unit.measured, *unit.not_measured) if _find_value(unit, key) is None]
     lost += [f"tracker.{key}" for key in ("rate_hz", "items") if key not in unit.tracker]

@@ -131,7 +131,7 @@ class Cell:
     step_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
     """(F,) CPU time of each step [ms]; NaN (the default) where not timed."""
     reference_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
-    """(F,) CPU time of the work of `experiment.method_run` right after each step [ms]; NaN (the default)
+    """(F,) CPU time of the work of `experiment.methods.method_run` right after each step [ms]; NaN (the default)
     after steps that it did not follow."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
     """Errors of the calibration by name (see `harness.experiment.simulated_calibration`); empty if it is exact."""
@@ -364,6 +364,11 @@ def as_row(cell: Cell) -> dict[str, Any]:
 def varied_text(varied: Mapping[str, Any]) -> str:
     """Text of varied values, such as "noise=clean worn=head+torso"; empty when nothing is varied."""
     return " ".join(f"{key}={_short(value)}" for key, value in varied.items())
+
+
+def setting_text(row: Mapping[str, Any]) -> str:
+    """Text of the varied values of a row of a cell or of a summary, as `varied_text`."""
+    return varied_text(row["varied"])
 
 
 def _short(value: Any) -> str:

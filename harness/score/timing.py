@@ -52,7 +52,7 @@ def step_times_ms(step_ms: Floats) -> dict[str, float]:
 
 
 def step_relative(step_cpu_ms: Floats, reference_cpu_ms: Floats) -> float:
-    """Median CPU time of a step relative to that of `experiment.method_run`; NaN where either was not timed.
+    """Median CPU time of a step relative to that of `experiment.methods.method_run`; NaN where either was not timed.
 
     CPU time is used because wall time on a busy machine does not measure the method: a step that is interrupted takes
     several times as long, while work as short as the reference is seldom interrupted.

@@ -18,7 +18,8 @@ from harness.core.progress import ProgressCallback
 from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.comparison.page import comparison_text
 from harness.report.comparison.wording import groups_vary, line_interval
 from harness.results.manifest import Manifest

@@ -10,8 +10,9 @@ from typing import Any
 from harness.compare.comparison import compare_runs
 from harness.errors import BadFile, Outcome
 from harness.experiment.engine import run
-from harness.experiment.isolation import Isolation
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.mocap.shared_motion import find_shared_motion
 from harness.results.reader import load_run

@@ -17,7 +17,7 @@ from harness.body.humanoid import build_body
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.testing.frames import exact_calibration, swaying_motion

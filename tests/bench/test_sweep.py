@@ -4,14 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from harness.bench import sweep
-from harness.experiment.scenario import variants
-from harness.experiment.sweep_config import expand_sweep, load_sweep
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
 
 
 def test_what_is_judged_beside_are_the_cells_of_the_sweep(tmp_path: Path) -> None:
     (swept,) = expand_sweep(*load_sweep(sweep._write_sweep(tmp_path, 3)))
     beside = sweep._small_scenario(3)
-    ours, theirs = ([replace(made, vary={}) for _, made in variants(scenario)] for scenario in (beside, swept))
+    ours, theirs = ([replace(made, vary={}) for _, made in scenario.variants()] for scenario in (beside, swept))
     assert len(ours) == 3
     assert ours == theirs
 
@@ -32,4 +31,4 @@ def test_two_jobs_are_given_the_same_shipped_clips(tmp_path: Path) -> None:
     (tmp_path / "shared.toml").write_text(sweep.PARALLEL_SWEEP)
     (scenario,) = expand_sweep(*load_sweep(tmp_path / "shared.toml"))
     assert scenario.motion.test == sweep.CLIPS
-    assert len(variants(scenario)) == 16
+    assert len(scenario.variants()) == 16

@@ -8,8 +8,7 @@ from harness.body.humanoid import build_body
 from harness.calibrate.liu2011_calibration import Liu2011Constants, PrintedObjective
 from harness.calibrate.pose_calibration import measure_poses, pose_bundle
 from harness.calibrate.skeleton_prior import fit_skeleton_prior
-from harness.experiment.clip_evaluation import mounts_of
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.synthetic import sample_skeletons
 from harness.simulate.components.mount import perturb_mounts
@@ -22,7 +21,7 @@ SEED, PRIOR_SIZE, PERFORMERS = 11, 100, 8
 @pytest.mark.slow
 def test_the_chosen_constants_have_the_figures_of_the_notes() -> None:
     people = sample_skeletons(PRIOR_SIZE + PERFORMERS, seed=SEED)
-    space, mounts = fit_skeleton_prior(people[:PRIOR_SIZE]), mounts_of(load_scenario("calibration"))
+    space, mounts = fit_skeleton_prior(people[:PRIOR_SIZE]), load_scenario("calibration").nominal_mounts
     errors: dict[str, list[tuple[float, float]]] = {}
     for number, skeleton in enumerate(people[PRIOR_SIZE:]):
         name = f"choice {number}"

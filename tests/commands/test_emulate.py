@@ -12,7 +12,8 @@ import pytest
 from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario, find_scenario, load_scenario, variants
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.stream.is900.codec.samples import DeviceSamples
@@ -82,7 +83,7 @@ def test_a_slip_in_a_fault_is_told_with_its_place(tmp_path: Path) -> None:
 def test_faults_cannot_be_varied() -> None:
     scenario = replace(load_scenario("emulator_faults"), vary={"fault": [[], []]})
     with pytest.raises(BadInput, match="cannot be varied"):
-        variants(scenario)
+        scenario.variants()
 
 
 def test_stations_have_the_numbers_that_are_asked_for(monkeypatch: pytest.MonkeyPatch, command: Command) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from harness.experiment.playback import Playback
-from harness.experiment.scenario import find_scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario
 from harness.stream.is900.driver import DriverConfig, Is900
 from harness.stream.is900.driver.transport import open_transport
 from harness.stream.is900.emulator import EmulatorConfig, serve_emulator

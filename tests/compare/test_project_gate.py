@@ -9,8 +9,9 @@ from harness.compare.margins import GATED_METRICS
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.split import ClipPart
 from harness.errors import RenamedKey
-from harness.experiment.clip_evaluation import ClipEvaluation, noise_of
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.mocap.synthetic import BEHAVIOURS
 from harness.reconstruct import registry
@@ -83,4 +84,4 @@ def test_an_old_key_is_refused_with_its_new_name(old: str, new: str, text: str, 
     motion = '\n[motion]\nsource = "builtin"\ntest = ["walking_p1_01"]\nbehaviours = ["walking"]\n'
     file.write_text(rest + text + ("" if "[motion]" in text else motion), encoding="utf-8")
     with pytest.raises(RenamedKey, match=f"'{old}' is now called '{new}'"):
-        noise_of(load_scenario(file))
+        _ = load_scenario(file).noise_model

@@ -13,8 +13,9 @@ from harness.compare.baseline import write_baseline
 from harness.core.fields import build, replace_fields
 from harness.core.ranges import Label, Range, check_fields, check_words, constraints_of
 from harness.errors import BadInput, HarnessError
-from harness.experiment.scenario import Scenario, load_scenario
-from harness.experiment.sweep_config import Sweep, load_sweep
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import Sweep, load_sweep
 from harness.reconstruct import registry
 from harness.simulate.noise import Noise
 from harness.study.placement.config import PlacementStudy
@@ -244,7 +245,7 @@ def test_bounds_and_no_value_are_allowed() -> None:
 
 def test_a_record_that_is_made_in_python_is_checked_too() -> None:
     scenario_types = [
-        kind for kind in RECORDS if kind.__module__.startswith(("harness.experiment.scenario", "harness.sim"))
+        kind for kind in RECORDS if kind.__module__.startswith(("harness.experiment.scenarios.scenario", "harness.sim"))
     ]
     assert len(scenario_types) > 15
     for kind in scenario_types:

@@ -68,7 +68,7 @@ class Mine(Upright):
 POOL = """
 import sys
 from harness.core.workers import run_in_workers
-from harness.experiment import executors
+from harness.experiment.workers import executors
 def paths():
     return sys.path
 if __name__ == "__main__":

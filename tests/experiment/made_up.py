@@ -8,8 +8,8 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.experiment import cells
-from harness.experiment.cells import PlannedCell
 from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.tasks import PlannedCell
 from harness.reconstruct.contract import Method
 from harness.results.cell import Cell
 from harness.score.score import Scores

@@ -7,7 +7,7 @@ from threading import Event
 import pytest
 
 from harness.core.files import TEMPORARY
-from harness.experiment.cell_watcher import ProgressCount
+from harness.experiment.workers.cell_watcher import ProgressCount
 from tests.planted import Plan, planted_run
 
 

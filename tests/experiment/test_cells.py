@@ -10,8 +10,11 @@ import pytest
 
 from harness.core.split import ClipPart
 from harness.errors import BadFile
-from harness.experiment.cells import CellOutcome, ClipTask, clear_caches, run_task
-from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario, variants
+from harness.experiment.cells import CellOutcome, clear_caches, run_task
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.tasks import ClipTask
 from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
 from harness.results.storage import Cell
 from tests.results.rewrite import read_json, write_json
@@ -51,7 +54,7 @@ def test_chosen_variants_of_a_job_are_those_cells_and_no_others() -> None:
     names = [str(cell) for cell in job().cells()]
     assert [str(cell) for cell in job(chosen=(1,)).cells()] == names[2:]
     assert [str(cell) for cell in job(chosen=(0, 1)).cells()] == names
-    assert variants(SMALL, (1,)) == variants(SMALL)[1:]
+    assert SMALL.variants((1,)) == SMALL.variants()[1:]
 
 
 def test_a_row_is_the_same_when_a_cell_ends_and_when_it_is_found(whole: tuple[Path, dict[str, Cell]]) -> None:

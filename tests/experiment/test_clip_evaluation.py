@@ -13,8 +13,9 @@ from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.method_run import run_method
-from harness.experiment.scenario import Scenario, ScenarioMotion, Station
+from harness.experiment.methods.method_run import run_method
+from harness.experiment.scenarios.scenario import Scenario, Station
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method

@@ -23,7 +23,9 @@ from harness.core.files import TEMPORARY
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment import cells, engine
-from harness.experiment.scenario import Scenario, ScenarioMotion, Station, load_scenario
+from harness.experiment.scenarios.scenario import Scenario, Station
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.report.comparison.wording import comparison_sentence
 from harness.report.run.text import run_table

@@ -10,9 +10,10 @@ import pytest
 from harness.cli import main
 from harness.core.split import ExampleLeak
 from harness.experiment import engine
-from harness.experiment.executors import process_executor
-from harness.experiment.scenario import Scenario, load_scenario
-from harness.experiment.sweep_config import Sweep
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import Sweep
+from harness.experiment.workers.executors import process_executor
 from harness.mocap import synthetic
 from harness.testing.regression_gate import RegressionGate
 from tests.mocap.clip_copies import mirrored, take_rows

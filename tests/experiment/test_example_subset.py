@@ -9,7 +9,7 @@ import pytest
 from harness.core.motion import BodyMotion
 from harness.errors import BadFile, BadInput
 from harness.experiment.example_subset import PIECE_S, keep_share
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from tests.experiment.test_thinning import takes
 
 SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)

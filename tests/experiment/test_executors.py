@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 import pytest
 
 from harness.errors import BadInput, MissingExtra
-from harness.experiment import executors
-from harness.experiment.executors import dask_executor, process_executor
+from harness.experiment.workers import executors
+from harness.experiment.workers.executors import dask_executor, process_executor
 from harness.results.manifest import source_hash
 from tests.interrupts import heeding_interrupts
 
@@ -148,7 +148,7 @@ def test_a_local_cluster_ends_with_the_program(end: signal.Signals, tmp_path: Pa
     program = tmp_path / "program.py"
     program.write_text(
         "import time\n"
-        "from harness.experiment.executors import dask_executor\n"
+        "from harness.experiment.workers.executors import dask_executor\n"
         "if __name__ == '__main__':\n"
         "    with dask_executor('local', workers=2) as each:\n"
         "        for which, _ in each(time.sleep, [(0.0,), (600.0,), (600.0,)]):\n"

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile, BadInput
-from harness.experiment.clip_evaluation import noise_of
-from harness.experiment.fitted_unit import read_fitted_unit
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.fitted_unit import read_fitted_unit
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.simulate.noise import noise_preset
 from tests.core.digested_toml import as_earlier_version
@@ -42,7 +42,7 @@ def load(folder: Path, lines: str, content: UnitFile | None = None) -> Scenario:
 
 def test_a_scenario_takes_over_the_unit(tmp_path: Path) -> None:
     scenario = load(tmp_path, 'fitted = "unit.toml"')
-    noise = noise_of(scenario)
+    noise = scenario.noise_model
     assert noise.white is not None
     assert noise.white.position_m == 0.002
     assert noise.clock is not None
@@ -72,7 +72,7 @@ def test_a_unit_file_of_an_earlier_version_has_every_field(tmp_path: Path) -> No
 def test_the_scenarios_own_tables_take_precedence(tmp_path: Path) -> None:
     lines = 'fitted = "unit.toml"\ncomponents.white.position_m = 0.003\ntracker.rate_hz = 50.0\nprofile = "mine"'
     scenario = load(tmp_path, lines)
-    noise = noise_of(scenario)
+    noise = scenario.noise_model
     assert noise.white is not None
     assert noise.white.position_m == 0.003
     assert noise.clock is not None

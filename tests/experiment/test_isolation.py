@@ -13,8 +13,10 @@ import pytest
 
 from harness.errors import Outcome
 from harness.experiment import engine
-from harness.experiment.isolation import Isolation
-from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.cell import Cell
 from harness.results.reader import select_cells
 from harness.results.storage import read_summary
@@ -144,7 +146,7 @@ def test_a_smaller_memory_limit_of_the_user_holds(tmp_path: Path) -> None:
     program = (
         "import resource, sys; from pathlib import Path\n"
         f"resource.setrlimit(resource.RLIMIT_DATA, ({limit}, {limit}))\n"
-        "from harness.experiment.isolation import Isolation\n"
+        "from harness.experiment.methods.isolation import Isolation\n"
         "from tests.experiment.test_isolation import HONEST, run\n"
         "assert run(Path(sys.argv[1]), HONEST, isolation=Isolation(memory_limit_gb=12.0)).keys() == {HONEST}\n"
     )

@@ -14,11 +14,13 @@ from harness.core.messages import MessageError
 from harness.errors import Outcome, ShapeError
 from harness.experiment import engine
 from harness.experiment.evaluation import evaluate_each
-from harness.experiment.method_messages import decode_answers, encode_answers
-from harness.experiment.method_run import MethodAnswers, run_method
+from harness.experiment.methods.method_messages import decode_answers, encode_answers
+from harness.experiment.methods.method_run import MethodAnswers, run_method
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_take import recorded_take
-from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.run.data import read_run
 from harness.report.run.ranking import describe_rankings
 from harness.report.run.text import run_table

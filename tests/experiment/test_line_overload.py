@@ -13,9 +13,11 @@ from harness.core.stream_health import describe_line_loss, excess_loss
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.executors import process_executor
-from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
-from harness.experiment.sweep_config import Sweep
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import Sweep
+from harness.experiment.workers.executors import process_executor
 from harness.mocap.sources import open_motion_source
 from harness.results.storage import read_summary
 from harness.simulate.link import TrackerConfig

@@ -13,16 +13,11 @@ import pytest
 from harness.body.humanoid import build_body
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
-from harness.experiment import engine, remote_method
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_process import MethodFailure
-from harness.experiment.remote_method import (
-    RemoteMethod,
-    close_methods,
-    describe_options,
-    hash_method,
-    resolve_method,
-)
+from harness.experiment import engine
+from harness.experiment.methods import remote_method
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_process import MethodFailure
+from harness.experiment.methods.remote_method import NamedMethod, RemoteMethod, close_methods, resolve_method
 from harness.results.storage import read_cells, read_summary
 from tests.experiment.test_isolation import ONE_CLIP
 
@@ -168,13 +163,13 @@ def test_a_declared_file_that_changes_during_a_run_fails_the_cell(folder: Path) 
 def test_source_that_changes_during_a_run_is_noticed_by_a_new_process(folder: Path) -> None:
     write_method(folder, "angle = 0.0")
     method = fit()
-    before = hash_method(method)
+    before = NamedMethod("", method).source_hash
     write_method(folder, "angle = 0.5")
     method.process.close()
     with pytest.raises(MethodFailure, match="changed since the run began"):
         method.fit(build_body(), [], generator(1, "fit"))
     end_methods()
-    assert hash_method(fit()) != before
+    assert NamedMethod("", fit()).source_hash != before
 
 
 def test_errors_of_names_are_those_of_the_registry(folder: Path) -> None:
@@ -244,7 +239,7 @@ def test_hashes_of_texts_and_the_temporary_folder_are_those_of_another_server(fo
     write_plain(folder, 0.1, f"import tempfile; self.parts = {parts}")
     texts = set[str]()
     for _ in range(2):
-        texts.add(describe_options(resolve_method("plain:Plain", Isolation())))
+        texts.add(NamedMethod("", resolve_method("plain:Plain", Isolation())).options)
         close_methods()
     assert len(texts) == 1
 
@@ -318,7 +313,7 @@ def test_byte_code_of_an_installed_method_is_not_that_of_before(
             for file in module.parent.iterdir():
                 py_compile.compile(str(file), doraise=True)
         method = resolve_method(name.replace("Mine", "Upright"), Isolation())
-        found.append((method.summary, hash_method(method)))
+        found.append((method.summary, NamedMethod("", method).source_hash))
         end_methods()
     assert [summary for summary, _ in found] == ["angle 0.1", "angle 0.5"]
     assert found[0][1] != found[1][1]
@@ -376,7 +371,7 @@ def test_the_code_that_makes_a_method_of_the_package_counts(folder: Path) -> Non
         write_unnoticed(folder / "maker.py", (folder / "maker.py").read_text().format(scale=scale))
         method = resolve_method("maker:make", Isolation())
         assert isinstance(method, RemoteMethod)
-        found.append(hash_method(method))
+        found.append(NamedMethod("", method).source_hash)
         end_methods()
     assert found[0] != found[1]
 
@@ -434,7 +429,7 @@ def test_a_declared_variable_is_part_of_the_key_and_may_be_read(folder: Path, mo
     for value in ("0.1", "0.5"):
         close_methods()  # the server too: it has the environment of its start, as a run has
         monkeypatch.setenv(VARIABLE, value)
-        hashes.append(hash_method(fit()))
+        hashes.append(NamedMethod("", fit()).source_hash)
     assert hashes[0] != hashes[1]
 
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile, SystemFault
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_process import MethodFailure, MethodProcess
-from harness.experiment.remote_method import RemoteMethod
-from harness.experiment.worker_process import close_fork_server
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_process import MethodFailure, MethodProcess
+from harness.experiment.methods.remote_method import RemoteMethod
+from harness.experiment.methods.worker_process import close_fork_server
 from tests.processes import is_running, wait_until
 
 pytestmark = [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.errors import ShapeError
-from harness.experiment.method_run import FRAMES_PER_TIMING, ReferenceWorkload, run_method
+from harness.experiment.methods.method_run import FRAMES_PER_TIMING, ReferenceWorkload, run_method
 
 
 def test_the_work_is_the_same_every_time_and_solves_what_it_says() -> None:

@@ -8,13 +8,15 @@ import pytest
 
 from harness.core.split import ClipPart
 from harness.experiment import engine
-from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import evaluate_each
 from harness.experiment.observed_take import simulated_take
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import recorded_take
-from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
 from harness.results.storage import read_summary

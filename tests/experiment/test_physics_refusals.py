@@ -8,9 +8,10 @@ import pytest
 from harness.cli import main
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
-from harness.experiment.cells import check_names
+from harness.experiment.plan import check_names
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import Scenario, load_scenario, variants
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.noise import STATISTICAL_COMPONENTS
 from harness.study.placement.config import base_scenario, load_placement_study
 
@@ -138,7 +139,7 @@ def test_a_varied_constellation_is_never_ignored(beside: str, key: str, says: st
 
 def test_the_physics_can_be_varied(tmp_path: Path) -> None:
     text = '[vary]\nphysics = ["none", {}]\n"physics.constellation.name" = ["cave", "hall"]'
-    names = [v.physics and v.physics.constellation.name for _, v in variants(load_scenario(written(tmp_path, text)))]
+    names = [v.physics and v.physics.constellation.name for _, v in load_scenario(written(tmp_path, text)).variants()]
     assert names == ["cave", "hall", "cave", "hall"]
     with pytest.raises(UnknownName, match="constellation called 'hal'"):
         checked(written(tmp_path, text.replace('"hall"', '"hal"')))

@@ -6,7 +6,7 @@ import pytest
 
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import find_scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario
 
 
 def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:

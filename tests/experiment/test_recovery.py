@@ -7,7 +7,7 @@ import pytest
 
 from harness.errors import Outcome, UnknownName
 from harness.experiment import engine
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.run.text import run_table
 from harness.results.reader import select_cells
 from harness.results.storage import read_summary

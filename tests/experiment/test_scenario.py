@@ -8,14 +8,9 @@ import pytest
 from harness.core.fields import replace_fields
 from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
-from harness.experiment.scenario import (
-    Station,
-    count_variants,
-    expand_clips,
-    load_scenario,
-    shipped_scenarios,
-    variants,
-)
+from harness.experiment.scenarios.motion_source import expand_clips
+from harness.experiment.scenarios.scenario import Station
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
 from harness.results.cell import varied_text
 from harness.simulate.components.faults import LostStation
 from harness.simulate.components.transient import Echo
@@ -199,7 +194,7 @@ components.echo.share = [0.0, 0.05]
 
 def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL + "[components.echo]\nsize_m = [0.1, 0.2]\n" + VARIED))
-    found = variants(scenario)
+    found = scenario.variants()
     assert [list(varied.values()) for varied, _ in found] == [
         ["clean", 0.0, 0.5], ["clean", 0.05, 0.5], ["default", 0.0, 0.5], ["default", 0.05, 0.5],
     ]  # fmt: skip
@@ -208,21 +203,21 @@ def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> Non
     assert (last.noise, last.stations["head"]) == ("default", Station("head", along=0.5))
     assert last.components == {"echo": {"size_m": [0.1, 0.2], "share": 0.05}}
     assert last.vary == {}
-    assert variants(last) == [({}, last)]
-    assert [count_variants(scenario), count_variants(last)] == [4, 1]
+    assert last.variants() == [({}, last)]
+    assert [scenario.count_variants(), last.count_variants()] == [4, 1]
 
 
 def test_what_is_worn_is_taken_from_the_stations_in_their_order(tmp_path: Path) -> None:
     two = MINIMAL + 'torso = { bone = "thorax" }\n'
     scenario = load_scenario(written(tmp_path, two + "[vary]\nworn = [[], ['torso'], ['torso', 'head']]\n"))
-    found = {varied_text(varied): tuple(made.worn_stations) for varied, made in variants(scenario)}
+    found = {varied_text(varied): tuple(made.worn_stations) for varied, made in scenario.variants()}
     assert found == {"worn=[]": ("head", "torso"), "worn=torso": ("torso",), "worn=torso+head": ("head", "torso")}
 
 
 def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL + '[vary]\n"components.echo" = ["none", { share = 0.1 }]\n'))
     without, with_it = (
-        replace_fields(noise_preset("default"), made.components, "components") for _, made in variants(scenario)
+        replace_fields(noise_preset("default"), made.components, "components") for _, made in scenario.variants()
     )
     assert without.echo is None
     assert with_it.echo == Echo(share=0.1)
@@ -314,7 +309,7 @@ def test_too_many_combinations_are_refused_before_they_are_listed(tmp_path: Path
     keys = ("tracker.latency_s", "tracker.baud", "tracker.queue_records", "seed", "tracker.rate_hz")
     table = "".join(f'"{key}" = {list(range(10, 40))}\n' for key in keys)
     with pytest.raises(HarnessError, match="24,300,000 combinations"):
-        variants(load_scenario(written(tmp_path, f"{MINIMAL}[vary]\n{table}")))
+        load_scenario(written(tmp_path, f"{MINIMAL}[vary]\n{table}")).variants()
 
 
 def test_a_pattern_matches_clips_that_are_named_by_their_path(tmp_path: Path) -> None:

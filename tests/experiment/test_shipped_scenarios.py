@@ -11,9 +11,11 @@ from harness.core.motion import Clip
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart
 from harness.experiment import clip_evaluation
-from harness.experiment.cells import check_names, plan_tasks
 from harness.experiment.clip_evaluation import Subject
-from harness.experiment.scenario import expand_clips, load_scenario
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import expand_clips
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.tasks import plan_tasks
 from harness.mocap.shared_motion import SharedMotion, find_shared_motion
 from harness.mocap.sources import MotionSource, open_motion_source
 

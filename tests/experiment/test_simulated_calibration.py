@@ -15,9 +15,11 @@ from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
-from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
-from harness.experiment.method_run import run_method
-from harness.experiment.scenario import CalibrationSettings, Scenario, ScenarioMotion, load_scenario
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.methods.method_run import run_method
+from harness.experiment.scenarios.scenario import CalibrationSettings, Scenario
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,
@@ -69,7 +71,7 @@ def plainly(scenario: Scenario) -> Simulation:
     """The take worn as if nobody had ever calibrated."""
     made = setting(scenario)
     return simulate_tracker(
-        made.body, made.subject.take, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
+        made.body, made.subject.take, scenario.nominal_mounts, scenario.device, scenario.noise_model, seed=scenario.seed
     )
 
 

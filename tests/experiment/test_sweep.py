@@ -19,11 +19,11 @@ from harness.core.files import TEMPORARY
 from harness.core.interrupts import REPEAT_S
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
-from harness.experiment.cells import ClipTask, cell_names, plan_tasks
 from harness.experiment.engine import run_cells, run_sweep
-from harness.experiment.executors import R, TaskExecutor, run_in_process
-from harness.experiment.scenario import load_scenario
-from harness.experiment.sweep_config import expand_sweep, load_sweep
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
+from harness.experiment.tasks import ClipTask, cell_names, plan_tasks
+from harness.experiment.workers.executors import R, TaskExecutor, run_in_process
 from harness.results.files.folder_kind import folder_lock
 from harness.results.storage import read_cell
 from harness.results.table import TIME_COLUMNS

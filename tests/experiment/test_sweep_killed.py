@@ -23,10 +23,11 @@ import pytest
 from harness.core.files import TEMPORARY
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import ClipTask, run_task
+from harness.experiment.cells import run_task
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.executors import TaskExecutor, dask_executor, process_executor, run_in_process
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.tasks import ClipTask
+from harness.experiment.workers.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from tests.study.papers.tiny import WALKS
 
 R = TypeVar("R")

@@ -20,12 +20,14 @@ from harness.core.files import content_key, to_json_types, write_text
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
-from harness.experiment.cells import cell_names
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_take import find_playback
-from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
+from harness.experiment.scenarios.motion_source import expand_clips
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
+from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
 from harness.experiment.status import read_status
-from harness.experiment.sweep_config import expand_sweep, load_sweep
+from harness.experiment.tasks import cell_names
 from harness.mocap.file_inspection import inspect_file
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read.c3d import read_c3d

@@ -17,7 +17,6 @@ from harness.commands import live_summary
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
-from harness.experiment.clip_evaluation import mounts_of, noise_of
 from harness.experiment.playback import Playback, prepare_playback
 from harness.live.pose import LivePose
 from harness.live.scheduling_jitter import JitterProbe
@@ -204,7 +203,7 @@ def worn(tmp_path_factory: pytest.TempPathFactory) -> Playback:
 def test_nobody_in_t_pose_is_told_so(worn: Playback) -> None:
     said: list[str] = []
     boxing = worn.simulation.frames
-    standing = TPoseCalibrator(worn.body, mounts_of(worn.scenario), attempts=2)
+    standing = TPoseCalibrator(worn.body, worn.scenario.nominal_mounts, attempts=2)
     recorded, plan = Paced(boxing, stamped=False), LiveOptions(40.0, queue_frames=9999, host_timestamps=False)
     with pytest.raises(UnusableHold):
         run_session(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
@@ -218,8 +217,8 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
 
     upright = humanoid.tpose(worn.body.skeleton)
     take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
-    noise = noise_of(worn.scenario)
-    standing = simulate_tracker(worn.body, take, mounts_of(worn.scenario), worn.tracker, noise, seed=1).frames
+    noise = worn.scenario.noise_model
+    standing = simulate_tracker(worn.body, take, worn.scenario.nominal_mounts, worn.tracker, noise, seed=1).frames
     output, said = Kept(), list[str]()
 
     def stands() -> Iterator[TrackerFrame]:
@@ -235,7 +234,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
         Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
         worn.body,
         worn.clip_evaluation.fit_method(registry.resolve("ik:previous"), "ik:previous"),
-        TPoseCalibrator(worn.body, mounts_of(worn.scenario)),
+        TPoseCalibrator(worn.body, worn.scenario.nominal_mounts),
         [output],
         LiveOptions(40.0, queue_frames=999, host_timestamps=False),
         say=said.append,

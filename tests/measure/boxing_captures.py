@@ -12,8 +12,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.clip_evaluation import mounts_of
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise
@@ -36,7 +35,7 @@ class BoxingCapture:
 
 def capture_boxing(body: Body, take: BodyMotion, noise: Noise, seed: int) -> BoxingCapture:
     """Six stations at 40 Hz, as a driver delivers their frames."""
-    mounts = mounts_of(load_scenario("builtin_boxing"))
+    mounts = load_scenario("builtin_boxing").nominal_mounts
     found = simulate_tracker(body, take, mounts, TrackerConfig(rate_hz=40.0), noise, seed=seed)
     exact = found.calibration
     place, turn = bone_poses(body.skeleton, take.qpos)

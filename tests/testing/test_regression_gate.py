@@ -17,7 +17,8 @@ from harness.compare import baseline
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results import manifest
 from harness.results.manifest import Manifest
 from harness.results.reader import load_results

@@ -31,9 +31,9 @@ from harness.bench.common import fresh_methods, run_benchmark_cells
 from harness.bench.limits import outcome_of
 from harness.compare.ranking import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.remote_method import resolve_method
-from harness.experiment.scenario import Scenario
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.remote_method import resolve_method
+from harness.experiment.scenarios.scenario import Scenario
 from harness.results.cell import cell_folder, read_cell
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.manifest import current_circumstances

@@ -17,8 +17,8 @@ from harness.core.motion import Clip
 from harness.core.package_data import VERSION
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.mocap.synthetic.takes import generate_rig, stretch_marks
 from harness.simulate.components.stationary import SessionBias
@@ -224,13 +224,13 @@ def planted_numbers(kind: str, seed: int) -> tuple[PlantedNumber, ...]:
 def _simulate_line(scenario: Scenario, clip: Clip) -> tuple[WireFormat, ByteCapture]:
     """What `harness record sim:` records of a scenario and a clip."""
     body, motion = retarget_to_own_body(clip)
-    mounts, tracker = mounts_of(scenario), tracker_of(scenario)
+    mounts, tracker = scenario.nominal_mounts, scenario.device
     wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
     trajectory = Trajectory(body, motion)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     session = _SESSION if clip.behaviour == BOXING else ""
     readings = simulate_readings(
-        trajectory, mounts, tracker, noise_of(scenario), time_s, seed=scenario.seed, take=clip.name, session=session
+        trajectory, mounts, tracker, scenario.noise_model, time_s, seed=scenario.seed, take=clip.name, session=session
     )
     return wire_format, transmit_readings(readings, wire_format, tracker)[1]
 

@@ -10,7 +10,7 @@ from harness.bench.lab.captures import NO_FAULTS, PLANTED_FAULTS, planted_captur
 from harness.bench.lab.validated_captures import registration_errors, validate_planted
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError
-from harness.experiment.executors import TaskExecutor
+from harness.experiment.workers.executors import TaskExecutor
 from harness.measure.reports.departures import Departure
 from harness.results.files.digests import check_key, read_record, write_record
 from harness.results.manifest import source_hash

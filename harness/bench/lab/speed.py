@@ -13,9 +13,9 @@ from harness.bench.lab.captures import FIVE_MINUTES, SCENARIO, planted_capture, 
 from harness.bench.lab.verb_cost import BOXING_KIND, measure_verb
 from harness.bench.limits import hold_to_limit
 from harness.body.retargeting import retarget_to_own_body
-from harness.experiment.clip_evaluation import mounts_of, noise_of
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.synthetic.takes import generate_rig
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
@@ -74,9 +74,9 @@ def long_capture(path: Path, seed: int, minutes: float) -> None:
 
 def _parts(scenario: Scenario, wire_format: WireFormat, count: int) -> Iterator[ByteCapture]:
     body, motion = retarget_to_own_body(generate_rig(FIVE_MINUTES))
-    mounts, tracker = mounts_of(scenario), scenario.tracker
+    mounts, tracker = scenario.nominal_mounts, scenario.tracker
     time_s = sampling_times_s(PART_S, tracker, len(mounts))[: round(PART_S * RATE_HZ)]
-    simulate = partial(simulate_readings, Trajectory(body, motion), mounts, tracker, noise_of(scenario), time_s)
+    simulate = partial(simulate_readings, Trajectory(body, motion), mounts, tracker, scenario.noise_model, time_s)
     for number in range(count):
         part: dict[str, Any] = {"take": f"part {number}", "begins_s": PART_S * number, "session": "long"}
         yield transmit_readings(simulate(seed=scenario.seed, **part), wire_format, tracker)[1]

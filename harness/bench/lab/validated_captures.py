@@ -21,7 +21,6 @@ from harness.body.kinematics import bone_poses
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.measure.pose_series import TruthPoses
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.components.stationary import Clock, SpeedError
@@ -59,7 +58,7 @@ def planted_truth(kind: str, seed: int) -> TruthMotion:
     """The reference of a capture: the performer's bones, with stations where the scenario without a fault has them."""
     scenario, clip = planted_scenario(EARLIER, seed), planted_motion(kind, seed)
     body, take = retarget_to_own_body(clip)
-    calibration = exact_calibration(body, mounts_of(scenario), tracker_of(scenario))
+    calibration = exact_calibration(body, scenario.nominal_mounts, scenario.device)
     position_m, world_from_bone = bone_poses(body.skeleton, take.qpos)
     time_s, rows = np.arange(len(take)) / take.rate_hz, {bone: body.skeleton.index(bone) for bone in calibration.bones}
     return TruthMotion(

@@ -13,7 +13,8 @@ from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, comp
 from harness.core.package_data import data_folder
 from harness.core.split import performer_of
 from harness.errors import Outcome
-from harness.experiment.scenario import Scenario, load_scenario, variants
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.results.reported_metrics import PRIMARY_METRIC
 
@@ -108,7 +109,7 @@ def rank_rows(
     values: dict[tuple[str, str], dict[str, dict[str, dict[str, list[float | None]]]]] = {}
     for scenario in scenarios:
         behaviour, _, source = scenario.name.rsplit("_", 2)
-        for _, variant in variants(scenario):
+        for _, variant in scenario.variants():
             worn = frozenset(variant.worn_stations)
             for method, clip in product(variant.methods, variant.motion.test):
                 for kind, item in _ranked_items(scenario, method, worn).items():

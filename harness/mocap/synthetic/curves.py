@@ -130,7 +130,7 @@ class Gesture:
         return self.at_s + max(keys[-1][0] for keys in self.channels.values())
 
     def vary(self, rng: np.random.Generator, size: float, slowness: float, spread: float = 0.06) -> "Gesture":
-        """The gesture with its values scaled by `size` and its times by `slowness`, varied at random.
+        """The gesture with its values scaled by `size` and its times by `slowness`, changed at random.
 
         `spread` is the relative standard deviation of each value. The order of the channels decides the random draws.
         """

@@ -164,8 +164,8 @@ def interval_charts(comparison: Comparison, gated: bool) -> list[Callable[[], Ch
     return charts
 
 
-def _interval_chart(name: str, metric: str, lines: Sequence[Difference], varied: bool) -> Chart:
-    names = [_label(line, varied) for line in lines]
+def _interval_chart(name: str, metric: str, lines: Sequence[Difference], several: bool) -> Chart:
+    names = [_label(line, several) for line in lines]
     texts = [
         f"{line.method} {format_change_percent(percent_of_a(line, line.difference))} {line.verdict}" for line in lines
     ]
@@ -227,8 +227,8 @@ def _extent(line: Difference) -> float:
     return max(abs(value) for value in ends if not math.isnan(value))
 
 
-def _label(line: Difference, varied: bool) -> str:
-    words = [line.method, *([line.group] if varied else [])]
+def _label(line: Difference, several: bool) -> str:
+    words = [line.method, *([line.group] if several else [])]
     rows = [row for text in words for row in textwrap.wrap(text, _LETTERS) or [""]]
     shortened = [*rows[: _MOST_ROWS - 1], textwrap.shorten(" ".join(rows[_MOST_ROWS - 1 :]), _LETTERS, placeholder="…")]
     return "\n".join(rows if len(rows) <= _MOST_ROWS else shortened)

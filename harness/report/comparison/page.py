@@ -138,16 +138,16 @@ def _cut(texts: Sequence[str], most: int, what: str = "and {} more") -> list[str
 
 
 def _slopes(lines: Sequence[Difference]) -> list[Block]:
-    varied = len({line.group for line in lines}) > 1
+    several = len({line.group for line in lines}) > 1
     charted = [(line, partial(slope_chart, line, n)) for n, line in enumerate(lines, start=1) if line.clips]
-    panels = [(_panel_heading(line, varied), draw) for line, draw in charted]
+    panels = [(_panel_heading(line, several), draw) for line, draw in charted]
     shown, rest = panels[:_MOST_OPEN], panels[_MOST_OPEN:]
     more = [BrowserOnly([Panels(rest)], f"{len(rest)} more lines")] if rest else []
     return [BrowserOnly([Prose(_SLOPES)]), Panels(shown), *more] if panels else []
 
 
-def _panel_heading(line: Difference, varied: bool) -> Markup:
-    group = tag("small", line.group) if varied else None
+def _panel_heading(line: Difference, several: bool) -> Markup:
+    group = tag("small", line.group) if several else None
     title = tag("h3", line.method, tag("small", f"{line.metric} [{line.unit}]"), group)
     return join(title, verdict_badge(line.verdict, MARKS[line.verdict]))
 
@@ -182,10 +182,10 @@ def _tables(comparison: Comparison, lines: Sequence[Difference], rest: Sequence[
 
 def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str, *, with_why: bool = True) -> DataTable:
     """A row for each line; with the reason for its verdict, which the terminal lists apart."""
-    varied = groups_vary(comparison)
+    several = groups_vary(comparison)
     rows = [
         [
-            Stack(line.method, ", ".join(filter(None, _names(line, varied)))),
+            Stack(line.method, ", ".join(filter(None, _names(line, several)))),
             Badge(line.verdict, MARKS[line.verdict], line.why if with_why else ""),
             format_mean(line, line.mean_a),
             format_mean(line, line.mean_b),
@@ -202,9 +202,9 @@ def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str,
     return DataTable(head, rows, caption=_LINES, label=label)
 
 
-def _names(line: Difference, varied: bool) -> tuple[str, ...]:
+def _names(line: Difference, several: bool) -> tuple[str, ...]:
     """Metric, group where it varies, and part of a line."""
-    return f"{line.metric} [{line.unit}]", line.group if varied else "", line.part.replace("_", " ")
+    return f"{line.metric} [{line.unit}]", line.group if several else "", line.part.replace("_", " ")
 
 
 def _reasons(lines: Sequence[Difference]) -> list[str]:
@@ -219,8 +219,8 @@ def _reasons(lines: Sequence[Difference]) -> list[str]:
 def _clip_table(metric: str, lines: Sequence[Difference]) -> DataTable:
     """A row for each clip and a column for each line: A, B and their difference."""
     clips = clips_of(lines)
-    varied = len({line.group for line in lines}) > 1
-    head = ["clip", *(f"{line.method}, {line.group}" if varied else line.method for line in lines)]
+    several = len({line.group for line in lines}) > 1
+    head = ["clip", *(f"{line.method}, {line.group}" if several else line.method for line in lines)]
     indices = [{clip: n for n, clip in enumerate(line.clips)} for line in lines]
     rows = [
         [clip, *(_clip_cell(line, at.get(clip)) for line, at in zip(lines, indices, strict=True))]

@@ -34,7 +34,7 @@ class RunCondition:
     """One combination of varied values, known or new performers, and one number of later
     frames: its cells are ranked together."""
 
-    varied: Mapping[str, Any]
+    setting: Mapping[str, Any]
     group: RankingGroup
     parts: tuple[str, ...]
     """Texts of what distinguishes it from the other conditions of the run; empty if it is the only one."""
@@ -195,8 +195,8 @@ def choose_condition(run: ConditionSet, selection: FigureSelection) -> RunCondit
         if not chosen:
             clips = dict.fromkeys(clip for each in run.conditions for clip in each.clips)
             raise UnknownName("clip of the run", selection.clip, clips)
-    last = chosen[-1].varied
-    return next(each for each in chosen if each.varied == last and each.group.lag_frames == chosen[0].group.lag_frames)
+    last = chosen[-1].setting
+    return next(each for each in chosen if each.setting == last and each.group.lag_frames == chosen[0].group.lag_frames)
 
 
 def rank_highlights(condition: RunCondition, selection: FigureSelection) -> Highlights:

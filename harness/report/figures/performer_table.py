@@ -93,9 +93,9 @@ def _errors(condition: RunCondition) -> dict[str, dict[str, float]]:
 
 
 def _titles(conditions: Sequence[RunCondition]) -> list[str]:
-    """Performers and varied values of each condition, without keys that tell no conditions apart."""
+    """Performers and setting of each condition, without keys that tell no conditions apart."""
     parts: list[dict[str, str]] = [
-        {"": each.group.performer, **{key: str(value) for key, value in each.varied.items()}} for each in conditions
+        {"": each.group.performer, **{key: str(value) for key, value in each.setting.items()}} for each in conditions
     ]
     for key in [name for name in parts[0] if name][::-1]:
         fewer = [{name: text for name, text in part.items() if name != key} for part in parts]

@@ -63,7 +63,7 @@ class FigureSelection:
     methods: tuple[str, ...] = ()
     """Methods to show, in this order where order matters; empty: all."""
     condition: str = ""
-    """Name of a condition or some of its parts (see `RunCondition.name`); empty: all, or the last varied values."""
+    """Name of a condition or some of its parts (see `RunCondition.name`); empty: all, or the last setting."""
     clip: str = ""
     control: str = ""
     """The method that is highlighted next to the one with the lowest error."""

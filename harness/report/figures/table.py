@@ -70,7 +70,7 @@ class ResultsTable:
     """A table of a run."""
 
     condition_names: tuple[str, ...]
-    """What distinguishes conditions: varied keys, performers, later frames, behaviour; empty for one condition."""
+    """What distinguishes conditions: keys that vary, performers, later frames, behaviour; empty for one condition."""
     metrics: tuple[str, ...]
     rows: tuple[ResultsRow, ...]
     """The rows of a condition follow each other."""
@@ -118,14 +118,14 @@ def build_table(
 
 
 def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:
-    varied = dict.fromkeys(key for each in run.conditions for key in each.varied)
+    keys = dict.fromkeys(key for each in run.conditions for key in each.setting)
     groups = {each.group for each in run.conditions}
     further = {
         "performers": len({group.performer for group in groups}) > 1,
         LAG_COLUMN: len({group.lag_frames for group in groups}) > 1,
         "behaviour": by_behaviour,
     }
-    return (*varied, *(name for name, shown in further.items() if shown))
+    return (*keys, *(name for name, shown in further.items() if shown))
 
 
 def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -> str:
@@ -134,7 +134,7 @@ def _condition_text(condition: RunCondition, name: str, behaviour: str | None) -
         LAG_COLUMN: str(condition.group.lag_frames),
         "behaviour": (behaviour or "").replace("_", " "),
     }
-    return texts[name] if name in texts else varied_text({name: condition.varied[name]}).removeprefix(f"{name}=")
+    return texts[name] if name in texts else varied_text({name: condition.setting[name]}).removeprefix(f"{name}=")
 
 
 def _value(

@@ -9,7 +9,7 @@ from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.compare.units import Sampling, average_units
 from harness.core.number_format import NOT_MEASURED, Interval, format_fixed
 from harness.report.kit.page import DataTable
-from harness.results.cell import varied_text
+from harness.results.cell import setting_text, varied_text
 
 _ERRORS = (
     ("mounts [mm]", "mount_mm", 1),
@@ -44,7 +44,7 @@ def calibration_errors(cells: Sequence[Mapping[str, Any]]) -> DataTable:
     """A row for each kind of calibration; none when every calibration was exact."""
     sessions: dict[tuple[str, str], dict[str, Mapping[str, float]]] = {}
     for cell in cells if any(cell["calibration_errors"] for cell in cells) else ():
-        key = str(cell["calibration"]), varied_text(cell["varied"])  # methods and inputs share a session
+        key = str(cell["calibration"]), setting_text(cell)  # methods and inputs share a session
         sessions.setdefault(key, {})[str(cell["clip"])] = cell["calibration_errors"]
     several = len({varied for _, varied in sessions}) > len({kind for kind, _ in sessions})
     rows = [

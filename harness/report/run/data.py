@@ -14,7 +14,7 @@ from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import training_note
 from harness.report.kit.style import STYLES
-from harness.results.cell import Cell, as_row, cell_folder, lag_of, varied_text
+from harness.results.cell import Cell, as_row, cell_folder, lag_of, setting_text
 from harness.results.files.integrity import SUMMARY, check_cells, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
@@ -97,7 +97,7 @@ class RunData:
     @property
     def varied_label(self) -> str:
         """The varied values that the page shows, as text; empty when the scenario varies none."""
-        return varied_text(self.cells[0]["varied"]) if self.cells else ""
+        return setting_text(self.cells[0]) if self.cells else ""
 
     @cached_property
     def series(self) -> tuple[str, ...]:

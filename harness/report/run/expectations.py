@@ -8,7 +8,7 @@ from harness.compare.run_summary.expected_orders import DECIMALS
 from harness.compare.run_summary.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
 from harness.core.number_format import NOT_MEASURED, format_fixed, format_share
 from harness.report.kit.page import Block, Bullets, DataTable, Prose, TerminalOnly
-from harness.results.cell import varied_text
+from harness.results.cell import setting_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 
 _MEANS = "means over the clips on which all were measured"
@@ -42,9 +42,9 @@ def _order_title(row: Mapping[str, Any]) -> str:
 
 
 def _setting(row: Mapping[str, Any]) -> str:
-    """Behaviour, inputs, performers and varied values, those that there are, and the number of clips."""
+    """Behaviour, inputs, performers and values that vary, those that there are, and the number of clips."""
     words = (row["behaviour"].replace("_", " "), row["inputs"], row["performer"] and f"{row['performer']} performers")
-    setting = ", ".join(filter(None, (*words, varied_text(row["varied"])))) or "everywhere"
+    setting = ", ".join(filter(None, (*words, setting_text(row)))) or "everywhere"
     of_any = f" of {row['clips_of_any']}" if row["clips"] < row["clips_of_any"] else ""
     return f"{setting} n\u00a0{row['clips']}{of_any}"
 

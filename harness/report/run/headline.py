@@ -8,7 +8,7 @@ from harness.core.stream_health import describe_line_loss
 from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
 from harness.report.run.ranking import describe_rankings
-from harness.results.cell import varied_text
+from harness.results.cell import setting_text
 from harness.results.reported_metrics import SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -99,10 +99,10 @@ def _learning(run: RunData) -> str:
 
 
 def _varied(run: RunData) -> str:
-    """The combinations of varied values that were run, and which of them the page shows."""
+    """The settings that were run, and which of them the page shows."""
     if not run.varied_label:
         return ""
-    texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.full_summary["cells"]))
+    texts = list(dict.fromkeys(setting_text(row) for row in run.full_summary["cells"]))
     return f"{'; '.join(texts)}. All sections from Results on show {run.varied_label}"
 
 

@@ -15,7 +15,7 @@ from harness.report.kit.ranking import LAG_NOTE, RankingPanel, describe_ranking,
 from harness.report.kit.style import Chart
 from harness.report.kit.text import metric_name
 from harness.report.run.data import Row, RunData, last_varied, series_name
-from harness.results.cell import lag_of, varied_text
+from harness.results.cell import lag_of, setting_text
 from harness.results.reported_metrics import PRIMARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
@@ -81,7 +81,7 @@ def rank_groups(summary: Mapping[str, Any]) -> Mapping[RankingGroup, MethodRanki
 
 
 def _measured_groups(summary: Mapping[str, Any]) -> GroupedValues:
-    """The values of the last combination of varied values, of the series that have the primary metric."""
+    """The values of the last setting, of the series that have the primary metric."""
     groups = group_values(last_varied(summary)["cells"], summary["methods"])
     return {
         group: {name: of for name, of in values.items() if of.get(PRIMARY_METRIC)} for group, values in groups.items()
@@ -96,7 +96,7 @@ def describe_rankings(summary: Mapping[str, Any], motion: str) -> list[tuple[str
     last = last_varied(summary)
     groups = _measured_groups(summary)
     several, found = len({group.performer for group in groups}) > 1, list[tuple[str, str | None]]()
-    setting = varied_text(last["cells"][0]["varied"]) if last["cells"] else ""
+    setting = setting_text(last["cells"][0]) if last["cells"] else ""
     for group, ranking in rank_groups(summary).items():
         measured = groups[group]
         if ranking is None:

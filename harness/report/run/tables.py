@@ -1,4 +1,4 @@
-"""Tables of a run's page: errors by behaviour and varied values, coverage, stream health, all metrics."""
+"""Tables of a run's page: errors by behaviour and setting, coverage, stream health, all metrics."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ from harness.report.kit.text import format_statistic, last_line
 from harness.report.run.data import Row, RunData, Trace
 from harness.report.run.metric_columns import SIGMA_COLUMNS, format_sigma_scores
 from harness.report.run.ranking import GroupedValues, best_series, group_values
-from harness.results.cell import varied_text
+from harness.results.cell import setting_text
 from harness.results.reported_metrics import (
     MAX_FALLBACK_SHARE,
     PRIMARY_METRIC,
@@ -100,14 +100,14 @@ def _fallback_note(row: Row) -> str:
 
 
 def effect_tables(run: RunData) -> list[Block]:
-    """For each behaviour and metric a table of methods by varied values; nothing when nothing is varied."""
+    """For each behaviour and metric a table of methods by setting; nothing when nothing varies."""
     shown = run.behaviours if run.varied_label else ()
     return [_effect_table(run, behaviour, metric) for behaviour in shown for metric in OPEN_METRICS]
 
 
 def _effect_table(run: RunData, behaviour: str, metric: str) -> DataTable:
     by_series, unit = rows_by_setting(run, behaviour), DEFINITIONS[metric].unit
-    columns = list(dict.fromkeys(varied_text(row["varied"]) for row in run.full_summary["cells"]))
+    columns = list(dict.fromkeys(setting_text(row) for row in run.full_summary["cells"]))
     rows = []
     for name in run.series:
         if name in by_series:
@@ -119,11 +119,11 @@ def _effect_table(run: RunData, behaviour: str, metric: str) -> DataTable:
 
 
 def rows_by_setting(run: RunData, behaviour: str) -> dict[str, dict[str, Row]]:
-    """Series -> varied values as text -> row of the full summary."""
+    """Series -> text of its setting -> row of the full summary."""
     rows: dict[str, dict[str, Row]] = {}
     for row in run.full_summary["behaviours"]:
         if row["behaviour"] == behaviour:
-            rows.setdefault(run.series_of(row), {})[varied_text(row["varied"])] = row
+            rows.setdefault(run.series_of(row), {})[setting_text(row)] = row
     return rows
 
 

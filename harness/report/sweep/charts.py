@@ -1,4 +1,4 @@
-"""The charts of a sweep: error against each varied key, a small chart for each scenario that varies the key."""
+"""The charts of a sweep: error against each key that varies, a small chart for each scenario that varies the key."""
 
 import textwrap
 from collections.abc import Mapping, Sequence

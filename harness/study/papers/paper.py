@@ -14,8 +14,10 @@ from harness.core.package_data import data_folder
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import BadInput, Outcome, SystemFault, UnknownName, was_interrupted
-from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.results import manifest
@@ -193,16 +195,13 @@ def _run_row(scenario: Scenario) -> tuple[str, ...]:
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
         f"stations {', '.join(scenario.worn_stations)}"
     )
-    varied = [
-        f"{key}: {', '.join(_varied_value_text(key, value) for value in values)}"
-        for key, values in scenario.vary.items()
-    ]
+    vary = [f"{key}: {', '.join(_value_text(key, value) for value in values)}" for key, values in scenario.vary.items()]
     methods, inputs = ", ".join(scenario.methods), ", ".join(scenario.inputs)
-    return scenario.name, setting, methods, inputs, "; ".join(varied) or "nothing"
+    return scenario.name, setting, methods, inputs, "; ".join(vary) or "nothing"
 
 
-def _varied_value_text(key: str, value: Any) -> str:
-    """A varied value without its key."""
+def _value_text(key: str, value: Any) -> str:
+    """The text of a value without its key."""
     return varied_text({key: value}).removeprefix(f"{key}=")
 
 

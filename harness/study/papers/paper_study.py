@@ -17,8 +17,8 @@ from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
-from harness.experiment.cells import cell_names
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.tasks import cell_names
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
@@ -50,7 +50,7 @@ class PaperStudy:
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran, or where the folder holds another run.
 
-        `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer, clip, varied.
+        `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer and clip.
         A row also has the `unit` of its clip, and `unit_clips`: how many clips of that unit and behaviour were planned.
         """
         wanted, rows = to_json_types(where), self.summary_rows(run)

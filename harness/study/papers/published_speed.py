@@ -14,9 +14,9 @@ from typing import Any
 from harness.core.files import content_key
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest

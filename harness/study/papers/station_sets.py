@@ -13,7 +13,7 @@ from harness.compare.paired_statistics import (
     mean_interval,
 )
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.cells import open_scenario_motion
+from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.results.findings.benchmark_statement import BenchmarkStatement, StatementKind
 from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart
 from harness.results.reported_metrics import PRIMARY_METRIC

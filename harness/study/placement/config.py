@@ -13,7 +13,9 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import SCHEMA, Scenario, change_scenario, check_scenario, find_config
+from harness.experiment.scenarios.scenario import SCHEMA, Scenario
+from harness.experiment.scenarios.scenario_checks import check_scenario
+from harness.experiment.scenarios.scenario_reader import find_config
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -119,7 +121,7 @@ class PlacementStudy:
     title: Text
     scenario: str
     """A file in the folder of the study (without `.toml`), or a shipped scenario. It defines motion, body, calibration,
-    noise, tracker and seed; its stations, methods, inputs and varied values are not used."""
+    noise, tracker and seed; its stations, methods, inputs and `vary` are not used."""
     methods: tuple[MethodName, ...]
     """Methods; the mean of their errors is minimised."""
     schema: int = SCHEMA
@@ -247,7 +249,7 @@ def check_station_count(stations: int, where: str) -> None:
 def base_scenario(
     study: PlacementStudy, load: Callable[[str], Scenario], condition: ConditionOptions | None = None
 ) -> Scenario:
-    """The scenario of the study or of a condition: with its changes, all candidates as stations, and nothing varied.
+    """The scenario of the study or of a condition: with its changes, all candidates as stations, and an empty `vary`.
 
     `load` gives the scenario that the study or the condition names.
     """
@@ -277,6 +279,6 @@ def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -
     if fixed := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
         raise BadInput(f"{where}: {', '.join(fixed)}.", "The study defines these keys.")
     try:
-        return change_scenario(scenario, content, where)
+        return scenario.change(content, where)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error

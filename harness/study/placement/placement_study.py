@@ -18,8 +18,8 @@ from harness.compare.units import count_units
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
 from harness.experiment.cells import clear_caches
-from harness.experiment.executors import TaskExecutor, run_in_process
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.files.folder_kind import FINDINGS
@@ -37,9 +37,10 @@ from harness.score.metrics import DEFINITIONS
 from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
-from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
+from harness.study.placement.plan import PlacementPlan, is_refined
+from harness.study.placement.planner import FilePlanner, Planner, QuestionPlanner
 from harness.study.placement.power import choose_pilot, estimate_power
-from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study
+from harness.study.placement.question import PlacementQuestion
 from harness.study.placement.ranking import (
     ConditionCosts,
     Costs,
@@ -58,8 +59,6 @@ from harness.study.placement.set_results import SetResults
 
 Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
 """Receives what a study can show, and notes on its plan, before its cells run."""
-Shorten = Callable[[float], tuple[PlacementPlan, str]]
-"""Gives another plan, and a note, for the duration of a cell on one worker [s]."""
 
 
 def run_placement(
@@ -85,30 +84,20 @@ def run_placement(
     PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
-    shorten: Shorten | None = None
+    planner: Planner
     if isinstance(asked, PlacementQuestion):
-        study, scenario = question_study(asked, folder)
-        plan = plan_study(study, lambda name: scenario, folder)
-
-        def keep_budget(cell_s: float) -> tuple[PlacementPlan, str]:
-            within, shortened, note = plan_within_budget(study, scenario, asked, cell_s, jobs)
-            return plan_study(within, lambda name: shortened, folder), note
-
-        shorten = keep_budget
+        planner = QuestionPlanner(asked, folder, jobs)
     else:
-        plan = plan_placement(asked, folder)
+        planner = FilePlanner(asked, folder)
+    plan = planner.first_plan()
     results = SetResults(out, folder, executor, command, progress, plan.study.link)
-    return _run_plan(plan, results, jobs, announce, shorten)
+    return _carry_out(planner, plan, results, jobs, announce)
 
 
-def _run_plan(
-    plan: PlacementPlan,
-    cache: SetResults,
-    jobs: int,
-    announce: Announce,
-    shorten: Shorten | None,
+def _carry_out(
+    planner: Planner, plan: PlacementPlan, cache: SetResults, jobs: int, announce: Announce
 ) -> tuple[PlacementFindings, Outcome]:
-    """Run a plan, or the one that `shorten` gives."""
+    """Measure the first sets of a plan as a pilot, then the sets of the final plan."""
     identity = {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed}
     with open_study(cache.out, identity):
         (cache.out / "cells").mkdir(exist_ok=True)
@@ -116,9 +105,8 @@ def _run_plan(
         pilot = _PlacementRun(plan, cache).measure(sets) if sets else {}
         cell_s = statistics.median(cache.seconds) if cache.seconds else None
         notes: tuple[str, ...] = ()
-        if shorten is not None and cell_s is not None:
-            plan, note = shorten(cell_s)
-            notes = (note,)
+        if cell_s is not None:
+            plan, notes = planner.final_plan(cell_s)
         units, clips = len(plan.units(plan.scenario)), len(plan.scenario.motion.test)
         power = estimate_power(
             pilot,

@@ -11,8 +11,10 @@ from pathlib import Path
 from harness.compare.margins import margin_of
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.scenario import Scenario, expand_clips, find_scenario, load_scenario
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource
 from harness.results.findings.placement_findings import CandidatePlace

@@ -16,7 +16,8 @@ from harness.body.places import select_places
 from harness.compare.significance import count_needed
 from harness.core.ranges import Name
 from harness.errors import BadInput, UnknownName
-from harness.experiment.scenario import Scenario, ScenarioMotion, Station
+from harness.experiment.scenarios.scenario import Scenario, Station
+from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
 from harness.simulate.physics.constellation import ConstellationSettings, load_constellation

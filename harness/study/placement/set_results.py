@@ -19,10 +19,11 @@ from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
-from harness.experiment.cells import cell_names, open_scenario_motion
 from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.executors import TaskExecutor
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.tasks import cell_names
+from harness.experiment.workers.executors import TaskExecutor
 from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
 
@@ -87,10 +88,10 @@ class SetResults:
         values: dict[str, dict[str, Any]] = {}
         for asked, sets in requests:
             for stations in sets:
-                scenario, varied = self._variant(asked, stations)
-                if _variant_key(varied) not in self._variants.get(scenario.name, ()):
+                scenario, setting = self._variant(asked, stations)
+                if _variant_key(setting) not in self._variants.get(scenario.name, ()):
                     todo[scenario.name] = scenario
-                    values.setdefault(scenario.name, {})[_variant_key(varied)] = next(iter(varied.values()))
+                    values.setdefault(scenario.name, {})[_variant_key(setting)] = next(iter(setting.values()))
         scenarios = []
         for name, scenario in todo.items():
             key = "worn" if not scenario.worn else "stations"
@@ -125,11 +126,11 @@ class SetResults:
     def _errors(
         self, asked: Scenario, stations: StationSet, metric: str, methods: tuple[str, ...]
     ) -> dict[str, float | None]:
-        scenario, varied = self._variant(asked, stations)
+        scenario, setting = self._variant(asked, stations)
         by_clip: dict[str, float | None] = {}
         for clip in scenario.motion.test:
             rows = [
-                self._rows.get((scenario.name, _variant_key(varied), method, clip))
+                self._rows.get((scenario.name, _variant_key(setting), method, clip))
                 for method in methods or scenario.methods
             ]
             by_clip[clip] = _mean([row[metric] if row is not None else None for row in rows])
@@ -140,8 +141,8 @@ class SetResults:
         rows = iter(cells.rows)
         for scenario in scenarios:
             planned = [
-                (scenario.name, _variant_key(varied), method, clip)
-                for varied, variant in variants(scenario)
+                (scenario.name, _variant_key(setting), method, clip)
+                for setting, variant in scenario.variants()
                 for clip in variant.motion.test
                 for method in variant.methods
             ]
@@ -154,7 +155,7 @@ class SetResults:
         self.failures |= cells.failures
 
     def _variant(self, asked: Scenario, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
-        """The scenario that a set is a variant of, and its varied values: stations, or places of moved stations."""
+        """The scenario that a set is a variant of, and the values that make it: stations, or moved places."""
         rate = link_rate_hz(asked, len(stations), self.link)
         scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate), vary={})
         names = [station_name(place) for place in stations]
@@ -186,5 +187,5 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return float(np.mean(measured)) if len(measured) == len(values) else None
 
 
-def _variant_key(varied: Mapping[str, Any]) -> str:
-    return json.dumps(to_json_types(varied), sort_keys=True)
+def _variant_key(setting: Mapping[str, Any]) -> str:
+    return json.dumps(to_json_types(setting), sort_keys=True)

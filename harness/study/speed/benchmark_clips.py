@@ -17,8 +17,8 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import DatabaseMethod, Method, Reconstructor
@@ -114,7 +114,7 @@ def generate_held_out_clips(seed: int, seconds: float) -> list[BenchmarkClip]:
 
 def simulate_clips(takes: Sequence[BodyMotion], seed: int, scenario: Scenario) -> list[BenchmarkClip]:
     """Simulate takes as the stations of a scenario read them."""
-    body, sensors = build_common_body(), (mounts_of(scenario), tracker_of(scenario), noise_of(scenario))
+    body, sensors = build_common_body(), (scenario.nominal_mounts, scenario.device, scenario.noise_model)
     return [BenchmarkClip.from_simulation(t.name, simulate_tracker(body, t, *sensors, seed=seed)) for t in takes]
 
 

@@ -17,14 +17,14 @@ from harness.core.arrays import Floats, Ints
 from harness.core.fault_report import named_folder_fault
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.clip_evaluation import ClipEvaluation, noise_of, tracker_of
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import evaluate
-from harness.experiment.isolation import DEFAULT_ISOLATION
-from harness.experiment.method_run import describe_failure
+from harness.experiment.methods.isolation import DEFAULT_ISOLATION
+from harness.experiment.methods.method_run import describe_failure
+from harness.experiment.methods.remote_method import NamedMethod, resolve_method
 from harness.experiment.observed_take import ObservedTake
 from harness.experiment.recorded_take import checked_note, find_playback, recorded_take, registered_take
-from harness.experiment.remote_method import method_identity, resolve_method
-from harness.experiment.scenario import Scenario, change_scenario, variants
+from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results.files.digests import check_key, read_result_json, write_result_json
 from harness.results.manifest import source_hash
@@ -53,12 +53,12 @@ class Arm:
     method: str
     set_name: str
     stations: tuple[str, ...]
-    varied: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Name in tables, such as "ik, six"."""
-        values = [f"{key.rpartition('.')[2]} = {value}" for key, value in self.varied.items()]
-        return ", ".join([self.method, self.set_name, *values])
+        texts = [f"{key.rpartition('.')[2]} = {value}" for key, value in self.values.items()]
+        return ", ".join([self.method, self.set_name, *texts])
 
 
 @dataclass(frozen=True)
@@ -209,15 +209,15 @@ class _TrustTaskRun:
         """The scenario of the simulated side: that of the playback with the errors of the unit."""
         if self.task.unit is None:
             return self.playback.scenario
-        return change_scenario(replace(self.playback.scenario, physics=None), self.task.unit, "unit")
+        return replace(self.playback.scenario, physics=None).change(self.task.unit, "unit")
 
     @cached_property
     def _noise(self) -> Noise:
-        return self.fitted.disturbance.add_to(noise_of(self.fitted), tuple(self.fitted.worn_stations))
+        return self.fitted.disturbed_noise
 
     def _identity(self, seed: int) -> dict[str, Any]:
         """What tells the cells of one seed apart from others."""
-        tracker = tracker_of(self.fitted).as_dict()
+        tracker = self.fitted.device.as_dict()
         return {"seed": seed, "noise": asdict(self._noise), "tracker": tracker, "span_s": self._span_s}
 
     def _simulate(self, seed: int) -> ObservedTake:
@@ -226,7 +226,7 @@ class _TrustTaskRun:
         The seed of its errors is derived from the plan's, so that a capture of a simulated line with the same seed has
         other errors.
         """
-        playback, tracker = self.playback, tracker_of(self.fitted)
+        playback, tracker = self.playback, self.fitted.device
         mounts, drawn = playback.clip_evaluation.session.true_mounts, int(generator(seed, "trust").integers(2**62))
         found = simulate_tracker(playback.body, playback.take, mounts, tracker, self._noise, seed=drawn)
         first, last = (time_s * tracker.rate_hz for time_s in self._span_s)
@@ -257,8 +257,8 @@ class _TrustTaskRun:
             return [({}, base)]
         scenario = replace(base.scenario, vary=dict(self.task.parameters))
         return [
-            (varied, ClipEvaluation(variant, base.source, base.part, base.behaviour))
-            for varied, variant in variants(scenario)
+            (values, ClipEvaluation(variant, base.source, base.part, base.behaviour))
+            for values, variant in scenario.variants()
         ]
 
     def _cells(
@@ -277,10 +277,14 @@ class _TrustTaskRun:
         self, arm: Arm, side: str, identity: Mapping[str, Any], load: Callable[[], ObservedTake]
     ) -> dict[str, float | None]:
         method = resolve_method(arm.method, DEFAULT_ISOLATION)
-        evaluation = next(each for varied, each in self._evaluations if varied == arm.varied)
+        evaluation = next(each for values, each in self._evaluations if values == arm.values)
         conditions = evaluation.conditions_of(method, "pos+ori")
         content = {"conditions": conditions, "seen": arm.stations, "metrics": self.task.metrics, **identity}
-        path = self.task.out / "cells" / f"{cell_key(content, method_identity(method, arm.method), source_hash())}.json"
+        path = (
+            self.task.out
+            / "cells"
+            / f"{cell_key(content, NamedMethod(arm.method, method).identity, source_hash())}.json"
+        )
         cell = {"key": path.stem, "arm": str(arm), "clip": str(self.clip), "side": side}
         if path.is_file():
             return read_cell_errors(path, cell, self.task.metrics)

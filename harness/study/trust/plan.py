@@ -18,7 +18,8 @@ from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.ranges import MethodName, Name, Range, Text, check_fields
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import Scenario, dotted_keys, find_scenario, load_scenario, variants
+from harness.experiment.scenarios.scenario import Scenario, dotted_keys
+from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
 
 PLAN_SCHEMA = 1
 KIND = "trust plan"
@@ -106,7 +107,7 @@ def unit_file(plan: Plan, path: Path) -> Path | None:
 
 def parameter_variants(plan: Plan, scenario: Scenario) -> list[tuple[dict[str, Any], Scenario]]:
     """Combinations of the plan's parameters with the scenario of each; one empty combination without parameters."""
-    return variants(replace(scenario, vary=plan.parameters))
+    return replace(scenario, vary=plan.parameters).variants()
 
 
 def plan_digest(path: Path) -> str:

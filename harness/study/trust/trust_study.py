@@ -19,9 +19,10 @@ from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
 from harness.experiment.cells import clear_caches
-from harness.experiment.executors import TaskExecutor, run_in_process
-from harness.experiment.fitted_unit import FITTED_PRESET, read_fitted_unit
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.fitted_unit import FITTED_PRESET, read_fitted_unit
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.workers.executors import TaskExecutor, run_in_process
 from harness.measure.unit_file import UnitFile
 from harness.mocap.library import LibraryFolders
 from harness.results.files.digests import write_result_json
@@ -164,8 +165,8 @@ def run_trust_study(
 def plan_arms(plan: Plan, scenario: Scenario) -> tuple[Arm, ...]:
     """Every method with every set of stations and every combination of parameters."""
     return tuple(
-        Arm(method, name, stations, varied)
-        for varied, _ in parameter_variants(plan, scenario)
+        Arm(method, name, stations, values)
+        for values, _ in parameter_variants(plan, scenario)
         for name, stations in plan.stations.items()
         for method in plan.methods
     )
@@ -247,7 +248,7 @@ def comparable_pairs(arms: Sequence[Arm]) -> list[tuple[str, str]]:
     return [
         (str(a), str(b))
         for a, b in combinations(arms, 2)
-        if (a.method != b.method) + (a.set_name != b.set_name) + (a.varied != b.varied) == 1
+        if (a.method != b.method) + (a.set_name != b.set_name) + (a.values != b.values) == 1
     ]
 
 

@@ -14,9 +14,8 @@ from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.experiment.clip_evaluation import mounts_of, tracker_of
 from harness.experiment.playback import Playback
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenarios.scenario import Scenario
 from harness.measure.pose_series import TruthPoses
 from harness.simulate.loop import loop_motion
 from harness.simulate.simulation import exact_calibration
@@ -95,13 +94,13 @@ def truth_of_playback(
 def truth_of_clip(clip: Clip, scenario: Scenario, stations: Sequence[str]) -> TruthMotion:
     """The bones of a clip on the performer's own body, with the stations of a scenario; BadInput for others."""
     body, take = retarget_to_own_body(clip)
-    mounts = {mount.station: mount for mount in mounts_of(scenario)}
+    mounts = {mount.station: mount for mount in scenario.nominal_mounts}
     missing = [name for name in stations if name not in mounts]
     if missing:
         raise BadInput(
             f"{scenario.name} has no station {missing[0]!r}.", f"Name a scenario with it; it has {', '.join(mounts)}."
         )
-    calibration = exact_calibration(body, [mounts[name] for name in stations], tracker_of(scenario))
+    calibration = exact_calibration(body, [mounts[name] for name in stations], scenario.device)
     return TruthMotion(
         f"the clip {clip.name}, {clip.duration_s:.1f} s",
         _bone_truths(body.skeleton, take, calibration.bones, np.zeros(1)),

@@ -7,7 +7,8 @@ import numpy as np
 
 from harness.errors import BadInput, NotComparable
 from harness.experiment.recorded_take import find_playback
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenarios.scenario import Scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.angular_speed import coarse_offset, record_period_s
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration import LEAST_OVERLAP_S

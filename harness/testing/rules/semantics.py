@@ -4,10 +4,9 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.estimate import LOST_AFTER_S, Origin, Status, session_lag
+from harness.core.estimate import HINGE_COUNT, LOST_AFTER_S, Origin, Status, session_lag
 from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
-from harness.experiment.method_run import HINGES
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.results.reported_metrics import MAX_FALLBACK_SHARE
 from harness.score.angles import wrap_difference
@@ -120,7 +119,7 @@ def keeps_lag_and_uncertainty(case: ContractCase) -> str:
         if len(given) not in (0, len(estimates)):
             raise RuleViolation(f"{len(given)} of {len(estimates)} estimates have standard deviations {when}")
         for sigma in given:
-            if sigma.shape != (HINGES,) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
+            if sigma.shape != (HINGE_COUNT,) or not np.all(np.isfinite(sigma) & (sigma > 0.0)):
                 raise RuleViolation(f"standard deviations of shape {sigma.shape} are not all above 0 rad {when}")
         found = f"a lag of {lag} frames, {'standard deviations' if given else 'no standard deviations'}"
         if text and found != text:

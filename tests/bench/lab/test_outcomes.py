@@ -13,7 +13,7 @@ from harness.bench.lab import outcomes
 from harness.bench.lab.captures import STATION
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber, collect_outcomes, outcome_path
 from harness.errors import BadFile, BadInput
-from harness.experiment.executors import process_executor, run_in_process
+from harness.experiment.workers.executors import process_executor, run_in_process
 from harness.results.manifest import source_hash
 
 R = TypeVar("R")

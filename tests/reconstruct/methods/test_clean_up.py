@@ -16,7 +16,7 @@ from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.playback import prepare_playback
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.methods.clean_up import CleanUp, FittedCleanUp

@@ -36,7 +36,7 @@ def test_varied_values_and_performers_are_conditions(conditions: Path) -> None:
     assert [len(each.clips) for each in run.conditions] == [6, 2, 6, 2]
     for each in run.conditions:
         assert {row["performer"] for row in each.cells} == {each.group.performer}
-        assert {row["noise"] for row in each.cells} == {each.varied["noise"]}
+        assert {row["noise"] for row in each.cells} == {each.setting["noise"]}
     assert [each.name for each in run.select("noise=clean").conditions] == names[:2]
     assert [each.name for each in run.select("new performers, noise=default").conditions] == names[3:]
     with pytest.raises(UnknownName, match=r"no condition of the run called 'noise=cleen'\. Did you mean 'noise=clean'"):

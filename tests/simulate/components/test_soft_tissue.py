@@ -14,8 +14,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, pack
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
-from harness.experiment.clip_evaluation import noise_of
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.simulate.components.mount import MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact, simulate_oscillators, soft_limit
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
@@ -52,7 +51,7 @@ def test_it_is_in_no_level() -> None:
 
 def test_a_scenario_adds_them_by_name() -> None:
     scenario = load_scenario("demo")
-    noise = noise_of(replace(scenario, components={"soft_tissue": {"damping": 0.5}, "strap_slip": {}}))
+    noise = replace(scenario, components={"soft_tissue": {"damping": 0.5}, "strap_slip": {}}).noise_model
     assert noise == replace(
         noise_preset(scenario.noise), soft_tissue=SoftTissueArtefact(damping=0.5), strap_slip=StrapSlip()
     )

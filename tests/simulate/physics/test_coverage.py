@@ -9,8 +9,8 @@ from harness.body.humanoid import build_body
 from harness.body.mounts import Mount
 from harness.body.retargeting import retarget_to_own_body
 from harness.core.motion import BodyMotion
-from harness.experiment.clip_evaluation import mount_of
-from harness.experiment.scenario import Station, read_station_sets
+from harness.experiment.scenarios.scenario import Station
+from harness.experiment.scenarios.scenario_reader import read_station_sets
 from harness.mocap import synthetic
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
@@ -169,7 +169,7 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
     """Performer -> coverage of his stations under `hall` in the first 10 s of his takes, one after the other."""
     sets = read_station_sets()
     stations = {**sets["liu2011"], "pelvis": sets["kim2012"]["pelvis"]}
-    mounts = [mount_of(name, Station(**station)) for name, station in stations.items()]
+    mounts = [Station(**station).nominal_mount(name) for name, station in stations.items()]
     hall, out = load_constellation(ConstellationSettings(name="hall")), {}
     for performer in synthetic.REFERENCE_PERFORMERS:
         parts = []

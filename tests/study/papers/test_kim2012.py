@@ -7,9 +7,10 @@ import pytest
 
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenario import load_scenario, variants
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results.findings.paper_findings import PaperFindings, read_findings, write_findings
 from harness.results.storage import open_study
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
@@ -43,8 +44,8 @@ def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
         assert not set(motion.test) & set(motion.examples)
     if path.stem.partition("_")[2].startswith("sensors"):
         assert (
-            len({format_station_set(made.worn_stations) for _, made in variants(scenario)})
-            == len(variants(scenario))
+            len({format_station_set(made.worn_stations) for _, made in scenario.variants()})
+            == len(scenario.variants())
             == 31
         )
 

@@ -12,8 +12,9 @@ import pytest
 from harness.core.seeds import generator
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import UnknownName
-from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.scenario import load_scenario, shipped_scenarios, variants
+from harness.experiment.plan import check_names
+from harness.experiment.scenarios.motion_source import open_scenario_motion
+from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
 from harness.results.cell import Cell
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.results.findings.paper_findings import PaperExperiment
@@ -44,7 +45,7 @@ class Told(PaperStudy):
 
     def make(self, run: str) -> list[dict[str, Any]]:
         found = []
-        for varied, scenario in variants(self.runs[run]):
+        for varied, scenario in self.runs[run].variants():
             motion = scenario.motion
             shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
             setting: dict[str, Any] = {"varied": varied, "split": motion.split, "lag": 0}

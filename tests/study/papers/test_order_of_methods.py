@@ -8,7 +8,7 @@ import pytest
 
 from harness.errors import Outcome
 from harness.experiment import engine
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.mocap.synthetic import BEHAVIOURS
 from harness.results.reader import load_results
 

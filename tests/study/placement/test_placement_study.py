@@ -12,7 +12,7 @@ import harness
 from harness.cli import main
 from harness.compare.units import Sampling
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.status import read_status
 from harness.results.files.folder_kind import FINDINGS
 from harness.results.findings.placement_findings import (

@@ -15,8 +15,8 @@ import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import evaluation
+from harness.experiment.methods.remote_method import run_over_frames
 from harness.experiment.playback import prepare_playback
-from harness.experiment.remote_method import run_over_frames
 from harness.measure.unit_file import UnitFile, write_unit_file
 from harness.results.files.digests import read_result_json, write_result_json
 from harness.results.files.folder_kind import FINDINGS, folder_lock

@@ -10,7 +10,7 @@ from harness.core import rotations
 from harness.core.humanoid24 import BONES
 from harness.errors import BadFile, BadInput
 from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
 from harness.measure.registration import register
 from harness.mocap import synthetic

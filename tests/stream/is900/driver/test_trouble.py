@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.experiment.scenario import load_scenario
+from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.stream.frame import TrackerFrame
 from harness.stream.host_clock import HostClockEstimator
 from harness.stream.is900.codec.commands import station_command

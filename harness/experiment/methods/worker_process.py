@@ -84,7 +84,12 @@ class _ForkServer:
         with theirs:
             number = theirs.fileno()
             self._process = PythonProcess(
-                "harness.experiment.fork_server", str(number), stdout=2, stderr=None, pass_fds=(number,), watched=False
+                "harness.experiment.methods.fork_server",
+                str(number),
+                stdout=2,
+                stderr=None,
+                pass_fds=(number,),
+                watched=False,
             )
 
     def fork(self, module: str) -> _ForkedWorker:

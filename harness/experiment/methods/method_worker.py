@@ -22,8 +22,8 @@ from harness.core.object_state import describe_state
 from harness.core.split import declared_training_data
 from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, HarnessError, SystemFault, shorten
-from harness.experiment.file_audit import FileAudit, UndeclaredInput
-from harness.experiment.method_messages import (
+from harness.experiment.methods.file_audit import FileAudit, UndeclaredInput
+from harness.experiment.methods.method_messages import (
     MAX_TEXT,
     Arrays,
     Header,
@@ -32,7 +32,7 @@ from harness.experiment.method_messages import (
     decode_training,
     encode_answers,
 )
-from harness.experiment.method_run import run_method
+from harness.experiment.methods.method_run import run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.source_files import declared_environment, source_files, source_hash

@@ -10,16 +10,10 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenario import (
-    SCHEMA,
-    Scenario,
-    check_scenario,
-    dotted_keys,
-    expand_clips,
-    find_config,
-    find_scenario,
-    load_scenario,
-)
+from harness.experiment.scenarios.motion_source import expand_clips
+from harness.experiment.scenarios.scenario import SCHEMA, Scenario, dotted_keys
+from harness.experiment.scenarios.scenario_checks import check_scenario
+from harness.experiment.scenarios.scenario_reader import find_config, find_scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
@@ -110,7 +104,7 @@ def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
         motion=replace(motion, test=tuple(kept), behaviours=tuple(kept.values())),
         methods=methods or scenario.methods,
         inputs=sweep.inputs or scenario.inputs,
-        vary=dict(dotted_keys(scenario.vary)) | dict(dotted_keys(sweep.vary)),
+        vary=scenario.varied_keys | dict(dotted_keys(sweep.vary)),
         expected_order=(),
         left_out={},
         fault=(),

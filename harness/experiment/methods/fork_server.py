@@ -23,7 +23,7 @@ from pathlib import Path
 from threading import Thread
 
 from harness.core.child_process import process_descriptors
-from harness.experiment import method_worker  # noqa: F401  # what all workers need
+from harness.experiment.methods import method_worker  # noqa: F401  # what all workers need
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _RETRY_S = 0.002

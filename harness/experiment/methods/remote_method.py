@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import count
 from typing import TypeVar
 
@@ -20,10 +21,11 @@ from harness.core.estimate import Estimate
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.object_state import describe_state
+from harness.core.split import declared_training_data
 from harness.core.working_folder import served_folders
 from harness.errors import HarnessError
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_messages import (
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_messages import (
     MAX_TEXT,
     Arrays,
     Header,
@@ -33,9 +35,9 @@ from harness.experiment.method_messages import (
     encode_take,
     encode_training,
 )
-from harness.experiment.method_process import MethodFailure, MethodProcess
-from harness.experiment.method_run import MethodAnswers, run_method
-from harness.experiment.worker_process import close_fork_server
+from harness.experiment.methods.method_process import MethodFailure, MethodProcess
+from harness.experiment.methods.method_run import MethodAnswers, run_method
+from harness.experiment.methods.worker_process import close_fork_server
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.source_files import source_hash
@@ -228,25 +230,47 @@ def _remote_method(name: str, isolation: Isolation) -> RemoteMethod | None:
 
 
 def close_methods() -> None:
-    """End the processes of all methods."""
+    """End the processes of all methods, and forget the methods that were found."""
+    find_method.cache_clear()
     while _remote_methods:
         _remote_methods.popitem()[1].process.close()
     close_fork_server()
 
 
-def hash_method(method: Method) -> str:
-    """Hash of the code and the declared inputs of a method, as its process has read them if it has one."""
-    return method.source_hash if isinstance(method, RemoteMethod) else source_hash(method)
+@dataclass(frozen=True, eq=False)
+class NamedMethod:
+    """A method, and what results say of it: as its process has read them if it has one."""
+
+    name: str
+    method: Method
+
+    @property
+    def source_hash(self) -> str:
+        """Hash of its code and of its declared inputs."""
+        return self.method.source_hash if isinstance(self.method, RemoteMethod) else source_hash(self.method)
+
+    @property
+    def options(self) -> str:
+        """Text of its attributes (`describe_state`)."""
+        if isinstance(self.method, RemoteMethod):
+            return self.method.options
+        return describe_state(self.method, self.method.name)
+
+    @property
+    def training_data(self) -> str:
+        """The training data that it declares (`core.split`)."""
+        return declared_training_data(self.method)
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What the key of a cell says of it: another method, other options or another source have another key."""
+        return {"name": self.name, "options": self.options, "source": self.source_hash}
 
 
-def describe_options(method: Method) -> str:
-    """Text of the attributes of a method (`describe_state`), those in its process if it has one."""
-    return method.options if isinstance(method, RemoteMethod) else describe_state(method, method.name)
-
-
-def method_identity(method: Method, name: str) -> dict[str, str]:
-    """What the key of a cell says of its method: another method, other options or another source have another key."""
-    return {"name": name, "options": describe_options(method), "source": hash_method(method)}
+@cache
+def find_method(name: str, isolation: Isolation) -> NamedMethod:
+    """The method of a name (`resolve_method`), found once: searching the installed packages takes long."""
+    return NamedMethod(name, resolve_method(name, isolation))
 
 
 def run_over_frames(fitted: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> MethodAnswers:

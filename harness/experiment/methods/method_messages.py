@@ -11,12 +11,12 @@ from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.core.arrays import immutable
 from harness.core.calibration import Calibration
-from harness.core.estimate import QPOS_SIZE, check_sigma, find_impossible_pose, session_lag
+from harness.core.estimate import HINGE_COUNT, QPOS_SIZE, check_sigma, find_impossible_pose, session_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
-from harness.experiment.method_run import HINGES, MethodAnswers
+from harness.experiment.methods.method_run import MethodAnswers
 from harness.stream.frame import TrackerFrame
 
 Message = tuple[dict[str, Any], dict[str, NDArray[Any]]]
@@ -91,7 +91,7 @@ def encode_answers(answers: MethodAnswers) -> dict[str, NDArray[Any]]:
 def decode_answers(arrays: Arrays, frames: int) -> MethodAnswers:
     """The answers of a method's process to so many frames; MessageError when they are anything else."""
     sizes: dict[str, tuple[int, ...]] = dict.fromkeys(MethodAnswers._fields, (frames,))
-    sizes |= {"qpos": (frames, QPOS_SIZE), "angle_sigma_rad": (frames, HINGES)}
+    sizes |= {"qpos": (frames, QPOS_SIZE), "angle_sigma_rad": (frames, HINGE_COUNT)}
     if "angle_sigma_rad" not in arrays:
         del sizes["angle_sigma_rad"]
     if {name: array.shape for name, array in arrays.items()} != sizes:
@@ -114,4 +114,4 @@ def decode_answers(arrays: Arrays, frames: int) -> MethodAnswers:
 
 def answers_size(frames: int) -> int:
     """Largest size of a message of answers to so many frames [bytes]."""
-    return 8 * frames * (QPOS_SIZE + HINGES + len(MethodAnswers._fields)) + MAX_TEXT * 8
+    return 8 * frames * (QPOS_SIZE + HINGE_COUNT + len(MethodAnswers._fields)) + MAX_TEXT * 8

@@ -10,10 +10,10 @@ from threading import Lock, Timer
 from harness import errors
 from harness.core.messages import MessageError, read_message, write_message
 from harness.errors import HarnessError, Outcome, SystemFault
-from harness.experiment.file_audit import UndeclaredInput
-from harness.experiment.isolation import Isolation
-from harness.experiment.method_messages import MAX_TEXT, Arrays, Header, Message
-from harness.experiment.worker_process import WorkerProcess, start_worker
+from harness.experiment.methods.file_audit import UndeclaredInput
+from harness.experiment.methods.isolation import Isolation
+from harness.experiment.methods.method_messages import MAX_TEXT, Arrays, Header, Message
+from harness.experiment.methods.worker_process import WorkerProcess, start_worker
 
 _TAINTED = UndeclaredInput.__name__
 _EXIT_S = 5.0
@@ -32,7 +32,9 @@ class MethodFailure(HarnessError):
 class MethodProcess:
     """The process of one method, started when it is first needed, and again after it ended."""
 
-    def __init__(self, name: str, isolation: Isolation, worker: str = "harness.experiment.method_worker") -> None:
+    def __init__(
+        self, name: str, isolation: Isolation, worker: str = "harness.experiment.methods.method_worker"
+    ) -> None:
         """The process runs `main` of the module `worker`."""
         self.name, self.isolation, self._worker = name, isolation, worker
         self._process: WorkerProcess | None = None

@@ -23,8 +23,6 @@ from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Reconstructor
 from harness.stream.frame import TrackerFrame
 
-HINGES = QPOS_SIZE - 7
-"""Number of hinge angles in a configuration."""
 FRAMES_PER_TIMING = 8
 """Number of frames from one timing to the next. A cell of 8 s at 40 Hz has 40 timings, which take 3 % of the time of a
 cell of the fastest method."""

@@ -1,0 +1,1 @@
+"""Scenarios and sweeps: their files read into frozen records, which are checked once."""

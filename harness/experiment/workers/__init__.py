@@ -1,0 +1,1 @@
+"""Workers that evaluate cells: executors, the loop over tasks, progress and interrupts."""
