@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from harness.experiment.engine import run
     from harness.experiment.scenarios.scenario_reader import load_scenario
     from harness.mocap.clip_file import read_clip
-    from harness.reconstruct.registry import methods
+    from harness.reconstruct.registry import list_methods as methods
     from harness.results.reader import load_run as load
     from harness.score.score import score_estimate
     from harness.stream.is900.driver.is900 import Is900

@@ -69,7 +69,7 @@ def planted_run(out: Path, plan: Plan = Plan()) -> Path:
     scenario = out.with_name(f"{out.name}.toml")
     scenario.write_text(tomli_w.dumps(_scenario(plan)), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        for name in {name.partition("+")[0] for name in plan.methods} - set(registry.methods()):
+        for name in {name.partition("+")[0] for name in plan.methods} - set(registry.list_methods()):
             patch.setitem(registry._BUILT_IN, name, MeanPose)
         patch.setattr(cells, "evaluate", lambda method, name, take: _answer(method, name, take, plan))
         measured = plan.covered >= 0.5 and set(plan.methods) > set(plan.silent)
@@ -250,7 +250,7 @@ def planted_means(plan: MeansPlan) -> Iterator[None]:
         )
 
     with pytest.MonkeyPatch.context() as patch:
-        for name in set(plan.methods) - set(registry.methods()):
+        for name in set(plan.methods) - set(registry.list_methods()):
             patch.setitem(registry._BUILT_IN, name, MeanPose)
         patch.setattr(cells, "evaluate_cell", judge)
         yield

@@ -72,7 +72,7 @@ def test_all_methods_are_the_scenario_s_and_every_other_one() -> None:
     named = _named_methods("all,mine:Mine,ik", own)
     assert named[:2] == own
     assert named[-1] == "mine:Mine"
-    assert set(named) == {*own, *registry.methods(), "mine:Mine"}
+    assert set(named) == {*own, *registry.list_methods(), "mine:Mine"}
     assert len(set(named)) == len(named)
 
 

@@ -13,7 +13,7 @@ from harness.bench.common import MOUNTS
 from harness.body.humanoid import build_body
 from harness.calibrate.hold import UnusableHold
 from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -172,7 +172,7 @@ def measure_calibration_accuracy(
 
 def simulate_pose_holds(session: TrackerSession, miss_rad: float) -> list[list[TrackerFrame]]:
     """Frames of the tracker while the performer holds each of the eight poses."""
-    configurations = [configuration(pose, session.body.skeleton) for pose in POSES]
+    configurations = [pose_configuration(pose, session.body.skeleton) for pose in POSES]
     rng = generator(session.seed, "calibration trial", session.name)
     take = hold_poses(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
     seen = simulate_tracker(session.body, take, session.true_mounts, session.tracker, session.noise, seed=session.seed)

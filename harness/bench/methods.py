@@ -32,7 +32,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.local_experts import HISTORY_AXES
 from harness.reconstruct.features.moment_table import cells_for
 from harness.reconstruct.index import FlatIndex, make_index
-from harness.reconstruct.index.selection import AUTO
+from harness.reconstruct.index.selection import AUTO_INDEX
 from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.expert_map import FEATURES, ExpertMap
 from harness.reconstruct.methods.local_pca import LocalPca
@@ -103,7 +103,7 @@ def _build_database(folder: Path, frames: int, seed: int) -> MotionDatabase:
 
 def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkStatement]) -> list[BenchmarkStatement]:
     """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
-    name, options = speed.method, config_hash(registry.resolve(speed.method))
+    name, options = speed.method, config_hash(registry.find_method(speed.method))
     target, to_ik, to_mink = MIN_SPEED_RATIO.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
     more: dict[str, str | float] = {
         "method": name,
@@ -134,7 +134,7 @@ def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> 
 
     The tables of `expert_map` are counted apart.
     """
-    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.resolve(name)))
+    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.find_method(name)))
     tables = _table_bytes(name, frames)
     used = peak_bytes - baseline_bytes - tables
     text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
@@ -177,7 +177,7 @@ def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[Ben
         neighbour_search.feature_problem,
     ):
         search = kind(benchmark_clips.build_common_body(), database, held_out)
-        exact, index, shares = FlatIndex(search.vectors), make_index(AUTO, search.vectors, search.count), []
+        exact, index, shares = FlatIndex(search.vectors), make_index(AUTO_INDEX, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:
             true, approximate = (set(i.nearest(query, search.count)[0].tolist()) for i in (exact, index))
             shares.append(len(true & approximate) / len(true))
@@ -202,7 +202,7 @@ def query_dimension(method: Method) -> int:
 
 def _table_bytes(name: str, frames: int) -> int:
     """Size of the moment tables of `expert_map` for a database of so many frames; 0 for other methods."""
-    if not isinstance(registry.resolve(name), ExpertMap):
+    if not isinstance(registry.find_method(name), ExpertMap):
         return 0
     sizes = [size + POSTURE_SIZE for size in (FEATURES, HISTORY_AXES)]
     return sum(4 * cells_for(frames) * (size + size * (size + 1) // 2) for size in sizes)

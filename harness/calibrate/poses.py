@@ -34,7 +34,7 @@ def pose_angles_rad(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
     return np.deg2rad([pose.angles_deg.get(name, 0.0) for name in skeleton.dof_names])
 
 
-def configuration(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
+def pose_configuration(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
     """(55,) configuration of a body in the pose: upright at the origin, facing x, its lower sole on the floor."""
     qpos = humanoid24.pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), pose_angles_rad(pose, skeleton))
     qpos[2] = -float(np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos[None]))))

@@ -113,12 +113,12 @@ def _print_statements(
     The outcome is REGRESSED where a target is missed. Where none is, it is INCOMPLETE where benchmarks were left out.
     """
     from harness.bench.limits import count_missed, outcome_of
-    from harness.report.kit.statement_lines import statement_lines
+    from harness.report.kit.statement_lines import format_statements
 
     content, outcome = {"rows": [row.as_dict() for row in rows], **content}, outcome_of(rows)
     if content.get("left_out") and outcome is not Outcome.REGRESSED:
         outcome = Outcome.INCOMPLETE
-    table = statement_lines(rows, reference=reference) if rows else []
+    table = format_statements(rows, reference=reference) if rows else []
     return print_result(args, content, *table, *lines, count_missed(rows), outcome=outcome)
 
 

@@ -168,7 +168,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
 def _calibrate_from_recording(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
     """The calibration, and the command that uses it."""
     from harness.experiment.calibration_session import CalibrationSession
-    from harness.experiment.recorded_take import name_recorded_stations
+    from harness.experiment.recorded_takes import name_recorded_stations
     from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(args.recording)

@@ -29,7 +29,7 @@ def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
     """Title -> name -> one line. `every`: also the scenarios that only choose or check constants."""
     scenarios = [path.stem for path in shipped_scenarios()]
     return {
-        "methods": {name: _describe_method(name) for name in registry.methods()},
+        "methods": {name: _describe_method(name) for name in registry.list_methods()},
         "scenarios": {
             name: _describe_scenario(name) for name in scenarios if every or not name.startswith(TUNING_PREFIXES)
         },
@@ -53,10 +53,10 @@ def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
 
 def _describe_method(name: str) -> str:
     """What it does, what it needs, and where it comes from."""
-    method = registry.resolve(name)
+    method = registry.find_method(name)
     examples = "examples" if method.needs_examples else "no examples"
     note = training_note(declared_training_data(method))
-    said = [method.summary, f"needs {examples}, takes any inputs", note, registry.origin(name)]
+    said = [method.summary, f"needs {examples}, takes any inputs", note, registry.method_origin(name)]
     return "; ".join(part for part in said if part)
 
 

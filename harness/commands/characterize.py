@@ -44,7 +44,7 @@ def add_characterize(verbs: Verbs) -> None:
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
-    from harness.report.kit.page_text import page_text
+    from harness.report.kit.page_text import render_text
     from harness.report.lab.unit_page import unit_page
     from harness.stream.recording.station_readings import CaptureReader
     from harness.study.trust.characterization import characterize_capture
@@ -64,7 +64,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
         "damage": list(found.profile.damage),
         **written,
     }
-    return print_result(args, content, page_text(page), *lines)
+    return print_result(args, content, render_text(page), *lines)
 
 
 def _parse_pair(text: str | None) -> tuple[str, str] | None:

@@ -43,7 +43,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page
     from harness.report.kit.page_html import write_page
-    from harness.report.kit.page_text import page_text
+    from harness.report.kit.page_text import render_text
 
     with show_steps("parts"):
         report_step("coverage")
@@ -58,7 +58,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
         "page": str(page),
     }
     following = [] if args.clip else ["inspect", args.file, "--clip", "walking_p1_01", *repeat_flags(args, "mocap")]
-    return print_result(args, said, page_text(shown), f"page: {page}", following=following)
+    return print_result(args, said, render_text(shown), f"page: {page}", following=following)
 
 
 def _load(path: Path) -> Constellation:

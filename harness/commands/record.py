@@ -125,10 +125,10 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     """The entry of a recording's note that names the plan it was made for; none without a plan."""
     if args.plan is None:
         return {}
-    from harness.stream.recording.recording import PLAN
+    from harness.stream.recording.recording import PLAN_FILE
     from harness.study.trust.plan import plan_digest
 
-    return {PLAN: plan_digest(args.plan)}
+    return {PLAN_FILE: plan_digest(args.plan)}
 
 
 def _record_line(args: argparse.Namespace) -> Outcome:

@@ -113,7 +113,7 @@ def _format_counts(stream: "RecordingStream") -> str:
 def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
     from harness.experiment.evaluation import check_methods, evaluate_each
-    from harness.experiment.recorded_take import find_playback, has_station_names, recorded_take
+    from harness.experiment.recorded_takes import find_playback, has_station_names, recorded_take
 
     options = {
         "scenario": args.scenario,

@@ -87,5 +87,5 @@ def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
     named = parse_methods(text)
     if EVERY_METHOD not in named:
         return named
-    every = (*own, *registry.methods())
+    every = (*own, *registry.list_methods())
     return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))

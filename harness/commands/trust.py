@@ -26,7 +26,7 @@ def add_trust(verbs: Verbs) -> None:
 def run_trust(args: argparse.Namespace) -> Outcome:
     from harness.experiment.workers.executors import process_executor
     from harness.report.kit.page_html import write_page
-    from harness.report.kit.page_text import page_text
+    from harness.report.kit.page_text import render_text
     from harness.report.lab.trust_page import trust_page
     from harness.study.trust.trust_study import run_trust_study
 
@@ -46,4 +46,4 @@ def run_trust(args: argparse.Namespace) -> Outcome:
     with show_steps("parts of the report"):
         report = write_page(page, out / "report.html")
     content = record_content(study.findings, out=out, report=report)
-    return print_result(args, content, page_text(page), "", f"report: {report}", outcome=study.findings.outcome)
+    return print_result(args, content, render_text(page), "", f"report: {report}", outcome=study.findings.outcome)

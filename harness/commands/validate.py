@@ -30,7 +30,7 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
-    from harness.report.kit.page_text import page_text
+    from harness.report.kit.page_text import render_text
     from harness.report.lab.validation_page import validation_page
     from harness.stream.recording.station_readings import CaptureReader
     from harness.study.trust.capture_readings import read_capture
@@ -73,5 +73,5 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     lines += [f"failed: {name}: {text.strip().splitlines()[-1]}" for name, text in failures.items()]
     content |= {"failures": failures} if failures else {}
     return print_result(
-        args, content, page_text(page), *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS
+        args, content, render_text(page), *lines, outcome=Outcome.INCOMPLETE if failures else Outcome.PASS
     )

@@ -13,7 +13,7 @@ from harness.core.motion import Clip
 from harness.core.progress import ProgressCallback
 from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.clip_file import FORMATS, read_clip
+from harness.mocap.clip_file import CLIP_FORMATS, read_clip
 from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.mocap.sources import SyntheticSource, find_library_folders, folders_of_environment
 from harness.report.kit.motion_player import NO_ESTIMATE, PlayerClip, PlayerStations, PlayerTrack, hold_last
@@ -46,7 +46,7 @@ def open_motion(
     if path.is_dir():
         _refuse_options(playback, "A run")
         return _view_run(path, methods)
-    is_motion = path.suffix.lower().lstrip(".") in (*FORMATS, "asf")
+    is_motion = path.suffix.lower().lstrip(".") in (*CLIP_FORMATS, "asf")
     if path.exists() and not is_motion:
         return _view_recording(path, methods or (), playback, mocap, progress)
     if methods:
@@ -133,7 +133,7 @@ def _view_recording(
 ) -> ViewedMotion:
     """The readings of a recording, with the truth and the estimates where the played scenario is known."""
     from harness.experiment.evaluation import check_methods, evaluate_each
-    from harness.experiment.recorded_take import find_playback, recorded_take
+    from harness.experiment.recorded_takes import find_playback, recorded_take
     from harness.score.pair import compute_poses
     from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig
     from harness.stream.recording.replay import RecordingStream

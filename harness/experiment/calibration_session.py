@@ -16,7 +16,7 @@ from harness.calibrate.performer_preview import PerformerPreview
 from harness.calibrate.pose_calibration import calibrate_poses
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
-from harness.calibrate.poses import POSES, CalibrationPose, configuration
+from harness.calibrate.poses import POSES, CalibrationPose, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core.arrays import Floats
@@ -84,7 +84,7 @@ class CalibrationSession:
     @cached_property
     def pose_qpos(self) -> list[Floats]:
         """Configurations (55,) of the poses on that body."""
-        return [configuration(pose, self.body.skeleton) for pose in self.poses]
+        return [pose_configuration(pose, self.body.skeleton) for pose in self.poses]
 
     @cached_property
     def source(self) -> MotionSource:

@@ -14,7 +14,7 @@ from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
 from harness.calibrate.calibration_file import CalibrationFile
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
@@ -99,7 +99,7 @@ class Playback:
         if not self.posing:
             return self.clip_evaluation.subject.take
         how = self.scenario.calibrating
-        poses = [configuration(pose, self.body.skeleton) for pose in POSES]
+        poses = [pose_configuration(pose, self.body.skeleton) for pose in POSES]
         return self.clip_evaluation.session.make_pose_take(
             poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s
         )

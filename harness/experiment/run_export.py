@@ -9,7 +9,7 @@ from harness.core.fields import build
 from harness.errors import BadInput
 from harness.experiment.scenarios.scenario import Station
 from harness.mocap.write.body_model import BodyModel, MountedStation
-from harness.mocap.write.export import export
+from harness.mocap.write.export import export_motion
 from harness.mocap.write.posed_motion import PosedMotion
 from harness.results.cell import Cell
 from harness.results.reader import select_cells
@@ -30,7 +30,7 @@ def export_run(
     `clips` and `methods` choose the cells (see `results.reader.select_cells`), `fmt` is one of
     `mocap.write.export.FORMATS`. Raises the errors of both.
     """
-    return export(
+    return export_motion(
         select_cells(run, clips=clips, methods=methods), fmt, folder, force=force, model=body_model, progress=progress
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_summary.run_statistics import run_statistics
+from harness.compare.run_summary.run_statistics import compute_run_statistics
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY
 from harness.core.progress import ProgressCallback
@@ -117,7 +117,7 @@ class RunFolder:
         return storage.write_summary(
             index,
             self.out,
-            run_statistics(index, self.out, orders, manifest.training_data) if plan.kind == "run" else {},
+            compute_run_statistics(index, self.out, orders, manifest.training_data) if plan.kind == "run" else {},
             kind=plan.kind,
             name=plan.name,
             command=plan.command,

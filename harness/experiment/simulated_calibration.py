@@ -17,7 +17,7 @@ from harness.calibrate.liu2011_calibration import calibrate_liu2011
 from harness.calibrate.pose_calibration import calibrate_poses
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core import rotations
@@ -156,10 +156,10 @@ def simulate_kim2012_calibration(session: TrackerSession, *, miss_rad: float, ho
 
 def _observe_eight_poses(session: TrackerSession, miss_rad: float, hold_s: float) -> list[list[TrackerFrame]]:
     """Frames of the eight holds, as the collector finds them in the simulated stream."""
-    poses = [configuration(pose, session.body.skeleton) for pose in POSES]
+    poses = [pose_configuration(pose, session.body.skeleton) for pose in POSES]
     frames = session.observe_poses(poses, miss_rad=miss_rad, hold_s=hold_s)
     standard = build_body()
-    shown = [configuration(pose, standard.skeleton) for pose in POSES]
+    shown = [pose_configuration(pose, standard.skeleton) for pose in POSES]
     stations = [mount.station for mount in session.nominal]
     collector = PoseCollector(stations, len(POSES), PoseClassifier(standard, session.nominal, shown))
     PoseGuide(collector, POSES).run(frames, say=lambda text: None)

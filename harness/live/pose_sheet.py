@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from harness.calibrate.poses import CalibrationPose, configuration
+from harness.calibrate.poses import CalibrationPose, pose_configuration
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.live.viewer import ViewerOutput
@@ -26,7 +26,7 @@ def draw_poses(poses: Sequence[CalibrationPose], skeleton: Skeleton, folder: Pat
     try:
         drawn = []
         for number, pose in enumerate(poses, 1):
-            viewer.show_pose(number, configuration(pose, skeleton))
+            viewer.show_pose(number, pose_configuration(pose, skeleton))
             picture, deadline_s = folder / f"{number:08d}.png", time.monotonic() + _DRAW_TIMEOUT_S
             while not picture.exists():
                 if time.monotonic() > deadline_s:

@@ -164,7 +164,7 @@ class Registration:
         return x, y, z
 
 
-def register(
+def register_poses(
     stations: Mapping[str, MeasuredPoses],
     truths: Mapping[str, TruthPoses],
     *,

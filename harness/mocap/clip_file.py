@@ -9,7 +9,7 @@ from harness.core.skeleton import unwrap_angles
 from harness.errors import BadFile, BadInput
 from harness.mocap.index import rate_from_index, unknown_rate_error
 
-FORMATS = ("amc", "bvh", "mvnx", "npz", "c3d")
+CLIP_FORMATS = ("amc", "bvh", "mvnx", "npz", "c3d")
 """Suffixes of motion files, the preferred one first. C3D files hold markers and cannot be read as a clip."""
 CMU_NAME = re.compile(r"(\d+_\d+)(_poses|_stageii)?")
 """Subject and trial of CMU's library ("13_17"), with the endings that AMASS adds."""
@@ -70,8 +70,8 @@ def motion_format(path: Path) -> str:
     kind = path.suffix.lower().lstrip(".")
     if kind == "asf":
         raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC file of it.")
-    if kind not in FORMATS:
-        raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in FORMATS), "Rename it?")
+    if kind not in CLIP_FORMATS:
+        raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in CLIP_FORMATS), "Rename it?")
     return kind
 
 

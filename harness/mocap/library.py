@@ -17,7 +17,7 @@ from pathlib import Path
 
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput, UnknownName, shorten
-from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
+from harness.mocap.clip_file import CMU_NAME, CLIP_FORMATS, clip_name, read_library_file
 from harness.mocap.index import INDEX_NAME, index_key, read_index, scan_folder
 
 LibraryFolders = Path | str | Sequence[Path | str]
@@ -206,7 +206,7 @@ def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
     top = folder.resolve()
     index = read_index(top / INDEX_NAME)
     rows = {(top / path).resolve(): row for path, row in index.items()}
-    paths, ignored = scan_folder(top, {f".{kind}" for kind in FORMATS})
+    paths, ignored = scan_folder(top, {f".{kind}" for kind in CLIP_FORMATS})
     files = []
     for path in paths:
         inside = path.relative_to(top)
@@ -221,7 +221,7 @@ def _scan_files(folder: Path) -> tuple[list[_File], tuple[Path, ...]]:
 def _group_takes(files: Sequence[_File]) -> list[list[_File]]:
     """Files of one name by take, the preferred file of each first."""
     takes: list[list[_File]] = []
-    for file in sorted(files, key=lambda file: FORMATS.index(file.format)):
+    for file in sorted(files, key=lambda file: CLIP_FORMATS.index(file.format)):
         same = [take for take in takes if any(_is_same(file, other) for other in take)]
         for same_place in (True, False):
             same = same or [take for take in takes if file.is_take_of(take, same_place)]

@@ -56,7 +56,7 @@ _BUILT_IN: dict[str, Callable[[], Method]] = {
 }
 
 
-def methods() -> dict[str, Callable[[], Method]]:
+def list_methods() -> dict[str, Callable[[], Method]]:
     """Name -> factory of all registered methods. Installed packages cannot replace a built-in name."""
     return {entry.name: partial(_make_installed, entry) for entry in entry_points(group=GROUP)} | _BUILT_IN
 
@@ -87,12 +87,12 @@ _ORIGINS = {
 }
 
 
-def origin(name: str) -> str:
+def method_origin(name: str) -> str:
     """Source of a method: its optional attribute `source`, else that of the built-in method that it presets."""
-    return str(getattr(resolve(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
+    return str(getattr(find_method(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
 
 
-def resolve(name: str) -> Method:
+def find_method(name: str) -> Method:
     """The method of a name with options, such as `local_pca[neighbours=100]+ik`; UnknownName, RenamedKey, BadInput."""
     base, *suffixes = split_outside_brackets(name, "+")
     plain, options = parse_name(base)
@@ -100,7 +100,7 @@ def resolve(name: str) -> Method:
     for suffix in suffixes:
         plain, options = parse_name(suffix)
         if f"+{plain}" != SUFFIX:
-            raise UnknownName("method", name, methods())
+            raise UnknownName("method", name, list_methods())
         method = with_options(CleanUp(method), options, method.name + SUFFIX)
     return method
 
@@ -156,7 +156,7 @@ def _refused(what: str, advice: str) -> Iterator[None]:
 
 def _base_method(name: str) -> Method:
     """The method of a name without options or suffix; UnknownName, BadInput."""
-    registered = methods()
+    registered = list_methods()
     if name in registered:
         return registered[name]()
     module, colon, attribute = name.partition(":")
@@ -178,7 +178,7 @@ def _base_method(name: str) -> Method:
 
 def summary(name: str) -> str:
     """Description of a method in one line."""
-    return resolve(name).summary
+    return find_method(name).summary
 
 
 def _module_exists(module: str) -> bool:

@@ -70,13 +70,13 @@ def source_hash(method: Method, modules: Iterable[ModuleType] = ()) -> str:
     state = hashlib.blake2b(digest_size=16)
     for part in _wrapped(method):
         state.update(f"{type(part).__module__}:{type(part).__qualname__}\0".encode())
-    state.update(source_files(method, modules).digest().encode())
+    state.update(find_source_files(method, modules).digest().encode())
     for name in sorted(declared_environment(method)):
         state.update(f"{name}\0{os.environ.get(name)!r}\0".encode())
     return state.hexdigest()
 
 
-def source_files(method: object, modules: Iterable[ModuleType] = ()) -> SourceFiles:
+def find_source_files(method: object, modules: Iterable[ModuleType] = ()) -> SourceFiles:
     """Files of a method and of the methods that it wraps; BadInput when one does not exist.
 
     `modules` are those that the method's process has loaded. Their files count, whatever way they were imported, unless

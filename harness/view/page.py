@@ -9,13 +9,13 @@ from typing import Any
 from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import UnknownName
-from harness.report.kit.document import document, page_style
+from harness.report.kit.document import html_document, page_style
 from harness.report.kit.markup import Markup, join, tag
 from harness.report.kit.motion_player import (
     PlayerClip,
     PlayerMotion,
     describe_body,
-    motion_player,
+    player_card,
     pack_clip,
     player_element,
     player_script,
@@ -152,9 +152,9 @@ h1 { margin: 0 0 0.4rem; font-size: 1.2rem; }
 
 def write_page(motion: ViewedMotion, progress: ProgressCallback = lambda clip, done, planned: None) -> str:
     """The HTML of a page that holds all its data and loads nothing; `progress` is called after each clip."""
-    player = motion_player(motion.whole(progress), "Bodies and stations in 3-D; drag to turn")
+    player = player_card(motion.whole(progress), "Bodies and stations in 3-D; drag to turn")
     note: Any = tag("p", motion.note) if motion.note else None
-    return document(
+    return html_document(
         title=f"{motion.title}: harness view",
         kicker="harness view",
         heading=motion.title,

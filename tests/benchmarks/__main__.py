@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from harness.bench.limits import count_missed, outcome_of
-from harness.report.kit.statement_lines import statement_lines
+from harness.report.kit.statement_lines import format_statements
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from tests.benchmarks.leak_check import bench_leak_check
 from tests.benchmarks.live_viewer import bench_live_viewer
@@ -27,7 +27,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=int, default=1, help="serve, view: number of runs")
     args = parser.parse_args(words)
     rows = [row for name in args.what for row in BENCHMARKS[name](args.seed, args.runs)]
-    print("\n".join([*statement_lines(rows), count_missed(rows), outcome_of(rows).word]))
+    print("\n".join([*format_statements(rows), count_missed(rows), outcome_of(rows).word]))
     return outcome_of(rows).exit_code
 
 

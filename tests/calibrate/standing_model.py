@@ -9,7 +9,7 @@ import numpy as np
 from harness.body.humanoid import build_body
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations
@@ -98,7 +98,7 @@ class Model:
         step[5] = rng.normal(0.0, 0.1)
         if number == 0:
             step[[0, 1, 5]] = 0.0
-        return kinematics.integrate(configuration(POSES[number], self.skeleton), step)
+        return kinematics.integrate(pose_configuration(POSES[number], self.skeleton), step)
 
     def _frames(self, qpos: Floats, number: int) -> list[TrackerFrame]:
         truth, kinematics = self.truth, Kinematics(build_body(self.skeleton))

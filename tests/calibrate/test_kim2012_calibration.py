@@ -9,7 +9,7 @@ from harness.body.humanoid import Body, build_body, tpose
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import locate_mount
 from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.core import rotations
 from harness.core.arrays import Floats
 from tests.calibrate.standing_model import Model, somebody
@@ -45,7 +45,7 @@ def test_straps_in_nominal_orientation_stay_right_and_others_do_not() -> None:
         model = Model(somebody(0), straps=straps)
         body, held = build_body(model.skeleton), model.held()
         maps = calibrate_kim2012(held[0], body, model.mounts).maps
-        place_m, turn = character(body, model, configuration(POSES[3], body.skeleton))
+        place_m, turn = character(body, model, pose_configuration(POSES[3], body.skeleton))
         mapped = maps.apply(held[3][0])
         # The first pose differs from the T-pose by 0.006 deg. The performer has stepped aside: heading does not count.
         heading = rotations.multiply(mapped.tracker_from_station[4], rotations.inverse(turn[4]))

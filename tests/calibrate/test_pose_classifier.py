@@ -10,7 +10,7 @@ from harness.body.kinematics import Kinematics
 from harness.body.mounts import DEFAULT_MOUNTS, locate_mounts
 from harness.calibrate.hold import HoldReadings
 from harness.calibrate.pose_classifier import PoseClassifier
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -24,7 +24,7 @@ def body() -> Body:
 
 
 def poses() -> list[Floats]:
-    return [configuration(pose, body().skeleton) for pose in POSES]
+    return [pose_configuration(pose, body().skeleton) for pose in POSES]
 
 
 @cache

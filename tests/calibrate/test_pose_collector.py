@@ -14,7 +14,7 @@ from harness.calibrate.guided_calibration import PoseGuide
 from harness.calibrate.hold import UnusableHold, measure_hold
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import HOLD_S, PoseCollector
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
@@ -36,7 +36,7 @@ def body() -> humanoid.Body:
 
 
 def pose(number: int) -> Floats:
-    return configuration(POSES[number], body().skeleton)
+    return pose_configuration(POSES[number], body().skeleton)
 
 
 def arms_down() -> Floats:
@@ -106,7 +106,7 @@ def test_poor_poses_of_other_people_are_taken(stations: tuple[str, ...], miss_de
     """Nothing is known of the performer."""
     clip = synthetic.generate("walking", "p3", 1, seed=1, duration_s=3.0)
     who = retarget_to_own_body(clip)[0]
-    poses = [configuration(one, who.skeleton) for one in POSES]
+    poses = [pose_configuration(one, who.skeleton) for one in POSES]
     _, said = collected(stream(poses, stations, miss_deg=miss_deg, seed=3, who=who), stations)
     assert said == list(range(1, 9))
 

@@ -8,7 +8,7 @@ from harness.body import ground
 from harness.body.anatomy import sole_points_m
 from harness.body.humanoid import build_body
 from harness.body.kinematics import pose_from_qpos as forward
-from harness.calibrate.poses import POSES, CalibrationPose, configuration, pose_angles_rad
+from harness.calibrate.poses import POSES, CalibrationPose, pose_configuration, pose_angles_rad
 from harness.core.humanoid24 import limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
 from tests.calibrate.standing_model import somebody
@@ -30,7 +30,7 @@ def test_angles_are_of_the_model_and_within_its_limits(pose: CalibrationPose) ->
 def test_it_stands(pose: CalibrationPose, skeleton: Skeleton) -> None:
     """The lower sole is on the floor, and the weight above the ground between the soles that are, within 3 cm: people
     shift as they must."""
-    qpos = configuration(pose, skeleton)
+    qpos = pose_configuration(pose, skeleton)
     at = forward(skeleton, qpos[None])
     assert ground.sole_heights_m(skeleton, at).min() == pytest.approx(0.0, abs=1e-12)
     soles = [
@@ -54,7 +54,7 @@ def test_no_limb_is_inside_another_part_of_the_body(pose: CalibrationPose) -> No
     """Bodies more than three joints apart overlap by at most 5 mm."""
     body = build_body()
     model, data = body.model, mujoco.MjData(body.model)
-    data.qpos[:] = configuration(pose, body.skeleton)
+    data.qpos[:] = pose_configuration(pose, body.skeleton)
     mujoco.mj_forward(model, data)
     worst_m = 0.0
     for a in range(model.ngeom):

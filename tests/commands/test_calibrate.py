@@ -31,7 +31,7 @@ from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
-PREVIOUS = registry.resolve("ik:previous")
+PREVIOUS = registry.find_method("ik:previous")
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 

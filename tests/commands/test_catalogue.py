@@ -27,7 +27,7 @@ class Undeclared(MeanPose):
 
 def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
     methods = build_catalogue()["methods"]
-    assert set(methods) == set(registry.methods())
+    assert set(methods) == set(registry.list_methods())
     assert "needs examples, takes any inputs; Liu et al. 2011" in methods["dynamic_map"]
     assert "needs no examples" in methods["ik:previous"]
     assert all(line.count("needs ") >= 1 for line in methods.values())

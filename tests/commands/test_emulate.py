@@ -59,7 +59,7 @@ def test_runs_know_nothing_of_faults() -> None:
 
     def inputs(of: Scenario) -> dict[str, object]:
         evaluation = ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking")
-        return evaluation.conditions_of(registry.resolve("ik:previous"), "pos+ori")
+        return evaluation.conditions_of(registry.find_method("ik:previous"), "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))

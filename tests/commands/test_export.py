@@ -9,7 +9,7 @@ from harness.body.mounts import DEFAULT_MOUNTS, locate_mount
 from harness.cli import main
 from harness.commands import export
 from harness.core.humanoid24 import standard_skeleton
-from harness.mocap.write.export import FORMATS
+from harness.mocap.write.export import EXPORT_FORMATS
 from harness.results.reader import select_cells
 from tests.command import Command
 from tests.mocap.write.glb_file import read_glb
@@ -26,10 +26,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_help_names_every_format() -> None:
-    assert export._FORMATS == FORMATS
+    assert export._FORMATS == EXPORT_FORMATS
 
 
-@pytest.mark.parametrize("fmt", FORMATS)
+@pytest.mark.parametrize("fmt", EXPORT_FORMATS)
 def test_every_format_is_written_for_the_chosen_cells(run: Path, tmp_path: Path, command: Command, fmt: str) -> None:
     words = ["--clip", "walking_*,golf_p1_01", "--clip", "boxing_p?_01", "--method", "ik", "--json"]
     files = command("export", run, "--format", fmt, "--out", tmp_path / "out", *words).content["files"]

@@ -11,7 +11,7 @@ from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
 from harness.report.comparison.page import comparison_page, comparison_text
 from harness.report.comparison.wording import comparison_sentence, describe_parts
-from harness.report.kit.page_html import page_html
+from harness.report.kit.page_html import render_html
 from harness.results.reader import ResultSet
 from harness.score.metrics import DEFINITIONS
 from tests.compare.sides import SIZES, cell, manifest, side
@@ -141,7 +141,7 @@ def test_a_line_names_the_behaviour_that_decides_it() -> None:
     assert (len(line.units), line.verdict) == (16, "better")
     assert describe_parts(comparison, line) == "better for boxing (8 performers), the same elsewhere"
     assert f"✓ ik {ANGLE}: better for boxing (8 performers), the same elsewhere" in comparison_text(comparison)
-    page = page_html(comparison_page(comparison), with_charts=False)
+    page = render_html(comparison_page(comparison), with_charts=False)
     assert f"{ANGLE}: better for boxing (8 performers), the same elsewhere." in page
     again = found(sides[0], sides[0])
     assert describe_parts(again, again.differences[0]) == "the same for walking (8 performers), boxing (8 performers)"

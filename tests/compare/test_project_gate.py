@@ -27,7 +27,7 @@ def scenario() -> Scenario:
 
 
 def test_every_family_of_methods_is_gated(scenario: Scenario) -> None:
-    families = {name for name in registry.methods() if ":" not in name}
+    families = {name for name in registry.list_methods() if ":" not in name}
     assert families <= set(scenario.methods)
     assert any(name.endswith("+ik") for name in scenario.methods)
     assert {behaviour for behaviour in scenario.motion.behaviours if behaviour} == {

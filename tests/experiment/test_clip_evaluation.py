@@ -23,7 +23,7 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
 from harness.simulate.components.stationary import WhiteNoise
 
-PREVIOUS = registry.resolve("ik:previous")
+PREVIOUS = registry.find_method("ik:previous")
 
 SCENARIO = Scenario(
     name="small",
@@ -157,7 +157,7 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02",), body="common", longest_s=1.5)
     scenario = replace(SCENARIO, motion=motion)
     elsewhere = replace(scenario, stations={"torso": Station("thorax", 0.6, 30.0), "knee": Station("ltibia", 0.1)})
-    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.resolve("dynamic_map")
+    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.find_method("dynamic_map")
     first = ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking")
     results = [_estimated(first, method)]
     shared = first.with_conditions(elsewhere)

@@ -17,7 +17,7 @@ from harness.experiment.evaluation import evaluate_each
 from harness.experiment.methods.method_messages import decode_answers, encode_answers
 from harness.experiment.methods.method_run import MethodAnswers, run_method
 from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.recorded_take import recorded_take
+from harness.experiment.recorded_takes import recorded_take
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario

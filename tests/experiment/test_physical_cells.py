@@ -12,7 +12,7 @@ from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import evaluate_each
 from harness.experiment.observed_take import simulated_take
 from harness.experiment.playback import prepare_playback
-from harness.experiment.recorded_take import recorded_take
+from harness.experiment.recorded_takes import recorded_take
 from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
@@ -41,7 +41,7 @@ def evaluation(scenario: Scenario) -> ClipEvaluation:
 
 
 def conditions(scenario: Scenario) -> dict[str, Any]:
-    return evaluation(scenario).conditions_of(registry.resolve("ik:previous"), "pos+ori")
+    return evaluation(scenario).conditions_of(registry.find_method("ik:previous"), "pos+ori")
 
 
 def test_without_physics_conditions_do_not_name_it() -> None:
@@ -82,9 +82,9 @@ def test_a_station_that_hears_too_little_is_noted(tmp_path: Path) -> None:
     """Emitters that reach 1.6 m: none is heard at the ankles."""
     deaf = replace(PHYSICAL, physics=Physics(ConstellationSettings(range_m=1.6)), methods=("ik:previous",))
     made = evaluation(deaf)
-    note = next(text for text in made.notes(registry.resolve("ik:previous")) if "hears" in text)
+    note = next(text for text in made.notes(registry.find_method("ik:previous")) if "hears" in text)
     assert note.startswith("left_ankle hears three emitters for 0 % of the time, right_ankle for 0 %")
-    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.resolve("ik:previous")))
+    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.find_method("ik:previous")))
     engine.run(deaf, tmp_path / "out")
     assert f"TOO FEW EMITTERS IN boxing_p1_01: {note}" in run_table(read_summary(tmp_path / "out"))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
 from harness.core.motion import BodyMotion
@@ -38,7 +38,7 @@ from harness.simulate.simulation import Simulation, exact_calibration, simulate_
 from harness.stream.frame import TrackerFrame
 from tests.joint_centres import joint_centres_m
 
-PREVIOUS = registry.resolve("ik:previous")
+PREVIOUS = registry.find_method("ik:previous")
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(
@@ -270,7 +270,7 @@ def test_nothing_of_the_performer_but_the_stream_is_told(
 ) -> None:
     """Where p1 stands but the stream of p2 is heard, what is found is p2's to the bit; its errors alone are others."""
     worn, calibrated, space = found
-    poses = [configuration(pose, worn.body.skeleton) for pose in POSES]
+    poses = [pose_configuration(pose, worn.body.skeleton) for pose in POSES]
     heard = worn.observe_poses(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
     other = session(replace(SMALL, calibrating=CalibrationSettings(beside_m=0.3)))
     assert other.body is not worn.body

@@ -13,7 +13,7 @@ from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.evaluation import evaluate_each
 from harness.experiment.playback import prepare_playback
-from harness.experiment.recorded_take import recorded_take
+from harness.experiment.recorded_takes import recorded_take
 from harness.results.reader import select_cells
 from harness.results.storage import read_summary
 from harness.stream.recording.recording import record_capture

@@ -21,7 +21,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
 from harness.experiment.playback import prepare_playback
-from harness.experiment.recorded_take import find_playback
+from harness.experiment.recorded_takes import find_playback
 from harness.experiment.scenarios.motion_source import expand_clips
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
@@ -34,7 +34,7 @@ from harness.mocap.read.c3d import read_c3d
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 from harness.report.comparison.page import comparison_text
-from harness.report.kit.page_html import page_html
+from harness.report.kit.page_html import render_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
@@ -129,7 +129,7 @@ def _read_library(folder: Path) -> object:
 
 def _plan(scenario: Scenario) -> object:
     for method in scenario.methods:
-        registry.resolve(method)
+        registry.find_method(method)
     return cell_names(scenario), content_key(to_json_types(scenario.vary))
 
 
@@ -154,7 +154,7 @@ def _read_placement(folder: Path) -> object:
 def _read_options(folder: Path) -> object:
     text = (folder / "x.txt").read_bytes().decode("utf-8", "replace")[:2000]
     names = (name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part))
-    return [(registry.resolve(name), registry.without_options(name)) for name in names]
+    return [(registry.find_method(name), registry.without_options(name)) for name in names]
 
 
 def _copy_shipped(name: str) -> Callable[[Path], object]:
@@ -251,7 +251,7 @@ def _make_paper(folder: Path) -> None:
 
 def _read_paper(folder: Path) -> object:
     findings = read_findings(folder / "findings.json")
-    return paper_text(findings), page_html(paper_page(findings), with_charts=False)
+    return paper_text(findings), render_html(paper_page(findings), with_charts=False)
 
 
 def _make_placement(folder: Path) -> None:
@@ -269,7 +269,7 @@ def _placement_findings() -> bytes:
 
 def _read_placement_findings(folder: Path) -> object:
     findings = read_placement(folder / "findings.json")
-    return placement_text(findings), page_html(placement_page(findings), with_charts=False)
+    return placement_text(findings), render_html(placement_page(findings), with_charts=False)
 
 
 def _make_database(folder: Path) -> None:

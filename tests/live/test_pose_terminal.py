@@ -10,12 +10,12 @@ import pytest
 from harness.body.humanoid import tpose
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.calibrate.performer_preview import PerformerPose
-from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.poses import POSES, pose_configuration
 from harness.core.humanoid24 import standard_skeleton
 from harness.live.pose_terminal import COLUMNS, ROWS, PoseTerminal, draw_figure, guided_lines
 
 OWN = standard_skeleton()
-TARGET = configuration(POSES[0], OWN)
+TARGET = pose_configuration(POSES[0], OWN)
 GUIDED = GuidedPose(1, TARGET, PerformerPose(TARGET, np.array([0.02, 0.07])), "right_hand", 1.35, "hold still")
 
 
@@ -62,7 +62,7 @@ def dots(lines: list[str]) -> np.ndarray:
 
 def test_a_figure_has_arms_where_the_pose_has_them() -> None:
     """In T-pose both arms are out; a raised left leg is on the right of the picture, which is seen from the front."""
-    straight, leg_up = (dots(draw_figure(q, OWN)) for q in (tpose(OWN), configuration(POSES[4], OWN)))
+    straight, leg_up = (dots(draw_figure(q, OWN)) for q in (tpose(OWN), pose_configuration(POSES[4], OWN)))
     assert straight.shape == (ROWS, COLUMNS)
     wide = np.flatnonzero(straight.any(axis=0))
     assert wide[0] < COLUMNS / 2 - 6

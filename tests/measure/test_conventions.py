@@ -16,7 +16,7 @@ from harness.measure.conventions import (
     require_scale,
 )
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import register
+from harness.measure.registration import register_poses
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
 
 pytestmark = pytest.mark.long
@@ -80,7 +80,7 @@ def test_a_reference_of_other_conventions_is_refused_with_its_cause(
 ) -> None:
     stations, truths = capture
     with pytest.raises(BadInput, match=cause):
-        register(stations, changed(truths, place, turn))
+        register_poses(stations, changed(truths, place, turn))
 
 
 @pytest.mark.parametrize("factor", [0.81, 1.0, 1.19])
@@ -88,7 +88,7 @@ def test_a_scale_error_of_a_tracker_is_measured(
     capture: tuple[dict[str, MeasuredPoses], dict[str, TruthPoses]], factor: float
 ) -> None:
     stations, truths = capture
-    found = register(stations, changed(truths, 1.0 / factor, 1.0)).values["scale"].value
+    found = register_poses(stations, changed(truths, 1.0 / factor, 1.0)).values["scale"].value
     assert found == pytest.approx(1.001 * factor - 1.0, abs=0.002)
 
 

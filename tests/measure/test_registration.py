@@ -16,7 +16,7 @@ from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import MountFit, Registration, register
+from harness.measure.registration import MountFit, Registration, register_poses
 from harness.mocap import synthetic
 from harness.mocap.library import MotionLibrary
 from harness.simulate.noise import noise_preset
@@ -71,7 +71,7 @@ def _room_turns(found: Registration, tracker: Tracker) -> list[Interval]:
 def test_exact_readings_give_exact_values(rng: np.random.Generator) -> None:
     tracker = replace(NOISY, white=(0.0, 0.0), drift=(0.0, 0.0), heading_rad=0.05, scale=0.01)
     stations, truths, mounts = make_capture(rng, tracker, 20.0)
-    found = register(stations, truths)
+    found = register_poses(stations, truths)
     for key, measured, true in list_errors(found, tracker, mounts, 10.0):
         assert measured.value == pytest.approx(true, abs=1e-3 if "ppm" in key else 1e-7), key
     assert found.matched > 0.99
@@ -94,7 +94,7 @@ def test_noise_echoes_excursions_and_gaps_are_withstood(rng: np.random.Generator
             place[begin : begin + 80] += np.array([0.0, 0.02, 0.0])
         valid[500:520] = False
         disturbed[name] = MeasuredPoses(one.measured_s, place, one.tracker_from_station, valid)
-    found = register(disturbed, truths)
+    found = register_poses(disturbed, truths)
     limits = {"_s": 5e-5, "ppm": 2.0, "scale": 1e-3, "heading_rad": 5e-3}
     for key, measured, true in list_errors(found, NOISY, mounts):
         limit = next((size for end, size in limits.items() if key.endswith(end)), 2e-3 if "turn" not in key else 8e-3)
@@ -118,7 +118,7 @@ def test_noise_echoes_excursions_and_gaps_are_withstood(rng: np.random.Generator
 )
 def test_a_fault_is_measured_with_its_size(key: str, tracker: Tracker, rng: np.random.Generator) -> None:
     stations, truths, mounts = make_capture(rng, tracker, 30.0)
-    found = register(stations, truths)
+    found = register_poses(stations, truths)
     true = {name: value for name, _, value in list_errors(found, tracker, mounts, 15.0)}[key]
     measured = found.values[key]
     assert measured.value == pytest.approx(true, rel=0.2)
@@ -129,7 +129,7 @@ def test_a_fault_is_measured_with_its_size(key: str, tracker: Tracker, rng: np.r
 def test_a_turned_station_shows_its_angle(rng: np.random.Generator) -> None:
     stations, truths, mounts = make_capture(rng, NOISY)
     turned = rotations.exp(np.deg2rad([0.0, 3.0, 0.0]))
-    found = register(stations, truths).mounts
+    found = register_poses(stations, truths).mounts
     angle = found["hand"].angle_from(rotations.multiply(turned, mounts["hand"][1]))
     assert angle.value == pytest.approx(np.deg2rad(3.0), rel=0.15)
     assert angle.low > np.deg2rad(2.0)
@@ -147,7 +147,7 @@ def test_length_has_the_interval_of_three_errors() -> None:
 def test_a_point_in_the_room_has_the_error_of_the_rotation(rng: np.random.Generator) -> None:
     """The covariance of a point is that of points under drawn rooms."""
     stations, truths, _ = make_capture(rng, NOISY, 20.0)
-    found = register(stations, truths)
+    found = register_poses(stations, truths)
     point_m = np.array([0.3, -0.4, 1.5])
     draws = rng.multivariate_normal(np.zeros(6), found.room_covariance, 20_000, check_valid="ignore")
     room = rotations.multiply(rotations.exp(draws[:, :3]), found.state.tracker_from_world)
@@ -159,10 +159,10 @@ def test_a_point_in_the_room_has_the_error_of_the_rotation(rng: np.random.Genera
 
 def test_stations_on_bodies_of_other_names(rng: np.random.Generator) -> None:
     stations, truths, mounts = make_capture(rng, replace(NOISY, drift=(0.0, 0.0)), 20.0)
-    found = register({"left": stations["hand"]}, truths, pairs={"left": "hand"})
+    found = register_poses({"left": stations["hand"]}, truths, pairs={"left": "hand"})
     assert rotations.angle_between_rad(found.mounts["left"].body_from_station, mounts["hand"][1]) < 5e-3
     with pytest.raises(BadInput, match="not the reference's, or stations are on other bodies"):
-        register({"left": stations["hand"]}, truths, pairs={"left": "head"})
+        register_poses({"left": stations["hand"]}, truths, pairs={"left": "head"})
 
 
 def test_inputs_that_do_not_show_the_values_are_refused(rng: np.random.Generator) -> None:
@@ -171,7 +171,7 @@ def test_inputs_that_do_not_show_the_values_are_refused(rng: np.random.Generator
 
     def refuses(changed: MeasuredPoses, reference: TruthPoses, message: str) -> None:
         with pytest.raises(BadInput, match=message):
-            register({"hand": changed}, {"hand": reference})
+            register_poses({"hand": changed}, {"hand": reference})
 
     unstamped = MeasuredPoses(np.full(len(hand.valid), np.nan), hand.position_m, hand.tracker_from_station, hand.valid)
     refuses(unstamped, truth, "'hand' have no time stamps")
@@ -194,7 +194,7 @@ def test_a_body_that_stays_in_place_does_not_show_the_heading(rng: np.random.Gen
     still = {"hand": TruthPoses(truth.time_s, np.zeros((len(truth.time_s), 3)), truth.world_from_body)}
     stations = report_poses(rng, still, {"hand": (np.zeros(3), rotations.IDENTITY)}, NOISY)
     with pytest.raises(BadInput, match="Not observable from this motion"):
-        register(stations, still)
+        register_poses(stations, still)
 
 
 @pytest.mark.slow
@@ -203,7 +203,7 @@ def test_intervals_contain_the_truth() -> None:
     covered: dict[str, list[bool]] = {}
     for seed in range(200):
         stations, truths, mounts = make_capture(generator(seed, "registration"), NOISY, 30.0)
-        found = register(stations, truths)
+        found = register_poses(stations, truths)
         for key, measured, true in list_errors(found, NOISY, mounts, 15.0):
             covered.setdefault(key, []).append(measured.contains(true))
     shares = {key: float(np.mean(values)) for key, values in covered.items()}
@@ -215,7 +215,7 @@ def check_figures(captures: list[BoxingCapture]) -> None:
     """The figures of a minute of boxing: each capture, and the median rotation."""
     angles = []
     for capture in captures:
-        found = register(capture.stations, capture.truths, pairs=capture.body_of)
+        found = register_poses(capture.stations, capture.truths, pairs=capture.body_of)
         values = found.values
         late_s = 20e-6 * found.reference_s
         assert values["time_offset_orientation_s"].value == pytest.approx(late_s, abs=0.5e-3)

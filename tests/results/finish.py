@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_summary.run_statistics import run_statistics
+from harness.compare.run_summary.run_statistics import compute_run_statistics
 from harness.results import storage
 from harness.results.files.digests import write_result_json
 from harness.results.files.folder_kind import LOCK_FILE
@@ -51,4 +51,4 @@ def finish_run(
         index.record_outcomes([(key, key, "") for key in keys])
         index.record_outcomes([(cell, "", text) for cell, text in failures.items()])
         index.note(kind="run")
-        return storage.write_summary(index, out, run_statistics(index, out, (), {}), kind="run")
+        return storage.write_summary(index, out, compute_run_statistics(index, out, (), {}), kind="run")

@@ -127,13 +127,13 @@ def test_every_source_keeps_the_contract_of_streams(source: str, tmp_path: Path)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", sorted(registry.methods()))
+@pytest.mark.parametrize("name", sorted(registry.list_methods()))
 @pytest.mark.parametrize("take", [None], indirect=True)
 def test_every_method_estimates_the_same_from_every_source(
     playback: Playback, frames_by_source: Sources, name: str
 ) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
-    reconstructor = playback.clip_evaluation.fit_method(registry.resolve(name), name)
+    reconstructor = playback.clip_evaluation.fit_method(registry.find_method(name), name)
     sources = {"simulation": list(playback.simulation.frames), **frames_by_source}
     first_s = max(frames[0].measured_s[0] for frames in sources.values())
 

@@ -9,7 +9,7 @@ from harness.bench.accuracy.targets import mean_of
 from harness.bench.limits import count_missed
 from harness.core.number_format import count_noun
 from harness.core.text_table import Table
-from harness.report.kit.statement_lines import statement_lines
+from harness.report.kit.statement_lines import format_statements
 
 
 def format_report(report: AccuracyReport) -> str:
@@ -24,7 +24,7 @@ def _sections(report: AccuracyReport) -> Iterator[str]:
     yield f"{report.method} against {report.stored_title}: joint angle [deg], mean over clips, seeds averaged first"
     yield "\n".join(("position, jitter and foot skate:", *_motion_table(report).lines()))
     yield "\n".join(_ranking_lines(report))
-    yield "\n".join(statement_lines(report.statements))
+    yield "\n".join(format_statements(report.statements))
     if report.no_lag:
         yield f"two frames of lag: not measured ({report.no_lag})"
     yield count_missed(report.statements)

@@ -26,7 +26,7 @@ GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")
 """Cells that differ in one of these are never pooled."""
 
 
-def run_statistics(
+def compute_run_statistics(
     index: CellIndex, out: Path, orders: Sequence[ExpectedOrder], training_data: Mapping[str, str]
 ) -> dict[str, Any]:
     """What `summary.json` says of a run beyond its counts; every finished cell is read once.

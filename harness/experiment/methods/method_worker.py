@@ -35,7 +35,7 @@ from harness.experiment.methods.method_messages import (
 from harness.experiment.methods.method_run import run_method
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor, Session
-from harness.reconstruct.source_files import declared_environment, source_files, source_hash
+from harness.reconstruct.source_files import declared_environment, find_source_files, source_hash
 
 _KEPT_FITS = 2
 """Number of trained methods that are kept: those of the last two sets of examples."""
@@ -83,9 +83,9 @@ class MethodWorker:
             serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
         self._audit.package = registry.defining_module(header["name"]).partition(".")[0]
-        method = registry.resolve(header["name"])
+        method = registry.find_method(header["name"])
         modules = tuple(sys.modules.values())
-        self._audit.cover(source_files(method, modules), declared_environment(method))
+        self._audit.cover(find_source_files(method, modules), declared_environment(method))
         self.method = method
         return {
             "summary": str(method.summary),
@@ -127,7 +127,7 @@ class MethodWorker:
 
 def _stable_options(method: Method, name: str) -> str:
     """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
-    made, again = describe_state(method, name), describe_state(registry.resolve(name), name)
+    made, again = describe_state(method, name), describe_state(registry.find_method(name), name)
     if made == again:
         return made.replace(tempfile.gettempdir(), "<TMPDIR>")  # each process has its own
     differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)

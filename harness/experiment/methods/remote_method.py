@@ -207,7 +207,7 @@ def resolve_method(name: str, isolation: Isolation) -> Method:
     """
     method = _remote_method(name, isolation)
     if method is None:
-        return registry.resolve(name)
+        return registry.find_method(name)
     method.describe()
     return method
 

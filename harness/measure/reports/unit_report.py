@@ -223,7 +223,7 @@ class UnitReport:
     """What cannot be told from this capture and what to know about it, a sentence each."""
 
 
-def unit_report(
+def make_unit_report(
     profile: UnitProfile, unit: UnitFile, checks: Sequence[Departure], expected_from: str, defaults: Mapping[str, float]
 ) -> UnitReport:
     """The report on a profile whose unit file is `unit`; `defaults` are the preset's values of its keys."""

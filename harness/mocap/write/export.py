@@ -25,11 +25,11 @@ _FORMATS_BY_MOTION: Mapping[str, Callable[[PosedMotion], Mapping[str, str]]] = {
     "tum": tum_files,
 }
 """Format -> texts of the files of one motion by their endings."""
-FORMATS = (*_FORMATS_BY_MOTION, "glb")
+EXPORT_FORMATS = (*_FORMATS_BY_MOTION, "glb")
 """Formats of files. `glb` (glTF 2.0) holds truth and estimate in one file, each of the others in files of its own."""
 
 
-def export(
+def export_motion(
     cells: Iterable[_AnyCell],
     fmt: str,
     folder: Path,
@@ -45,8 +45,8 @@ def export(
     out. `model` gives the surface and the stations of a body for `glb`. Raises UnknownName for another format, and
     BadInput if a file exists (unless `force`), if the folder cannot be written, and if there is nothing to write.
     """
-    if fmt not in FORMATS:
-        raise UnknownName("export format", fmt, FORMATS)
+    if fmt not in EXPORT_FORMATS:
+        raise UnknownName("export format", fmt, EXPORT_FORMATS)
     ready: dict[Path, Path] = {}
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -21,7 +21,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Lookup, make_index
 from harness.reconstruct.index.exact import nearest_exact, nearest_partial
-from harness.reconstruct.index.selection import AUTO, KD_TREE_MAX_NEIGHBOURS
+from harness.reconstruct.index.selection import AUTO_INDEX, KD_TREE_MAX_NEIGHBOURS
 from harness.reconstruct.solver.ground_frame import AnchorFrame, anchor_of, relative_ground, twist_rad
 
 Codes = NDArray[np.int16]
@@ -89,7 +89,7 @@ class ExampleFeatures:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         database.release_memory()
-        self.index = make_index(_default_index(len(database)) if index == AUTO else index, self, neighbours)
+        self.index = make_index(_default_index(len(database)) if index == AUTO_INDEX else index, self, neighbours)
 
     def nearest(self, query: Query, count: int, lookup: Lookup) -> Ints:
         """Rows of the `count` frames nearest to a query, with its confidences as weights.

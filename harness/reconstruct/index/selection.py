@@ -14,7 +14,7 @@ INDEXES: dict[str, Callable[[Vectors, int], Index]] = {
     "inverted_file": lambda vectors, wanted: InvertedFile(vectors, wanted),
     "graph": lambda vectors, wanted: NeighbourGraph(vectors, _fastest(vectors, wanted)),
 }
-AUTO = "auto"
+AUTO_INDEX = "auto"
 FLAT_MAX_VECTORS, KD_TREE_MAX_DIMENSIONS, KD_TREE_MAX_NEIGHBOURS = 3000, 20, 16
 """Limits of the choice: the flat index up to the first number of vectors; the kd-tree up to this many dimensions and
 wanted neighbours. In more dimensions, or for hundreds of neighbours, a tree visits nearly all vectors."""
@@ -25,10 +25,10 @@ def make_index(kind: str, vectors: Vectors, wanted: int = KD_TREE_MAX_NEIGHBOURS
 
     "auto" takes the fastest whose recall is near 1 (`best_index`).
     """
-    if kind == AUTO:
+    if kind == AUTO_INDEX:
         return _fastest(vectors, wanted)
     if kind not in INDEXES:
-        raise UnknownName("index", kind, (AUTO, *INDEXES))
+        raise UnknownName("index", kind, (AUTO_INDEX, *INDEXES))
     return INDEXES[kind](vectors, wanted)
 
 

@@ -45,7 +45,7 @@ from harness.report.kit.page import (
     TerminalOnly,
 )
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.kit.text import list_first, truncate
 
 _WIDTH = 160
@@ -87,7 +87,7 @@ def write_comparison_page(comparison: Comparison, path: Path) -> Path:
 
 def comparison_text(comparison: Comparison) -> str:
     """The page for a terminal; without tables if nothing was compared."""
-    return page_text(comparison_page(comparison), _WIDTH)
+    return render_text(comparison_page(comparison), _WIDTH)
 
 
 def comparison_page(comparison: Comparison) -> Page:

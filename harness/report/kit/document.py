@@ -18,7 +18,7 @@ Section = tuple[str, str, Markup]
 """Title, name for links, content; a section without content is left out."""
 
 
-def document(
+def html_document(
     *,
     title: str,
     kicker: str,

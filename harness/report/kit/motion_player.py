@@ -121,7 +121,7 @@ ChunkWriter = Callable[[bytes], str]
 """Stores a compressed chunk; returns what the page needs to find it."""
 
 
-def motion_player(motion: PlayerMotion, label: str) -> Markup:
+def player_card(motion: PlayerMotion, label: str) -> Markup:
     """The player with its data and scripts, for a page that loads nothing; `label` describes it to screen readers."""
     data = json.dumps(pack_motion(motion, _to_base64), separators=(",", ":")).replace("<", "\\u003c")
     return join(

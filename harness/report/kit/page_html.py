@@ -8,7 +8,7 @@ from typing import Any
 
 from harness.core.files import write_text
 from harness.core.number_format import NOT_MEASURED, Interval
-from harness.report.kit.document import chart_figure, chart_panel, document
+from harness.report.kit.document import chart_figure, chart_panel, html_document
 from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, scroll_box, tag, verdict_badge
 from harness.report.kit.page import (
     Badge,
@@ -41,13 +41,13 @@ _NOT_MEASURED = tag("span", NOT_MEASURED, class_="none")
 
 def write_page(page: Page, path: Path, plots: Path | None = None) -> Path:
     """Write the page to `path` and return it; its folder is created. Charts are also written to the folder `plots`."""
-    text = page_html(page, plots)
+    text = render_html(page, plots)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
     return path
 
 
-def page_html(page: Page, plots: Path | None = None, *, with_charts: bool = True) -> str:
+def render_html(page: Page, plots: Path | None = None, *, with_charts: bool = True) -> str:
     """The HTML of a page; without charts their numbers are open."""
     return _Renderer(plots, with_charts).page(page)
 
@@ -64,7 +64,7 @@ class _Renderer:
         if page.verdict:
             word, outcome = page.verdict
             heading = join(tag("span", word, class_=f"big {to_file_name(outcome.word)}"), page.headline)
-        return document(
+        return html_document(
             title=f"{page.name}: harness {page.verb}" if page.name else f"harness {page.verb}",
             kicker=f"harness {page.verb}" + (f" · {page.name}" if page.name else ""),
             heading=heading,

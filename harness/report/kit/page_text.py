@@ -14,7 +14,7 @@ NUMBER = re.compile(r"(< |± )?[−+-]?[\d.,]+\b.{,28}|[–—-]?|exact|known|no
 """Texts that are aligned right, as numbers are."""
 
 
-def page_text(page: Page, width: int = WIDTH) -> str:
+def render_text(page: Page, width: int = WIDTH) -> str:
     """The text of a page; what a terminal cannot show, and explanations of columns, are left out."""
     lines = _wrapped(page.headline, width) + join_blocks(page.lead, width, after_text=True)
     facts = [

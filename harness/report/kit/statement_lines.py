@@ -42,7 +42,7 @@ def statement_row(statement: BenchmarkStatement) -> list[object]:
     ]
 
 
-def statement_lines(
+def format_statements(
     statements: Sequence[BenchmarkStatement],
     *,
     target: str = "target",

@@ -28,7 +28,7 @@ from harness.report.kit.page import (
     json_listing,
 )
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text, table_lines
+from harness.report.kit.page_text import render_text, table_lines
 from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, statement_row
 from harness.report.kit.text import describe_motion_source, to_file_name
 from harness.report.paper.charts import figure_charts, figure_table, is_measured
@@ -79,7 +79,7 @@ def write_paper_page(folder: Path) -> Path:
 
 def paper_text(findings: PaperFindings) -> str:
     """The page for a terminal: every claim with its verdict, experiment by experiment."""
-    return page_text(paper_page(findings), WIDTH)
+    return render_text(paper_page(findings), WIDTH)
 
 
 def paper_page(findings: PaperFindings, folder: Path | None = None) -> Page:
@@ -180,7 +180,7 @@ def _result(claim: BenchmarkStatement | None) -> object:
 def statements_text(findings: PaperFindings) -> str:
     """The printed statements with the results of both readings, in lines of at most `WIDTH` characters."""
     claims, table = all_claims(findings), statements_table(findings)
-    head = page_text(Page("", "", findings.reference, {}, []), WIDTH).split("\n")
+    head = render_text(Page("", "", findings.reference, {}, []), WIDTH).split("\n")
     head += [f"{findings.paper} on {findings.motion}, seed {findings.seed}.", claims_sentence(claims)]
     others = sum(claim.kind != "printed" for claim in claims)
     more = (

@@ -21,7 +21,7 @@ from harness.report.kit.page import (
     json_listing,
 )
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.kit.statement_lines import WIDTH
 from harness.report.kit.style import Chart
 from harness.report.kit.text import describe_motion_source, last_line
@@ -83,7 +83,7 @@ def write_placement_page(folder: Path) -> Path:
 
 def placement_text(findings: PlacementFindings) -> str:
     """The page for a terminal."""
-    return page_text(placement_page(findings), WIDTH)
+    return render_text(placement_page(findings), WIDTH)
 
 
 def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), missing: Sequence[str] = ()) -> Page:

@@ -15,7 +15,7 @@ from harness.report.kit.chart import clear_plots
 from harness.report.kit.document import chart_figure, data_uri, facts_list
 from harness.report.kit.error_lines import choose_highlights
 from harness.report.kit.markup import Markup, join, scroll_box, tag
-from harness.report.kit.motion_player import motion_player
+from harness.report.kit.motion_player import player_card
 from harness.report.kit.page import (
     Block,
     BrowserOnly,
@@ -266,7 +266,7 @@ def _instants(run: RunData, window: WorstWindow) -> Ints:
 def _player(run: RunData, windows: Mapping[tuple[str, str], WorstWindow], reader: Callable[[str], Cell]) -> list[Block]:
     """The interactive view of all clips and methods; nothing without an estimate."""
     motion, note = run_motion(run, windows, reader)
-    player = [motion_player(motion, "Truth, estimates and stations in 3-D; drag to turn")] if motion.clips else []
+    player = [player_card(motion, "Truth, estimates and stations in 3-D; drag to turn")] if motion.clips else []
     return [Prose(_PLAYER), *([Prose(note)] if note else []), BrowserOnly(player)] if player else []
 
 

@@ -13,7 +13,7 @@ from harness.core.arrays import Bools
 from harness.core.number_format import Interval, count_noun
 from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.kit.ranking import BOLD_NOTE
 from harness.report.kit.text import format_statistic, list_first
 from harness.report.sweep.charts import (
@@ -83,7 +83,7 @@ def sweep_text(sweep: SweepData) -> str:
         Section("Varied keys", "varied", [DataTable(["varied", f"lowest and highest mean {PRIMARY_METRIC}"], effects)]),
         Section("Failures", "failures", [Bullets(failures, prefix="FAILED "), *rest]),
     ]
-    return page_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections))
+    return render_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections))
 
 
 def _methods_table(sweep: SweepData) -> DataTable:

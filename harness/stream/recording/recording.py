@@ -59,7 +59,7 @@ from harness.stream.recording.blocks import (
 )
 
 EXPECTED_FILE = "a recording by `harness record`"
-PLAN = "plan"
+PLAN_FILE = "plan"
 """Name of the plan's digest in a note."""
 _WRITABLE_FILE = "a file to record into"
 _MAX_ANSWER_BYTES = 8192
@@ -407,7 +407,7 @@ class RecordingWriter:
                 _seek_first_block(self.path, file)
                 parser, blocks = Recording(self.path, b""), _whole_blocks(file)
                 kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
-            self._check_plan(_note_values(parser, kept, PLAN))
+            self._check_plan(_note_values(parser, kept, PLAN_FILE))
             return [parser.format_of(block) for block in kept if block.kind == CONFIGURED]
         except FileNotFoundError:
             if not self.path.parent.is_dir():
@@ -418,7 +418,7 @@ class RecordingWriter:
 
     def _check_plan(self, existing: tuple[str, ...]) -> None:
         """Raise BadFile unless the notes of the file name the plan of the new one: a plan comes before its data."""
-        plan = str(self._note.get(PLAN) or "")
+        plan = str(self._note.get(PLAN_FILE) or "")
         if not existing or existing == (plan,):
             return
         found = " and ".join(f"the plan {digest[:12]}" if digest else "no plan" for digest in existing)

@@ -23,7 +23,7 @@ from harness.experiment.methods.isolation import DEFAULT_ISOLATION
 from harness.experiment.methods.method_run import describe_failure
 from harness.experiment.methods.remote_method import NamedMethod, resolve_method
 from harness.experiment.observed_take import ObservedTake
-from harness.experiment.recorded_take import checked_note, find_playback, recorded_take, registered_take
+from harness.experiment.recorded_takes import checked_note, find_playback, recorded_take, registered_take
 from harness.experiment.scenarios.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results.files.digests import check_key, read_result_json, write_result_json

@@ -17,7 +17,7 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure.profile import UnitProfile, measure_profile
 from harness.measure.reports.departures import Departure, compare_with_expected
-from harness.measure.reports.unit_report import UnitReport, unit_report
+from harness.measure.reports.unit_report import UnitReport, make_unit_report
 from harness.measure.unit_file import UnitFile
 from harness.results.files.digests import file_digest
 from harness.simulate.noise import noise_preset
@@ -160,7 +160,7 @@ class Characterization:
     def report(self) -> UnitReport:
         """All that the unit's page shows."""
         defaults = {key: number.value for key, number in preset_values().items()}
-        return unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
+        return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
 
 
 def characterize_capture(

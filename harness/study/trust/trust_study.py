@@ -36,7 +36,7 @@ from harness.results.findings.trust_findings import (
     TrustFindings,
 )
 from harness.results.storage import open_study
-from harness.stream.recording.recording import PLAN, read_recording
+from harness.stream.recording.recording import PLAN_FILE, read_recording
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
     ArmErrors,
@@ -328,7 +328,7 @@ def _carried_plans(path: Path) -> tuple[str, ...]:
     if len(clips := capture.note_values("clip")) > 1:
         found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
         raise BadFile(path, found, "one clip", "Record each clip into a file of its own.")
-    return capture.note_values(PLAN)
+    return capture.note_values(PLAN_FILE)
 
 
 def _unit_keys(unit: UnitFile) -> dict[str, Any]:

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from harness.errors import BadInput, NotComparable
-from harness.experiment.recorded_take import find_playback
+from harness.experiment.recorded_takes import find_playback
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.angular_speed import coarse_offset, record_period_s
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration import LEAST_OVERLAP_S
-from harness.mocap.clip_file import FORMATS, read_clip
+from harness.mocap.clip_file import CLIP_FORMATS, read_clip
 from harness.mocap.library import LibraryFolders
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader
@@ -42,7 +42,7 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
     suffix = path.suffix.lower()
     if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
         return read_truth_file(path, capture.stations)
-    if suffix.lstrip(".") in (*FORMATS, "asf"):
+    if suffix.lstrip(".") in (*CLIP_FORMATS, "asf"):
         return truth_of_clip(read_clip(path), _scenario_of(capture, source), capture.stations)
     if path.is_file():
         return truth_of_capture(read_capture(CaptureReader(path)), capture.stations)

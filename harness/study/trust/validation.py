@@ -10,10 +10,10 @@ from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment.evaluation import Evaluation, evaluate_each
-from harness.experiment.recorded_take import registered_take
+from harness.experiment.recorded_takes import registered_take
 from harness.measure.angular_speed import identify_stations, record_period_s
 from harness.measure.pose_series import MeasuredPoses
-from harness.measure.registration import Registration, StationResiduals, register, require_stamps
+from harness.measure.registration import Registration, StationResiduals, register_poses, require_stamps
 from harness.measure.reports.departures import Departure, compare_with_expected
 from harness.measure.reports.unit_report import CaptureSummary
 from harness.measure.reports.validation_report import (
@@ -76,7 +76,7 @@ def validate_capture(
     poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
     pairs, exchanged = _identify(poses, truth)
-    registration = register(poses, truth.bodies, pairs=pairs)
+    registration = register_poses(poses, truth.bodies, pairs=pairs)
     progress("accuracy", 2, 3)
     numbers = {
         "time_offset_orientation_s": registration.values["time_offset_orientation_s"],

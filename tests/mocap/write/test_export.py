@@ -19,7 +19,7 @@ from harness.mocap import synthetic
 from harness.mocap.clip_file import read_clip
 from harness.mocap.read.bvh import read_bvh
 from harness.mocap.write.bvh import euler_zyx_deg
-from harness.mocap.write.export import FORMATS, export
+from harness.mocap.write.export import EXPORT_FORMATS, export_motion
 from harness.mocap.write.opensim import ROOT_COLUMNS, euler_zxy_rad
 from harness.mocap.write.tables import POINTS
 from harness.score.pair import Pair, compute_poses
@@ -75,10 +75,10 @@ def joints_m(qpos: Floats, skeleton: Skeleton) -> Floats:
 
 
 def test_what_a_killed_export_left_is_removed_by_the_next(cell: Written, tmp_path: Path) -> None:
-    stem = export([cell], "glb", tmp_path)[0].stem
+    stem = export_motion([cell], "glb", tmp_path)[0].stem
     left = leave_behind(tmp_path / f"{stem}.truth.bvh")
     assert left.is_file()
-    files = export([cell], "bvh", tmp_path)
+    files = export_motion([cell], "bvh", tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {f"{stem}.glb", *(path.name for path in files)}
 
 
@@ -87,7 +87,7 @@ def test_pymotion_reads_the_same_joint_centres_from_bvh(cell: Written, tmp_path:
     from pymotion.ops.skeleton import fk
 
     motions = (cell.truth_qpos, SKELETON), (cell.estimate_qpos, BELIEVED)
-    for file, motion in zip(export([cell], "bvh", tmp_path), motions, strict=True):
+    for file, motion in zip(export_motion([cell], "bvh", tmp_path), motions, strict=True):
         bvh = BVH()
         bvh.load(str(file))
         turned, position, parents, offsets, ends, end_parents = bvh.get_data()
@@ -122,7 +122,7 @@ def test_bvh_is_read_back_to_the_precision_of_its_numbers(
     )
     skeletons = motion.skeleton, BELIEVED
     for file, qpos, skeleton in zip(
-        export([cell], "bvh", tmp_path), (truth, cell.estimate_qpos), skeletons, strict=True
+        export_motion([cell], "bvh", tmp_path), (truth, cell.estimate_qpos), skeletons, strict=True
     ):
         back = read_clip(file)
         root_m, quaternion, angles_rad = unpack(qpos)
@@ -136,7 +136,7 @@ def test_bvh_is_read_back_to_the_precision_of_its_numbers(
 
 
 def test_arbitrary_rotations_in_bvh_are_read_back(cell: Written, tmp_path: Path) -> None:
-    for file, qpos in zip(export([cell], "bvh", tmp_path), (cell.truth_qpos, cell.estimate_qpos), strict=True):
+    for file, qpos in zip(export_motion([cell], "bvh", tmp_path), (cell.truth_qpos, cell.estimate_qpos), strict=True):
         back, clip = read_bvh(file), read_clip(file)
         assert back.rate_hz == RATE_HZ
         assert back.unit_evidence == "centimetres, as this package writes"
@@ -160,7 +160,7 @@ def test_euler_angles_rebuild_every_rotation(rng: np.random.Generator) -> None:
 
 
 def test_trc_has_the_joint_centres_y_up(cell: Written, tmp_path: Path) -> None:
-    files = export([cell], "trc", tmp_path)
+    files = export_motion([cell], "trc", tmp_path)
     assert [f.name.split(".", 2)[-1] for f in files] == ["40-ik-pos+ori.truth.trc", "40-ik-pos+ori.estimate.trc"]
     lines = files[1].read_text().split("\n")
     assert lines[2].split("\t") == ["40", "40", "50", "25", "mm", "40", "1", "50"]
@@ -188,7 +188,7 @@ def storage_table(file: Path) -> tuple[set[str], list[str], list[list[str]]]:
 
 
 def test_mot_has_the_root_and_the_angles(cell: Written, tmp_path: Path) -> None:
-    truth, estimate = export([cell], "mot", tmp_path)
+    truth, estimate = export_motion([cell], "mot", tmp_path)
     assert (truth.suffix, estimate.suffix) == (".mot", ".mot")
     head, names, rows = storage_table(estimate)
     assert {"version=1", "nRows=50", "nColumns=55", "inDegrees=yes"} <= head
@@ -216,7 +216,7 @@ def test_zxy_angles_rebuild_rotations_at_gimbal_lock(rng: np.random.Generator) -
 
 
 def test_sto_has_orientations_of_segments_named_for_opensense(cell: Written, tmp_path: Path) -> None:
-    truth, estimate = export([cell], "sto", tmp_path)
+    truth, estimate = export_motion([cell], "sto", tmp_path)
     assert (truth.suffix, estimate.suffix) == (".sto", ".sto")
     head, names, rows = storage_table(truth)
     assert {"DataRate=40.000000", "DataType=Quaternion", "version=3", "OpenSimVersion=4.1"} <= head
@@ -235,7 +235,7 @@ def test_sto_has_orientations_of_segments_named_for_opensense(cell: Written, tmp
 
 def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path: Path) -> None:
     errors = {"mpjpe_mm": np.where(np.arange(FRAMES) == 3, np.nan, 12.5)}
-    truth, estimate = export([replace(cell, errors=errors)], "csv", tmp_path)
+    truth, estimate = export_motion([replace(cell, errors=errors)], "csv", tmp_path)
     with estimate.open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == FRAMES
@@ -251,7 +251,7 @@ def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path
 def test_csv_has_the_standard_deviations_of_a_method_that_states_them(cell: Written, tmp_path: Path) -> None:
     sigma_rad = np.deg2rad(1.0 + np.arange(48.0)) * np.ones((FRAMES, 1))
     marked = pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.arange(48.0))
-    _, estimate = export([replace(cell, angle_sigma_rad=sigma_rad)], "csv", tmp_path)
+    _, estimate = export_motion([replace(cell, angle_sigma_rad=sigma_rad)], "csv", tmp_path)
     with estimate.open() as file:
         row = next(csv.DictReader(file))
     for dof, name in enumerate(SKELETON.dof_names):
@@ -260,7 +260,7 @@ def test_csv_has_the_standard_deviations_of_a_method_that_states_them(cell: Writ
 
 
 def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:
-    files = export([cell], "tum", tmp_path)
+    files = export_motion([cell], "tum", tmp_path)
     assert [f.name.split(".", 3)[-1] for f in files if "truth" in f.name] == [f"truth.{p}.tum" for p in POINTS]
     for point in ("root", "rfoot"):
         table = np.loadtxt(next(f for f in files if f.name.endswith(f"estimate.{point}.tum")))
@@ -278,7 +278,7 @@ def test_evo_finds_our_root_position_error(cell: Written, tmp_path: Path) -> Non
     program = find_evo()
     if program is None:
         pytest.skip("evo is not installed (extra dev)")
-    files = export([cell], "tum", tmp_path)
+    files = export_motion([cell], "tum", tmp_path)
     truth, estimate = (next(f for f in files if f.name.endswith(f"{kind}.root.tum")) for kind in ("truth", "estimate"))
     pair = Pair(
         compute_poses(SKELETON, cell.truth_qpos), compute_poses(SKELETON, cell.estimate_qpos), cell.frame_index, RATE_HZ
@@ -293,31 +293,31 @@ def test_gaps_and_broken_estimates(cell: Written, tmp_path: Path) -> None:
     estimate = cell.estimate_qpos.copy()
     estimate[10] = np.nan
     gappy = replace(cell, estimate_qpos=estimate, frame_index=np.r_[np.arange(20), np.arange(23, 23 + 30)])
-    truth, _ = export([gappy], "bvh", tmp_path)
+    truth, _ = export_motion([gappy], "bvh", tmp_path)
     text = truth.read_text().split("\n")
     assert "Frames: 53" in text
     rows = text[text.index("Frames: 53") + 2 :]
     assert rows[9] == rows[10] != rows[11]
     assert rows[19] == rows[20] == rows[22] != rows[23]
-    tum = export([gappy], "tum", tmp_path)[0]
+    tum = export_motion([gappy], "tum", tmp_path)[0]
     assert len(tum.read_text().split("\n")) - 1 == FRAMES - 1
 
 
-@pytest.mark.parametrize("fmt", FORMATS)
+@pytest.mark.parametrize("fmt", EXPORT_FORMATS)
 def test_a_file_is_written_over_only_when_told(cell: Written, tmp_path: Path, fmt: str) -> None:
     folder = tmp_path / "deep" / "out"
-    files = export([cell], fmt, folder)
+    files = export_motion([cell], fmt, folder)
     assert sorted(folder.iterdir()) == sorted(files)
     files[-1].write_bytes(b"edited by hand")
     with pytest.raises(BadInput, match="--force"):
-        export([cell], fmt, folder)
+        export_motion([cell], fmt, folder)
     assert files[-1].read_bytes() == b"edited by hand"
-    assert export([cell], fmt, folder, force=True) == files
+    assert export_motion([cell], fmt, folder, force=True) == files
     assert files[-1].read_bytes() != b"edited by hand"
 
 
 def test_names_of_files_are_safe_and_unlike(cell: Written, tmp_path: Path) -> None:
-    files = export([cell, replace(cell, key="fedcba9876543210")], "csv", tmp_path)
+    files = export_motion([cell, replace(cell, key="fedcba9876543210")], "csv", tmp_path)
     assert len(set(files)) == 4
     assert all(file.parent == tmp_path for file in files)
     assert files[0].name == "walking_01_02@0.20-0.40-ik-pos+ori.truth.csv"
@@ -325,21 +325,21 @@ def test_names_of_files_are_safe_and_unlike(cell: Written, tmp_path: Path) -> No
 
 def test_what_cannot_be_exported_is_refused(cell: Written, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="bvh"):
-        export([cell], "fbx", tmp_path)
+        export_motion([cell], "fbx", tmp_path)
     with pytest.raises(BadInput, match="No cell"):
-        export([], "csv", tmp_path)
+        export_motion([], "csv", tmp_path)
     with pytest.raises(BadInput, match="No cell"):
-        export([replace(cell, estimate_qpos=cell.estimate_qpos * np.nan)], "bvh", tmp_path)
+        export_motion([replace(cell, estimate_qpos=cell.estimate_qpos * np.nan)], "bvh", tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(BadInput, match="cannot be written"):
-        export([cell], "csv", tmp_path / "file")
+        export_motion([cell], "csv", tmp_path / "file")
 
 
 def test_files_are_written_together_or_not_at_all(cell: Written, tmp_path: Path) -> None:
     there = replace(cell, clip="there", key="1" * 16)
-    export([there], "csv", tmp_path)
+    export_motion([there], "csv", tmp_path)
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     with pytest.raises(BadInput, match="exists"):
-        export([cell, there], "csv", tmp_path)
+        export_motion([cell, there], "csv", tmp_path)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
-    assert len(export([cell, there], "csv", tmp_path, force=True)) == 4
+    assert len(export_motion([cell, there], "csv", tmp_path, force=True)) == 4

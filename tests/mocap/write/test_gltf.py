@@ -14,7 +14,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import unpack
 from harness.core.skeleton import Pose, Skeleton, forward_kinematics
 from harness.mocap.write.body_model import BodyModel, MountedStation
-from harness.mocap.write.export import export
+from harness.mocap.write.export import export_motion
 from harness.mocap.write.gltf_builder import MAX_VERTICES, GltfBuilder
 from harness.mocap.write.posed_motion import ExportableCell, PosedMotion
 from tests.mocap.write.glb_file import GlbFile, read_glb
@@ -34,7 +34,7 @@ def cell(rng: np.random.Generator) -> Written:
 
 @pytest.fixture
 def glb(cell: Written, tmp_path: Path) -> GlbFile:
-    (file,) = export([cell], "glb", tmp_path, model=dressed)
+    (file,) = export_motion([cell], "glb", tmp_path, model=dressed)
     assert file.name == "walking_01_02@0.20-0.40-ik-pos+ori.glb"
     return read_glb(file)
 
@@ -140,18 +140,18 @@ def test_meshes_are_closed_and_face_outward(glb: GlbFile) -> None:
 
 def test_gaps_keep_their_time_and_one_frame_is_enough(cell: Written, tmp_path: Path) -> None:
     gappy = replace(cell, frame_index=np.r_[np.arange(20), np.arange(23, 23 + 30)])
-    glb = read_glb(export([gappy], "glb", tmp_path)[0])
+    glb = read_glb(export_motion([gappy], "glb", tmp_path)[0])
     times = glb.array(glb.content["animations"][0]["samplers"][0]["input"])[:, 0]
     np.testing.assert_allclose(times, (gappy.frame_index - gappy.frame_index[0]) / RATE_HZ, atol=1e-6)
     assert glb.content["nodes"][glb.node("truth")]["extras"] == {"start_s": 3.0, "rate_hz": 40.0}
     estimate = np.full_like(cell.estimate_qpos, np.nan)
     estimate[5] = cell.estimate_qpos[5]
-    single = read_glb(export([replace(cell, estimate_qpos=estimate, key="1" * 16)], "glb", tmp_path / "one")[0])
+    single = read_glb(export_motion([replace(cell, estimate_qpos=estimate, key="1" * 16)], "glb", tmp_path / "one")[0])
     assert single.content["accessors"][single.content["animations"][0]["samplers"][0]["input"]]["count"] == 1
 
 
 def test_without_a_model_bodies_are_sticks(cell: Written, tmp_path: Path) -> None:
-    glb = read_glb(export([cell], "glb", tmp_path)[0])
+    glb = read_glb(export_motion([cell], "glb", tmp_path)[0])
     (primitive,) = glb.content["meshes"][glb.content["nodes"][glb.node("truth lfemur")]["mesh"]]["primitives"]
     place = glb.array(primitive["attributes"]["POSITION"])
     bone = SKELETON.bone_m[SKELETON.index("lfemur")]
@@ -194,7 +194,7 @@ for time_s in sys.argv[2:]:
 def test_vtk_places_every_vertex_as_we_do(cell: Written, tmp_path: Path) -> None:
     """Number, mean and bounds of all vertices at two times of the animation."""
     pytest.importorskip("vtkmodules", reason="VTK is not installed (extra `viz`)")
-    (file,) = export([cell], "glb", tmp_path, model=dressed)
+    (file,) = export_motion([cell], "glb", tmp_path, model=dressed)
     glb, times = read_glb(file), (0.0, 21 / RATE_HZ)
     command = [sys.executable, "-c", VTK, str(file), *map(str, times)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

@@ -12,7 +12,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.mocap import synthetic
-from harness.mocap.write.export import export
+from harness.mocap.write.export import export_motion
 from harness.mocap.write.opensim import ROOT_COLUMNS
 from harness.score.pair import compute_poses
 from tests.mocap.write.test_export import BELIEVED, NAMES, SKELETON, Written, in_opensim, joints_m
@@ -48,7 +48,7 @@ def table_of(opensim: Any, table: Any) -> Floats:
 
 
 def test_opensim_reads_mot(opensim: Any, cell: Written, tmp_path: Path) -> None:
-    _, estimate = export([cell], "mot", tmp_path)
+    _, estimate = export_motion([cell], "mot", tmp_path)
     storage, table = opensim.Storage(str(estimate)), opensim.TimeSeriesTable(str(estimate))
     assert (storage.isInDegrees(), storage.getSize()) == (True, len(cell.frame_index))
     assert table.getTableMetaDataString("inDegrees") == "yes"
@@ -61,7 +61,7 @@ def test_opensim_reads_mot(opensim: Any, cell: Written, tmp_path: Path) -> None:
 
 
 def test_opensim_reads_trc(opensim: Any, cell: Written, tmp_path: Path) -> None:
-    _, estimate = export([cell], "trc", tmp_path)
+    _, estimate = export_motion([cell], "trc", tmp_path)
     table = opensim.TimeSeriesTableVec3(str(estimate))
     assert table.getColumnLabels() == NAMES
     assert (table.getTableMetaDataString("Units"), table.getNumRows()) == ("mm", len(cell.frame_index))
@@ -70,7 +70,7 @@ def test_opensim_reads_trc(opensim: Any, cell: Written, tmp_path: Path) -> None:
 
 
 def test_opensim_reads_sto(opensim: Any, cell: Written, tmp_path: Path) -> None:
-    truth, _ = export([cell], "sto", tmp_path)
+    truth, _ = export_motion([cell], "sto", tmp_path)
     table = opensim.TimeSeriesTableQuaternion(str(truth))
     assert table.getColumnLabels()[:2] == ("pelvis_imu", "torso_imu")
     np.testing.assert_allclose(table.getIndependentColumn(), cell.time_s, atol=1e-6)
@@ -81,7 +81,7 @@ def test_opensim_reads_sto(opensim: Any, cell: Written, tmp_path: Path) -> None:
 
 def test_opensense_finds_the_hip_and_knee_again(opensim: Any, cell: Written, tmp_path: Path) -> None:
     """A model of pelvis, thigh and shank with free joints, calibrated with the first frame; to OpenSense's accuracy."""
-    truth, _ = export([cell], "sto", tmp_path)
+    truth, _ = export_motion([cell], "sto", tmp_path)
     model = opensim.Model()
     bodies = {
         name: opensim.Body(name, 1.0, opensim.Vec3(0), opensim.Inertia(1, 1, 1))

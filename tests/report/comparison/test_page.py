@@ -25,7 +25,7 @@ from harness.report.comparison.wording import (
     line_interval,
 )
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.page_html import page_html
+from harness.report.kit.page_html import render_html
 from harness.report.kit.style import Chart
 from tests.report.comparison.compared import CIRCUMSTANCES, compared, every_verdict, nothing_compared, one_line
 from tests.report.drawing import texts_apart
@@ -208,7 +208,7 @@ def test_groups_are_told_apart_where_there_are_several(tmp_path: Path) -> None:
 def test_lines_stand_worst_first_and_of_many_slopes_the_rest_is_folded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.report.comparison.page.slope_chart", lambda line, n: Chart("", "", "", "", "<svg/>"))
     monkeypatch.setattr("harness.report.comparison.page.interval_charts", lambda *sides: [])
-    raw = page_html(comparison_page(compared({**{f"m{n}": 0.0 for n in range(29)}, "bad": 0.4}, 6)))
+    raw = render_html(comparison_page(compared({**{f"m{n}": 0.0 for n in range(29)}, "bad": 0.4}, 6)))
     assert re.findall(r'<th scope="row">(\w+)<', raw)[:2] == ["bad", "m0"]
     assert raw.index('alt=""') < raw.index("<summary>6 more lines</summary>")
     assert raw.count('class="panel"') == 30

@@ -14,7 +14,7 @@ from PIL import Image
 from harness.core.number_format import format_fixed
 from harness.report.coverage.content import CoverageContent
 from harness.report.coverage.page import coverage_page, coverage_sentence, dilution_chart
-from harness.report.kit.page_html import page_html, write_page
+from harness.report.kit.page_html import render_html, write_page
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
 from tests.report.reading import count_pictures, read, section_ids, text_of
 
@@ -99,7 +99,7 @@ def test_bars_of_a_station_add_up_to_the_whole_time(figures: dict[str, Figure], 
 
 
 def test_the_same_content_gives_the_same_page(coverages: Coverages) -> None:
-    assert page_html(coverage_page(coverages[1])) == page_html(coverage_page(coverages[1]))
+    assert render_html(coverage_page(coverages[1])) == render_html(coverage_page(coverages[1]))
 
 
 def test_places_without_a_fix_have_no_colour(coverages: Coverages) -> None:

@@ -15,7 +15,7 @@ from harness.report.kit.motion_player import (
     PlayerStations,
     PlayerTrack,
     encode,
-    motion_player,
+    player_card,
     pack_motion,
 )
 
@@ -94,4 +94,4 @@ def test_bones_have_the_girth_of_their_side_less_name(rng: np.random.Generator) 
 
 
 def test_names_cannot_end_the_data(rng: np.random.Generator) -> None:
-    assert "<b>" not in motion_player(motion(rng), "bodies")
+    assert "<b>" not in player_card(motion(rng), "bodies")

@@ -24,7 +24,7 @@ from harness.report.kit.page import (
     TerminalOnly,
 )
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.kit.style import Chart
 from tests.report.reading import read, text_of
 
@@ -56,7 +56,7 @@ def test_both_renderings_have_every_part_that_is_for_both(tmp_path: Path) -> Non
         caption="What they are.",
     )
     page = page_of(table, Bullets(["one", "two"]), Prose("A sentence."), lead=[Prose("First.", is_warning=True)])
-    text, html = page_text(page), text_of(write_page(page, tmp_path / "page.html"))
+    text, html = render_text(page), text_of(write_page(page, tmp_path / "page.html"))
     for part in ("It differs.", "First.", "3 clips", "Pairs", "agree", "both say so", "1.20 mm", "1.19 to 1.21", "one"):
         assert part in text
         assert part in html
@@ -82,7 +82,7 @@ def test_what_only_a_browser_shows_is_not_printed(tmp_path: Path) -> None:
         TerminalOnly([Prose("In a terminal alone.")]),
     )
     file = write_page(page, tmp_path / "page.html", tmp_path)
-    html, text = text_of(file), page_text(page)
+    html, text = text_of(file), render_text(page)
     for part in ("Numbers of this chart", "hidden", "harness run", "player", "as wanted", "How to read it."):
         assert part in html
         assert part not in text
@@ -103,7 +103,7 @@ def test_without_a_chart_its_numbers_are_open(tmp_path: Path) -> None:
 
 def test_a_section_without_content_is_left_out(tmp_path: Path) -> None:
     page = page_of(DataTable(["a"], []), Bullets([], title="Nothing"), Drawing(lambda: None))
-    assert "part" not in page_text(page)
+    assert "part" not in render_text(page)
     sections = [a["id"] for name, a in read(write_page(page, tmp_path / "page.html")).found if name == "section"]
     assert sections == ["command"]
 
@@ -122,23 +122,23 @@ def test_no_name_becomes_markup(tmp_path: Path) -> None:
 @pytest.mark.parametrize("width", [60, 118])
 def test_lines_of_a_terminal_fit(width: int) -> None:
     table = DataTable(["name", "what it means", "n"], [["a name of some words " * 3, "words " * 30, LENGTH]])
-    lines = page_text(page_of(table, Prose("words " * 50), Bullets(["words " * 50])), width).splitlines()
+    lines = render_text(page_of(table, Prose("words " * 50), Bullets(["words " * 50])), width).splitlines()
     assert max(map(len, lines)) <= width
 
 
 def test_a_terminal_cuts_long_tables_and_leaves_out_empty_columns() -> None:
     table = DataTable(["a", "nothing", "b"], [[f"row {n}", "", LENGTH] for n in range(9)], most_printed=4)
-    lines = page_text(page_of(table)).splitlines()
+    lines = render_text(page_of(table)).splitlines()
     assert lines[-1] == "and 5 more"
     assert "nothing" not in "\n".join(lines)
     narrow = DataTable(["a", "b"], [["row", LENGTH]], intervals_printed=False)
-    assert page_text(page_of(narrow)).splitlines()[-1] == "row  1.20 mm"
+    assert render_text(page_of(narrow)).splitlines()[-1] == "row  1.20 mm"
 
 
 def test_a_row_of_one_cell_is_a_heading_of_rows(tmp_path: Path) -> None:
     table = DataTable(["claim", "verdict"], [["first group"], ["a", Badge("met", "✓")], ["b", ""]], cards=True)
     file = write_page(page_of(table), tmp_path / "page.html")
-    assert page_text(page_of(table)).splitlines()[-5:] == ["claim  verdict", "", "first group", "a      ✓ met", "b"]
+    assert render_text(page_of(table)).splitlines()[-5:] == ["claim  verdict", "", "first group", "a      ✓ met", "b"]
     found = read(file).found
     assert [a.get("data-label") for name, a in found if name == "td"] == ["verdict"] * 2
     assert [a for name, a in found if a.get("colspan") == "2"] == [

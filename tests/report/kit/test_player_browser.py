@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.humanoid24 import BONES, pack
 from harness.mocap.synthetic import generate
-from harness.report.kit.document import document
+from harness.report.kit.document import html_document
 from harness.report.kit.motion_player import (
     NO_ESTIMATE,
     PlayerClip,
@@ -17,7 +17,7 @@ from harness.report.kit.motion_player import (
     PlayerMotion,
     PlayerStations,
     PlayerTrack,
-    motion_player,
+    player_card,
 )
 from harness.score.pair import compute_poses
 
@@ -56,8 +56,8 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         truth = PlayerTrack("truth", motion.joints_m, solved)
         clips.append(PlayerClip(behaviour, behaviour, time_s, 0.0, truth, tracks, stations))
     moment = PlayerMoment("map: worst", 1, "map", 0.5, 0.6)
-    player = motion_player(PlayerMotion(skeleton, clips, [moment]), "bodies")
-    page = document(title="t", kicker="k", heading="h", facts={}, missing=[], sections=[("In 3-D", "look", player)])
+    player = player_card(PlayerMotion(skeleton, clips, [moment]), "bodies")
+    page = html_document(title="t", kicker="k", heading="h", facts={}, missing=[], sections=[("In 3-D", "look", player)])
     path = tmp_path_factory.mktemp("player") / "page.html"
     path.write_text(page, encoding="utf-8")
     return path

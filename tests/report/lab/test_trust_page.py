@@ -9,7 +9,7 @@ import pytest
 from harness.core.number_format import Interval, format_p_value
 from harness.errors import Outcome
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.lab.trust_page import OUTCOME_TITLES, correlations, count_pairs, trust_page, verdict_sentence
 from harness.results.findings.trust_findings import RankCorrelation, TrustFindings
 from tests.report.reading import count_pictures, emptied, numbers_in_order, read, section_ids, text_of
@@ -85,9 +85,9 @@ def test_an_exploratory_study_says_so(tmp_path: Path, trust_findings: TrustFindi
     text = text_of(written(tmp_path, exploratory))
     assert "Exploratory: " in text
     assert text.count("120 another plan ") == 6
-    assert "Exploratory: " in page_text(trust_page(exploratory, COMMAND))
+    assert "Exploratory: " in render_text(trust_page(exploratory, COMMAND))
     unit = replace(trust_findings, unit="unit.toml", unit_digest="ab12" * 16)
-    assert "unit.toml, digest ab12ab12ab12" in page_text(trust_page(unit, COMMAND))
+    assert "unit.toml, digest ab12ab12ab12" in render_text(trust_page(unit, COMMAND))
 
 
 def test_sections_with_charts_and_numbers(page: Path, trust_findings: TrustFindings) -> None:
@@ -156,7 +156,7 @@ def test_the_same_findings_give_the_same_bytes(page: Path, tmp_path: Path, trust
 
 def test_the_terminal_has_the_verdict_first_and_all_numbers(trust_findings: TrustFindings) -> None:
     failed = replace(trust_findings, outcome=Outcome.INCOMPLETE, failures=FAILED)
-    lines = page_text(trust_page(failed, COMMAND)).splitlines()
+    lines = render_text(trust_page(failed, COMMAND)).splitlines()
     assert lines[0] == verdict_sentence(failed)
     assert max(map(len, lines)) <= 118
     for title in ("pairs", "margins", "distance of the errors", "stream health", "captures"):

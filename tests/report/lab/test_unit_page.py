@@ -18,7 +18,7 @@ from harness.measure.reports.unit_report import (
     UnitReport,
 )
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.lab.quantities import find_quantity
 from harness.report.lab.unit_page import advice_text, description, unit_page
 from tests.report.reading import count_pictures, numbers_in_order, section_ids, text_of
@@ -108,7 +108,7 @@ def test_a_report_without_content_makes_a_page(tmp_path: Path, bare: UnitReport)
     page = write_page(unit_page(bare, COMMAND), tmp_path / "unit.html")
     assert section_ids(page) == ["parameters", "command"]
     assert "No expected number could be compared with rig." in text_of(page)
-    text = page_text(unit_page(bare, COMMAND))
+    text = render_text(unit_page(bare, COMMAND))
     assert not any(part in text for part in ("clock and records", "episodes", "how long", "bar", "unit file", "\n- "))
 
 
@@ -118,7 +118,7 @@ def test_the_same_report_gives_the_same_bytes(page: Path, tmp_path: Path, unit_w
 
 
 def test_the_terminal_has_the_answer_first_and_every_number(unit_with_faults: UnitReport) -> None:
-    lines = page_text(unit_page(unit_with_faults, COMMAND)).splitlines()
+    lines = render_text(unit_page(unit_with_faults, COMMAND)).splitlines()
     assert lines[0].startswith("rig departs from the preset default in ")
     assert max(map(len, lines)) <= 118
     parts = [line for before, line in pairwise(lines) if not before]

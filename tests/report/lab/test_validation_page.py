@@ -11,7 +11,7 @@ from harness.core.number_format import Interval, format_fixed
 from harness.errors import ShapeError
 from harness.measure.reports.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
-from harness.report.kit.page_text import page_text
+from harness.report.kit.page_text import render_text
 from harness.report.lab.quantities import find_quantity
 from harness.report.lab.validation_page import (
     largest_of_stretches,
@@ -38,7 +38,7 @@ def page(tmp_path_factory: pytest.TempPathFactory, late_capture: ValidationRepor
 
 
 def printed(report: ValidationReport) -> str:
-    return page_text(validation_page(report, SCORES, COMMAND))
+    return render_text(validation_page(report, SCORES, COMMAND))
 
 
 def test_the_answer_is_the_heading_and_the_departure_follows(page: Path, late_capture: ValidationReport) -> None:
@@ -61,7 +61,7 @@ def test_exchanged_stations_are_named_first(exchanged_capture: ValidationReport,
     answer = validation_answer(exchanged_capture)
     assert f"It shows no departure from the preset default in {len(exchanged_capture.checks)} checks." in answer
     assert text.index(answer) < text.index(first) < text.index(second) < text.index("frames were matched")
-    assert page_text(validation_page(exchanged_capture, {}, COMMAND)).count(f"\n- {first}") == 1
+    assert render_text(validation_page(exchanged_capture, {}, COMMAND)).count(f"\n- {first}") == 1
 
 
 def test_every_section_has_its_numbers_and_their_intervals(page: Path, late_capture: ValidationReport) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from harness.report.kit.page_html import page_html
+from harness.report.kit.page_html import render_html
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.placement.wording import (
     changes_sentence,
@@ -101,8 +101,8 @@ def test_too_few_clips_are_said_before_anything_else() -> None:
 
 def test_the_text_and_the_page_keep_what_was_announced(findings: PlacementFindings) -> None:
     assert power_sentences(POWER)[0] in " ".join(placement_text(findings).split())
-    assert power_sentences(POWER)[1] in page_html(placement_page(findings), with_charts=False)
-    assert "<dt>Clips</dt>" not in page_html(placement_page(replace(findings, power=None)), with_charts=False)
+    assert power_sentences(POWER)[1] in render_html(placement_page(findings), with_charts=False)
+    assert "<dt>Clips</dt>" not in render_html(placement_page(replace(findings, power=None)), with_charts=False)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_sets_have_a_rank_under_each_condition(findings: PlacementFindings) -> N
     assert ranks_by_condition(replace(few, conditions=()), 9) == []
     rows = [line.split() for line in placement_text(few).splitlines() if line.startswith("sternum  ")]
     assert ["sternum", "3", "not", "measured", "3"] in rows
-    assert 'aria-label="ranks"' in page_html(placement_page(few), with_charts=False)
+    assert 'aria-label="ranks"' in render_html(placement_page(few), with_charts=False)
 
 
 def test_changes_of_order_are_counted_and_the_first_is_named(findings: PlacementFindings) -> None:
@@ -139,7 +139,7 @@ def test_changes_of_order_are_counted_and_the_first_is_named(findings: Placement
     own = replace(pair, a=findings.conditions[0].name)
     assert said in " ".join(placement_text(replace(findings, agreements=(own,))).split())
     assert "are on the page alone: 1." in placement_text(replace(findings, agreements=(own, pair)))
-    assert said in page_html(placement_page(replace(findings, agreements=(pair,))), with_charts=False)
+    assert said in render_html(placement_page(replace(findings, agreements=(pair,))), with_charts=False)
     untested = replace(pair, changes=1, changed=(replace(change, significant=None),))
     assert changes_sentence(findings, untested).startswith(
         "1 of 10 pairs changes its order (too few units or too many sets to test): first"

@@ -3,7 +3,7 @@
 import re
 
 from harness.report.kit.page import Page, Section
-from harness.report.kit.page_html import page_html, page_table
+from harness.report.kit.page_html import render_html, page_table
 from harness.report.kit.page_text import join_blocks, table_lines
 from harness.report.run.expectations import expected_orders, recovery_table
 
@@ -54,7 +54,7 @@ def test_each_order_is_a_table_with_a_row_for_each_setting() -> None:
 def test_the_page_says_the_same_and_keeps_text_text() -> None:
     hostile = ORDER | {"source": "<b>", "holds": None, "means_deg": None, "why": ["a & b"]}
     blocks = expected_orders({"expected_orders": [*ORDERS, hostile]})
-    page = page_html(Page("report", "", "", {}, [Section("Orders", "orders", blocks)]))
+    page = render_html(Page("report", "", "", {}, [Section("Orders", "orders", blocks)]))
     assert page.count("<table") == 3
     assert page.count(">does not hold<") == 2
     assert page.count("<li>Where old &gt; ik: because</li>") == 1

@@ -16,7 +16,7 @@ from harness.compare.paired_statistics import mean_interval
 from harness.compare.units import Sampling
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.page_html import page_html, page_table
+from harness.report.kit.page_html import render_html, page_table
 from harness.report.sweep.charts import (
     MAX_SERIES,
     _dot_chart_height_in,
@@ -270,7 +270,7 @@ def test_hostile_names_stay_text() -> None:
         for value in (key, '"b"')
     ]
     sweep = collect_cells(iter(rows), name=HOSTILE, planned=3, failures={HOSTILE: HOSTILE})
-    raw = page_html(sweep_page(sweep))
+    raw = render_html(sweep_page(sweep))
     assert "<script>alert" not in raw
     assert raw.count("&lt;script&gt;alert(1)&lt;/script&gt;") > 5
     assert not re.search(r"(?:src|href)=\"(?!data:|#)", raw)
@@ -317,7 +317,7 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 
     failures = {f"cell {n}": "ValueError: the same" for n in range(1_000)}
     few, many = (
-        page_html(
+        render_html(
             sweep_page(collect_cells(cells(count), name="x", planned=count + 1_000, failures=failures)),
             with_charts=False,
         )

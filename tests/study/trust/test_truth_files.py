@@ -13,7 +13,7 @@ from harness.core.arrays import Bools, Floats
 from harness.errors import BadFile, BadInput
 from harness.measure.pose_series import TruthPoses
 from harness.mocap.read.c3d import MarkerClip
-from harness.mocap.write.export import export
+from harness.mocap.write.export import export_motion
 from harness.score.pair import compute_poses
 from harness.stream.frame import TrackerFrame
 from harness.stream.station_counts import FRAME_COLUMNS, format_csv_row, frame_rows
@@ -110,7 +110,7 @@ def test_markers_that_fix_no_pose_are_refused(clip: MarkerClip, words: str) -> N
 
 def test_an_exported_tum_trajectory_is_read_back(rng: np.random.Generator, tmp_path: Path) -> None:
     cell = Written(arbitrary_motion(rng), arbitrary_motion(rng))
-    for file in export([cell], "tum", tmp_path):
+    for file in export_motion([cell], "tum", tmp_path):
         if ".estimate." in file.name:
             file.unlink()
     truth = read_truth_file(tmp_path, ["head", "lhand"])

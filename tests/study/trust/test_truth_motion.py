@@ -12,7 +12,7 @@ from harness.errors import BadFile, BadInput
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.measure.pose_series import MeasuredPoses, TruthSpline
-from harness.measure.registration import register
+from harness.measure.registration import register_poses
 from harness.mocap import synthetic
 from harness.simulate.loop import loop_motion, simulate_loop
 from harness.simulate.noise import Noise
@@ -92,7 +92,7 @@ def test_loops_of_a_capture_are_told_from_their_neighbours(playback: Playback, f
     ends = [(poses.measured_s[0], poses.measured_s[-1]) for poses in stations.values()]
     device_s = min(end[0] for end in ends), max(end[1] for end in ends)
     truth = truth_of_playback(playback, host_clock=False, device_s=device_s)
-    found = register(stations, truth.bodies, pairs=truth.body_of)
+    found = register_poses(stations, truth.bodies, pairs=truth.body_of)
     drift_s = 2e-5 * found.reference_s
     assert found.values["time_offset_orientation_s"].value == pytest.approx(drift_s, abs=1e-4)
     assert found.matched > 0.97

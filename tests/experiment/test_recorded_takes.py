@@ -13,7 +13,7 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment.evaluation import Evaluation, check_methods, evaluate_each
 from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.recorded_take import find_playback, frame_numbers, recorded_take
+from harness.experiment.recorded_takes import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenarios.scenario_reader import find_scenario
 from harness.stream.is900.codec import commands
 from harness.stream.is900.codec.reader import WireFormat
