@@ -237,7 +237,6 @@ def test_a_full_disk_ends_a_recording_and_keeps_what_came_before(tmp_path: Path)
 def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
-    from harness.compare import baseline
 
     planted_run(tmp_path / "run", PLAN)
     monkeypatch.chdir(tmp_path)
@@ -245,7 +244,7 @@ def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
     folder = tmp_path / "results" / "baselines"
     before = {path.name: path.read_bytes() for path in (folder / "one").iterdir()}
 
-    monkeypatch.setattr(baseline, "move_into_place", failing(OSError(28, "No space left on device")))
+    monkeypatch.setattr("harness.compare.baseline.move_into_place", failing(OSError(28, "No space left on device")))
     assert "Free some disk space" in command("baseline", "save", "one", "run", "--force", code=5).err
     assert {path.name: path.read_bytes() for path in (folder / "one").iterdir()} == before
     assert [path.name for path in folder.iterdir()] == ["one"]

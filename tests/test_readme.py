@@ -15,7 +15,7 @@ from harness.cli import build_parser, main
 from harness.commands.catalogue import build_catalogue
 from harness.core.options import expand_alternatives
 from harness.errors import Outcome
-from harness.experiment import engine
+from harness.experiment.engine import run as run_scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.reconstruct import registry
 from harness.report.run.text import run_table
@@ -108,7 +108,7 @@ def test_every_block_of_the_page_on_own_methods_runs(tmp_path: Path, monkeypatch
     monkeypatch.syspath_prepend(str(tmp_path))
     hinges = [
         np.array([estimate.qpos[7:] for estimate in case.run(case.frames)])
-        for case in (make_case(registry.find_method(name)) for name in ("ridge", "steady:Steady"))
+        for case in (make_case(registry.make_method(name)) for name in ("ridge", "steady:Steady"))
     ]
     np.testing.assert_array_equal(hinges[1][0], hinges[0][0])
     np.testing.assert_allclose(hinges[1][1], 0.5 * (hinges[0][0] + hinges[0][1]), atol=1e-12)
@@ -148,7 +148,7 @@ def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, mo
     (info / "entry_points.txt").write_text("\n".join(lines))
     assert "upright" not in registry.list_methods()
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert registry.find_method("upright+ik").name == "upright+ik"
+    assert registry.make_method("upright+ik").name == "upright+ik"
     assert "upright" in build_catalogue()["methods"]
     monkeypatch.chdir(short_demo(tmp_path / "demo").parent)
     out = tmp_path / "run"
@@ -158,9 +158,9 @@ def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, mo
 
 def test_documented_options_are_those_of_the_method() -> None:
     (named,) = re.findall(r"`--methods '([^']*)'`", OWN_METHOD)
-    assert registry.find_method(named).name == named
+    assert registry.make_method(named).name == named
     for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", OWN_METHOD):
-        assert [registry.find_method(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
+        assert [registry.make_method(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, behaviour: str) -
     shown = RESULTS.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
     clips = tuple(clip for clip in DEMO.motion.test if clip.startswith(behaviour))
     alone = replace(DEMO, motion=replace(DEMO.motion, test=clips, behaviours=(behaviour,)))
-    assert engine.run(alone, tmp_path / "demo") is Outcome.PASS
+    assert run_scenario(alone, tmp_path / "demo") is Outcome.PASS
     made = run_table(read_summary(tmp_path / "demo"))
     rows, again = ([line.split() for line in text.splitlines() if "/" in line] for text in (shown, made))
     assert len(rows) == 1 + len(DEMO.methods) * len(set(DEMO.motion.behaviours))  # the title first

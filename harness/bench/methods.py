@@ -103,7 +103,7 @@ def _build_database(folder: Path, frames: int, seed: int) -> MotionDatabase:
 
 def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkStatement]) -> list[BenchmarkStatement]:
     """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
-    name, options = speed.method, config_hash(registry.find_method(speed.method))
+    name, options = speed.method, config_hash(registry.make_method(speed.method))
     target, to_ik, to_mink = MIN_SPEED_RATIO.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
     more: dict[str, str | float] = {
         "method": name,
@@ -134,7 +134,7 @@ def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> 
 
     The tables of `expert_map` are counted apart.
     """
-    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.find_method(name)))
+    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.make_method(name)))
     tables = _table_bytes(name, frames)
     used = peak_bytes - baseline_bytes - tables
     text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
@@ -202,7 +202,7 @@ def query_dimension(method: Method) -> int:
 
 def _table_bytes(name: str, frames: int) -> int:
     """Size of the moment tables of `expert_map` for a database of so many frames; 0 for other methods."""
-    if not isinstance(registry.find_method(name), ExpertMap):
+    if not isinstance(registry.make_method(name), ExpertMap):
         return 0
     sizes = [size + POSTURE_SIZE for size in (FEATURES, HISTORY_AXES)]
     return sum(4 * cells_for(frames) * (size + size * (size + 1) // 2) for size in sizes)

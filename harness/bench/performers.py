@@ -238,7 +238,7 @@ def _new_to_known(source: MotionSource, takes: dict[str, list[str]], behaviour: 
             scenario = replace(load_clean_scenario(), motion=motion, methods=(METHOD,), seed=seed, vary={})
             (cell,) = ClipTask(scenario, ClipPart.parse(motion.test[0]), behaviour, None, "").cells()
             evaluation = ClipEvaluation(scenario, source, cell.part, behaviour)
-            found = evaluate_cell(evaluation, registry.find_method(METHOD), cell, "", "")
+            found = evaluate_cell(evaluation, registry.make_method(METHOD), cell, "", "")
             errors.append(float(found.scores.metrics["joint_angle_mean_deg"] or np.nan))
         logs.append(np.log(errors[0] / errors[1]))
     return np.array(logs)

@@ -113,7 +113,7 @@ def _small_scenario(cells: int) -> Scenario:
 def _time_scoring(scenario: Scenario) -> Floats:
     """Time to evaluate all cells but the first, which also makes what they share; as in `_time_call`."""
     task = ClipTask(scenario, ClipPart.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
-    method, evaluation, start = registry.find_method(scenario.methods[0]), None, process_times()
+    method, evaluation, start = registry.make_method(scenario.methods[0]), None, process_times()
     for index, cell in enumerate(task.cells()):
         if evaluation is None:
             source = open_scenario_motion(cell.scenario.motion, None, scenario.seed)

@@ -53,7 +53,7 @@ def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
 
 def _describe_method(name: str) -> str:
     """What it does, what it needs, and where it comes from."""
-    method = registry.find_method(name)
+    method = registry.make_method(name)
     examples = "examples" if method.needs_examples else "no examples"
     note = training_note(declared_training_data(method))
     said = [method.summary, f"needs {examples}, takes any inputs", note, registry.method_origin(name)]

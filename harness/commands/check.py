@@ -31,7 +31,7 @@ def run_check(args: argparse.Namespace) -> Outcome:
     found: dict[str, list[RuleResult]] = {}
     with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         names = args.methods or sorted(registry.list_methods())
-        inside = {name: registry.find_method(name) for name in names if registry.is_built_in(name)}
+        inside = {name: registry.make_method(name) for name in names if registry.is_built_in(name)}
         for name in names:
             found[name] = []
             for finding in check_rules(inside[name]) if name in inside else check_rules_apart(name):

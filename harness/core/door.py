@@ -12,7 +12,8 @@ from typing import Any
 def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """`__getattr__` and `__dir__` of a package, for the names that its `if TYPE_CHECKING` block imports.
 
-    Type checkers read the block as it stands, and the program reads its source. A name is imported when it is used.
+    Type checkers read the block as it stands, and the program reads its source. A name is looked up at each
+    use, so that it is always what its module has.
     """
 
     def load_name(name: str) -> Any:
@@ -20,9 +21,7 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
         if place is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module, attribute = place
-        value = getattr(import_module(module), attribute)
-        setattr(sys.modules[package], name, value)
-        return value
+        return getattr(import_module(module), attribute)
 
     return load_name, lambda: sorted({*vars(sys.modules[package]), *door_names(package)})
 

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body import humanoid
+from harness.body.humanoid import tpose
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Status
@@ -68,15 +68,15 @@ class UnityPose:
 
     def __init__(self, skeleton: Skeleton) -> None:
         self.names = (HIPS, *UNITY_BONES)
-        rest = forward_kinematics(skeleton, *(part[None] for part in humanoid24.unpack(humanoid.tpose(skeleton))))
+        rest = forward_kinematics(skeleton, *(part[None] for part in humanoid24.unpack(tpose(skeleton))))
         bones = [skeleton.index(bone) for bone, _ in UNITY_BONES.values()]
         start_m = np.concatenate([rest.start_m[0, :1], rest.start_m[0, bones]])
         self._neck, self._head = self.names.index("Neck"), self.names.index("Head")
         self._upper_neck = skeleton.index("upperneck")
         self._bones = np.array(bones, dtype=np.int64)
         self._parents: Ints = np.array([self.names.index(p) for _, p in UNITY_BONES.values()], dtype=np.int64)
-        tpose = rotations.from_matrix(np.swapaxes(rest.world_from_bone[0], -1, -2))
-        self._bone_from_tpose, self._upper_neck_from_tpose = tpose[bones], tpose[self._upper_neck]
+        tpose_from_world = rotations.from_matrix(np.swapaxes(rest.world_from_bone[0], -1, -2))
+        self._bone_from_tpose, self._upper_neck_from_tpose = tpose_from_world[bones], tpose_from_world[self._upper_neck]
         self._offset_m = start_m[1:] - start_m[self._parents]
 
     def local(self, pose: LivePose) -> Floats:

@@ -71,7 +71,9 @@ def motion_format(path: Path) -> str:
     if kind == "asf":
         raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC file of it.")
     if kind not in CLIP_FORMATS:
-        raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in CLIP_FORMATS), "Rename it?")
+        raise BadFile(
+            path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in CLIP_FORMATS), "Rename it?"
+        )
     return kind
 
 

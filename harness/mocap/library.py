@@ -17,7 +17,7 @@ from pathlib import Path
 
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput, UnknownName, shorten
-from harness.mocap.clip_file import CMU_NAME, CLIP_FORMATS, clip_name, read_library_file
+from harness.mocap.clip_file import CLIP_FORMATS, CMU_NAME, clip_name, read_library_file
 from harness.mocap.index import INDEX_NAME, index_key, read_index, scan_folder
 
 LibraryFolders = Path | str | Sequence[Path | str]

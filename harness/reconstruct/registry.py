@@ -89,10 +89,10 @@ _ORIGINS = {
 
 def method_origin(name: str) -> str:
     """Source of a method: its optional attribute `source`, else that of the built-in method that it presets."""
-    return str(getattr(find_method(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
+    return str(getattr(make_method(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
 
 
-def find_method(name: str) -> Method:
+def make_method(name: str) -> Method:
     """The method of a name with options, such as `local_pca[neighbours=100]+ik`; UnknownName, RenamedKey, BadInput."""
     base, *suffixes = split_outside_brackets(name, "+")
     plain, options = parse_name(base)
@@ -178,7 +178,7 @@ def _base_method(name: str) -> Method:
 
 def summary(name: str) -> str:
     """Description of a method in one line."""
-    return find_method(name).summary
+    return make_method(name).summary
 
 
 def _module_exists(module: str) -> bool:

@@ -25,10 +25,12 @@ _FRAMES = 8
 
 def compile_all(progress: ProgressCallback = lambda name, done, planned: None) -> None:
     """Run every registered method on a few frames; HarnessError when an estimate is not finite."""
-    names = [name for name in (*registry.list_methods(), "ik[align=true]") if ":" not in name]  # a preset is the same code
+    names = [
+        name for name in (*registry.list_methods(), "ik[align=true]") if ":" not in name
+    ]  # a preset is the same code
     for done, name in enumerate(names):
         progress(name, done, len(names) + 1)
-        case = make_case(registry.find_method(name))
+        case = make_case(registry.make_method(name))
         frames: list[TrackerFrame] = list(case.frames[:_FRAMES])
         for readings in (frames, [keep_positions(frame) for frame in frames]):
             estimates = run_session(case.reconstructor.begin(case.calibration), readings)

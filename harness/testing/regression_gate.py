@@ -17,7 +17,7 @@ from harness.core.files import content_key
 from harness.core.progress import ProgressCallback
 from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment import engine
+from harness.experiment.engine import run as run_scenario
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.comparison.page import comparison_text
@@ -77,7 +77,7 @@ class RegressionGate:
 
         `against` is the method of the baseline to compare with: by default the one of the same name, or the only one.
         BadInput when the baseline does not exist or has several other methods; UnknownName for unknown methods and
-        metrics; also raises what `engine.run` raises.
+        metrics; also raises what `harness.run` raises.
         """
         reference = self._read(name)
         methods = list(dict.fromkeys(cell.method for cell in reference.cells))
@@ -130,7 +130,7 @@ class RegressionGate:
     def _run(self, scenario: Scenario) -> Path:
         out = self.out / f"{scenario.name}-{content_key(repr(scenario))[:12]}"
         with _single_threaded():
-            engine.run(scenario, out, jobs=2, command=self.command, progress=self.progress)
+            run_scenario(scenario, out, jobs=2, command=self.command, progress=self.progress)
         return out
 
 

@@ -15,8 +15,8 @@ from harness.report.kit.motion_player import (
     PlayerClip,
     PlayerMotion,
     describe_body,
-    player_card,
     pack_clip,
+    player_card,
     player_element,
     player_script,
 )

@@ -72,8 +72,8 @@ def test_learning_is_timed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_options_change_the_hash() -> None:
-    plain, other = (registry.find_method(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
-    assert methods.config_hash(plain) == methods.config_hash(registry.find_method("ik")) != methods.config_hash(other)
+    plain, other = (registry.make_method(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
+    assert methods.config_hash(plain) == methods.config_hash(registry.make_method("ik")) != methods.config_hash(other)
 
 
 def test_memory_is_that_of_the_process_alone(folder: Path) -> None:

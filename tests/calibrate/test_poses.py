@@ -8,7 +8,7 @@ from harness.body import ground
 from harness.body.anatomy import sole_points_m
 from harness.body.humanoid import build_body
 from harness.body.kinematics import pose_from_qpos as forward
-from harness.calibrate.poses import POSES, CalibrationPose, pose_configuration, pose_angles_rad
+from harness.calibrate.poses import POSES, CalibrationPose, pose_angles_rad, pose_configuration
 from harness.core.humanoid24 import limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
 from tests.calibrate.standing_model import somebody

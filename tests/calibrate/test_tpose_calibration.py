@@ -357,7 +357,7 @@ def test_a_method_reaches_nearly_as_far_as_with_the_truth(noise: str) -> None:
     frames, truth = session.seen(take.qpos)
     off_m = []
     for calibration in (truth, found):
-        walker = registry.find_method("ik:previous").fit(body, [], np.random.default_rng(1)).begin(calibration)
+        walker = registry.make_method("ik:previous").fit(body, [], np.random.default_rng(1)).begin(calibration)
         poses = np.array([walker.step(frame).qpos for frame in frames])
         apart_m = joint_centres_m(body.skeleton, poses) - joint_centres_m(body.skeleton, take.qpos[: len(poses)])
         off_m.append(float(np.linalg.norm(apart_m, axis=2).mean()))

@@ -31,7 +31,7 @@ from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
-PREVIOUS = registry.find_method("ik:previous")
+PREVIOUS = registry.make_method("ik:previous")
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 
@@ -166,7 +166,7 @@ def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_live_session_begins_with_eight_poses(model: Playback, monkeypatch: pytest.MonkeyPatch) -> None:
     witness = Witness()
-    monkeypatch.setattr(registry, "resolve", lambda name: witness)
+    monkeypatch.setattr("harness.experiment.methods.remote_method.make_method", lambda name: witness)
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         what = ["--scenario", "demo", "--clip", CLIP, "--calibration", "poses", "--seconds", "1"]
         assert main(["live", "--port", device.name, *what]) == 0
@@ -223,7 +223,7 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     kept, reordered, table = read_calibration(calibrated), tmp_path / "other.toml", tmp_path / "poses.csv"
     write_calibration(reordered, kept.select(STATIONS[::-1]))
     witness = Witness()
-    monkeypatch.setattr(registry, "resolve", lambda name: witness)
+    monkeypatch.setattr("harness.experiment.methods.remote_method.make_method", lambda name: witness)
     rehearsal = prepare_playback("demo", clip=CLIP, stations=4)
     what = ["--scenario", "demo", "--clip", CLIP, "--calibration", str(reordered), "--poses", str(table)]
     with serve_emulator(rehearsal.samples, tcp="127.0.0.1:0") as device:

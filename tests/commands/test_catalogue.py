@@ -34,10 +34,10 @@ def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
 
 
 def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    entry = EntryPoint("theirs", "tests.commands.test_catalogue:Theirs", registry.GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
+    entry = EntryPoint("theirs", "tests.commands.test_catalogue:Theirs", "harness.methods")
+    monkeypatch.setattr("harness.reconstruct.registry.entry_points", lambda group: [entry])
     assert build_catalogue()["methods"]["theirs"].endswith("takes any inputs; Somebody 2031")
-    entry = EntryPoint("theirs", "tests.commands.test_catalogue:Undeclared", registry.GROUP)
+    entry = EntryPoint("theirs", "tests.commands.test_catalogue:Undeclared", "harness.methods")
     assert build_catalogue()["methods"]["theirs"].endswith("takes any inputs; training data unknown")
 
 

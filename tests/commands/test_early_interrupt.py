@@ -9,9 +9,7 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.commands.output import progress_note, recording_note
-from harness.experiment import playback
 from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording import command_recording, line_server, recorder, recording
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.command import Command
@@ -25,7 +23,7 @@ def interrupt(*_: object, **__: object) -> NoReturn:
 def test_a_simulated_recording_that_is_stopped_before_it_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
-    monkeypatch.setattr(playback, "prepare_playback", interrupt)
+    monkeypatch.setattr("harness.experiment.playback.prepare_playback", interrupt)
     path = tmp_path / "a.rec"
     said = command("record", "sim:demo", path, code=130)
     assert said.lines[-1] == "interrupted"
@@ -46,7 +44,7 @@ def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_
     if existing:
         record_capture(path, FOUR, capture, {})
     before = path.read_bytes() if existing else None
-    monkeypatch.setattr(recording, "_CHUNKS_PER_WRITE", 100)
+    monkeypatch.setattr("harness.stream.recording.recording._CHUNKS_PER_WRITE", 100)
     original, seen = RecordingWriter.on_simulated, list[int]()
 
     def stop_after(writer: RecordingWriter, chunks: Any) -> None:
@@ -66,17 +64,17 @@ def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "options"),
+    ("name", "options"),
     [
-        (recorder, "open_tracker", []),
-        (command_recording, "detect_device", ["--send", "S"]),
-        (line_server, "detect_device", ["--serve", "LINK"]),
+        ("recorder.open_tracker", []),
+        ("command_recording.detect_device", ["--send", "S"]),
+        ("line_server.detect_device", ["--serve", "LINK"]),
     ],
 )
 def test_a_recording_of_a_device_that_is_stopped_before_the_device_was_set_up(
-    module: Any, name: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    name: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     command: Command) -> None:  # fmt: skip
-    monkeypatch.setattr(module, name, interrupt)
+    monkeypatch.setattr(f"harness.stream.recording.{name}", interrupt)
     path = tmp_path / "a.rec"
     words = [str(tmp_path / "link") if word == "LINK" else word for word in options]
     assert command("record", "tcp://127.0.0.1:9", path, *words, code=130).lines[-1] == "interrupted"
@@ -106,7 +104,7 @@ def test_a_recording_is_good_from_its_first_record_on(
     def opened(port: str, config: object, *, observer: RecordingWriter, on_event: object) -> Iterator[_Device]:
         yield _Device(observer, records)
 
-    monkeypatch.setattr(recorder, "open_tracker", opened)
+    monkeypatch.setattr("harness.stream.recording.recorder.open_tracker", opened)
     said = command("record", "tcp://127.0.0.1:9", tmp_path / "a.rec", code=code)
     assert said.lines[-1] == ("pass" if records else "interrupted")
 
@@ -117,7 +115,7 @@ def test_a_recording_is_good_from_its_first_record_on(
 def test_emulate_and_live_that_are_stopped_while_they_prepare(
     words: list[str], monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
-    monkeypatch.setattr(playback, "prepare_playback", interrupt)
+    monkeypatch.setattr("harness.experiment.playback.prepare_playback", interrupt)
     said = command(*words, code=130)
     assert said.lines[-1] == "interrupted"
     assert "resumes" not in said.err

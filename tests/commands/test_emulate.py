@@ -18,7 +18,6 @@ from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator import server
 from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.faults import FaultKind
 from tests.command import Command
@@ -59,7 +58,7 @@ def test_runs_know_nothing_of_faults() -> None:
 
     def inputs(of: Scenario) -> dict[str, object]:
         evaluation = ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking")
-        return evaluation.conditions_of(registry.find_method("ik:previous"), "pos+ori")
+        return evaluation.conditions_of(registry.make_method("ik:previous"), "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))
@@ -94,7 +93,7 @@ def test_stations_have_the_numbers_that_are_asked_for(monkeypatch: pytest.Monkey
         played.append((samples.stations, config))
         return {}
 
-    monkeypatch.setattr(server, "play_samples", play)
+    monkeypatch.setattr("harness.stream.is900.emulator.server.play_samples", play)
     words = ["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--stylus-bytes", "2"]
     talk = command(*words, "--stations", "head=9,left_hand=2").err
     assert "stations 2 left_hand, 9 head\n" in talk

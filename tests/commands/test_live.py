@@ -84,7 +84,7 @@ def test_ctrl_c_before_the_first_pose_is_an_interrupt(tmp_path: Path, played: Pl
 def _same_as_a_run(played: Playback, rows: list[dict[str, str]]) -> None:
     """Poses of the first lap are those of a run over the simulation."""
     frames = played.simulation.frames
-    session = played.clip_evaluation.fit_method(registry.find_method("ik"), "ik").begin(played.calibration)
+    session = played.clip_evaluation.fit_method(registry.make_method("ik"), "ik").begin(played.calibration)
     stations = list(played.scenario.stations)
     for frame, row in zip(frames[: played.samples.take_frames], rows, strict=False):
         estimate = session.step(frame)

@@ -121,7 +121,7 @@ def test_ordinary_words_are_accepted() -> None:
     assert not Label().accepts(" head")
 
 
-METHODS = {type(registry.find_method(name)) for name in (*registry.list_methods(), "mean_pose+ik")}
+METHODS = {type(registry.make_method(name)) for name in (*registry.list_methods(), "mean_pose+ik")}
 ENDLESS = {"jump_m", "to_s"}
 """Fields that may be as large as you like; `inf` switches the outlier gate off, or lasts to the end."""
 NOT_CHOSEN = {"schema"}

@@ -20,10 +20,10 @@ from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.mean_pose import MeanPose
-from harness.simulate import noise
 from harness.simulate.components.stationary import WhiteNoise
+from harness.simulate.noise import Noise, noise_preset
 
-PREVIOUS = registry.find_method("ik:previous")
+PREVIOUS = registry.make_method("ik:previous")
 
 SCENARIO = Scenario(
     name="small",
@@ -134,8 +134,11 @@ def test_what_a_scenario_changes_is_named(changed: Scenario, key: str) -> None:
 
 def test_a_level_that_the_code_redefines_is_another_input(monkeypatch: pytest.MonkeyPatch) -> None:
     before = inputs()
-    level: Callable[[str], noise.Noise] = noise.noise_preset
-    monkeypatch.setattr(noise, "noise_preset", lambda name: replace(level(name), white=WhiteNoise(position_m=0.001)))
+
+    def redefined(name: str) -> Noise:
+        return replace(noise_preset(name), white=WhiteNoise(position_m=0.001))
+
+    monkeypatch.setattr("harness.experiment.scenarios.scenario.noise_preset", redefined)
     assert inputs()["components"] != before["components"]
     assert {k for k, v in inputs().items() if v != before[k]} == {"components"}
 
@@ -157,7 +160,7 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02",), body="common", longest_s=1.5)
     scenario = replace(SCENARIO, motion=motion)
     elsewhere = replace(scenario, stations={"torso": Station("thorax", 0.6, 30.0), "knee": Station("ltibia", 0.1)})
-    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.find_method("dynamic_map")
+    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.make_method("dynamic_map")
     first = ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking")
     results = [_estimated(first, method)]
     shared = first.with_conditions(elsewhere)

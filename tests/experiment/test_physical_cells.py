@@ -41,7 +41,7 @@ def evaluation(scenario: Scenario) -> ClipEvaluation:
 
 
 def conditions(scenario: Scenario) -> dict[str, Any]:
-    return evaluation(scenario).conditions_of(registry.find_method("ik:previous"), "pos+ori")
+    return evaluation(scenario).conditions_of(registry.make_method("ik:previous"), "pos+ori")
 
 
 def test_without_physics_conditions_do_not_name_it() -> None:
@@ -82,9 +82,9 @@ def test_a_station_that_hears_too_little_is_noted(tmp_path: Path) -> None:
     """Emitters that reach 1.6 m: none is heard at the ankles."""
     deaf = replace(PHYSICAL, physics=Physics(ConstellationSettings(range_m=1.6)), methods=("ik:previous",))
     made = evaluation(deaf)
-    note = next(text for text in made.notes(registry.find_method("ik:previous")) if "hears" in text)
+    note = next(text for text in made.notes(registry.make_method("ik:previous")) if "hears" in text)
     assert note.startswith("left_ankle hears three emitters for 0 % of the time, right_ankle for 0 %")
-    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.find_method("ik:previous")))
+    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.make_method("ik:previous")))
     engine.run(deaf, tmp_path / "out")
     assert f"TOO FEW EMITTERS IN boxing_p1_01: {note}" in run_table(read_summary(tmp_path / "out"))
 

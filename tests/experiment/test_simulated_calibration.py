@@ -38,7 +38,7 @@ from harness.simulate.simulation import Simulation, exact_calibration, simulate_
 from harness.stream.frame import TrackerFrame
 from tests.joint_centres import joint_centres_m
 
-PREVIOUS = registry.find_method("ik:previous")
+PREVIOUS = registry.make_method("ik:previous")
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(

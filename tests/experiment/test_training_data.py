@@ -41,7 +41,7 @@ NOTES = {"theirs:Silent": "training data unknown", "theirs:Corpus": "trained on 
 
 @pytest.mark.parametrize("name", [*registry.list_methods(), "ik+ik", "ik:previous+ik", "mean_pose+ik"])
 def test_every_shipped_method_declares_what_it_learns_from(name: str) -> None:
-    method = registry.find_method(name)
+    method = registry.make_method(name)
     assert method.training_data == ("examples" if method.needs_examples else "none")  # type: ignore[attr-defined]
 
 

@@ -129,7 +129,7 @@ def _read_library(folder: Path) -> object:
 
 def _plan(scenario: Scenario) -> object:
     for method in scenario.methods:
-        registry.find_method(method)
+        registry.make_method(method)
     return cell_names(scenario), content_key(to_json_types(scenario.vary))
 
 
@@ -154,7 +154,7 @@ def _read_placement(folder: Path) -> object:
 def _read_options(folder: Path) -> object:
     text = (folder / "x.txt").read_bytes().decode("utf-8", "replace")[:2000]
     names = (name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part))
-    return [(registry.find_method(name), registry.without_options(name)) for name in names]
+    return [(registry.make_method(name), registry.without_options(name)) for name in names]
 
 
 def _copy_shipped(name: str) -> Callable[[Path], object]:

@@ -233,7 +233,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     run_session(
         Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
         worn.body,
-        worn.clip_evaluation.fit_method(registry.find_method("ik:previous"), "ik:previous"),
+        worn.clip_evaluation.fit_method(registry.make_method("ik:previous"), "ik:previous"),
         TPoseCalibrator(worn.body, worn.scenario.nominal_mounts),
         [output],
         LiveOptions(40.0, queue_frames=999, host_timestamps=False),
@@ -249,7 +249,7 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     from harness.reconstruct import registry
 
     boxing = worn.simulation.frames[:60]
-    reconstructor = worn.clip_evaluation.fit_method(registry.find_method("ik"), "ik")
+    reconstructor = worn.clip_evaluation.fit_method(registry.make_method("ik"), "ik")
     warm_up(reconstructor, worn.calibration, boxing[:3])
     session = reconstructor.begin(worn.calibration)
     offline = [session.step(frame) for frame in boxing]

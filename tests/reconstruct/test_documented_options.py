@@ -76,7 +76,7 @@ def leaves(options: object, prefix: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize(("method", "option"), documented())
 def test_a_default_is_the_documented_one(method: str, option: str) -> None:
-    found = attrgetter(option)(registry.find_method(method))
+    found = attrgetter(option)(registry.make_method(method))
     assert found == pytest.approx(documented()[method, option])
 
 
@@ -94,7 +94,7 @@ def test_the_tables_are_read() -> None:
 def test_every_option_of_dynamic_map_is_documented_or_shared() -> None:
     """Options that the tables leave out are those of the parts that all methods share, and of the features."""
     told = {option for method, option in documented() if method in ("dynamic_map", "ik")}
-    left = set(leaves(registry.find_method("dynamic_map"))) - told
+    left = set(leaves(registry.make_method("dynamic_map"))) - told
     assert left == {
         *("name", "summary", "index", "jump_m"),
         *(f"regression.{name}" for name in ("window_weight", "lever_m", "directions", "ridge")),
@@ -104,7 +104,7 @@ def test_every_option_of_dynamic_map_is_documented_or_shared() -> None:
 @pytest.mark.parametrize("name", ["ik", "local_pca", "dynamic_map", "dynamic_map:window", "dynamic_map:literal"])
 def test_loss_and_stopping_are_shared(name: str) -> None:
     """Options of the table of common parts hold for every method whose own table or text has no other."""
-    method, own = registry.find_method(name), {option for key, option in documented() if key == name}
+    method, own = registry.make_method(name), {option for key, option in documented() if key == name}
     for (key, option), value in documented().items():
         exempt = option in own or (name == "dynamic_map:literal" and option.startswith("loss."))
         if key == "ik" and option.partition(".")[0] in ("loss", "stopping") and not exempt:
@@ -122,7 +122,7 @@ GATES_M = {
 
 @pytest.mark.parametrize("name", GATES_M)
 def test_the_outlier_gate_is_as_wide_as_documented(name: str) -> None:
-    assert attrgetter("jump_m")(registry.find_method(name)) == GATES_M[name]
+    assert attrgetter("jump_m")(registry.make_method(name)) == GATES_M[name]
 
 
 PRESETS: dict[str, dict[str, float | bool | str]] = {
@@ -155,5 +155,5 @@ PRESETS: dict[str, dict[str, float | bool | str]] = {
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_variant_is_what_its_text_says(name: str) -> None:
-    method = registry.find_method(name)
+    method = registry.make_method(name)
     assert {option: attrgetter(option)(method) for option in PRESETS[name]} == pytest.approx(PRESETS[name])

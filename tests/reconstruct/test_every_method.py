@@ -33,7 +33,7 @@ ALSO = ("mean_pose+ik", "best_match+ik")
 COSTLY = ("dynamic_map:literal", "kernel_cca:literal", "weighted_blend:literal", "best_match+ik")
 """Methods whose contract takes half a minute each; they share their session with one that is cheaper."""
 _OTHERS = (("walking", 1), ("boxing", 2))
-LEARNERS = [name for name in NAMES if registry.find_method(name).needs_examples]
+LEARNERS = [name for name in NAMES if registry.make_method(name).needs_examples]
 
 
 @dataclass(frozen=True)
@@ -88,19 +88,19 @@ def errors(method: Method, examples: list[BodyMotion], shown: Scene) -> tuple[fl
 
 @cache
 def at_home(name: str) -> tuple[float, float]:
-    return errors(registry.find_method(name), [walk().take, *others()], walk())
+    return errors(registry.make_method(name), [walk().take, *others()], walk())
 
 
 @cache
 def unseen(name: str) -> tuple[float, float]:
     """Errors with other takes as examples."""
-    return errors(registry.find_method(name), walk().examples, walk())
+    return errors(registry.make_method(name), walk().examples, walk())
 
 
 @pytest.mark.parametrize("name", [name for name in LEARNERS if not name.startswith("ik")])
 def test_examples_are_needed(name: str) -> None:
     """A method that learns from windows of n frames needs n + 1."""
-    method, rng = registry.find_method(name), np.random.default_rng(0)
+    method, rng = registry.make_method(name), np.random.default_rng(0)
     fewest = {"expert_map": 4, "dynamic_map": 4}.get(name, 3 if name.startswith(("dynamic_map:", "local_pca")) else 1)
     short = replace(walk().take, qpos=walk().take.qpos[: fewest - 1])
     for examples in ([], [short, short]) if fewest > 1 else ([],):
@@ -119,7 +119,7 @@ def test_a_noiseless_take_that_is_among_the_examples_is_recovered(name: str) -> 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_scores_do_not_change_when_the_room_of_the_examples_is_turned_and_shifted(name: str) -> None:
     examples = [replace(take, qpos=moved(take.qpos, 2.5, (-4.0, 7.0, 0.0))) for take in walk().examples]
-    assert errors(registry.find_method(name), examples, walk()) == pytest.approx(unseen(name), rel=0.03, abs=0.02)
+    assert errors(registry.make_method(name), examples, walk()) == pytest.approx(unseen(name), rel=0.03, abs=0.02)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -127,7 +127,7 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
     home = walk()
     take = replace(home.take, qpos=moved(home.take.qpos, -1.2, (3.0, -8.0, 0.0)))
     away = Scene(home.body, home.calibration, take, exact_frames(home.body, home.calibration, take.qpos), [])
-    found = errors(registry.find_method(name), home.examples, away)
+    found = errors(registry.make_method(name), home.examples, away)
     assert found == pytest.approx(unseen(name), rel=0.02, abs=0.02)
 
 
@@ -140,13 +140,13 @@ def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
     rules = {rule: check for rule, check in RULES.items() if check is not works_in_another_process}
     assert len(rules) == len(RULES) - 1
     monkeypatch.setattr(method_checks, "RULES", rules)
-    check_method(registry.find_method(name))
+    check_method(registry.make_method(name))
 
 
 @pytest.mark.long
 def test_what_was_fitted_may_go_to_another_process() -> None:
     """One process for all methods, since starting one takes seconds."""
-    trials = [make_case(registry.find_method(name)) for name in (*NAMES, *ALSO)]
+    trials = [make_case(registry.make_method(name)) for name in (*NAMES, *ALSO)]
     tasks = [(trial.fit(), trial.calibration, trial.frames) for trial in trials]
     there = {which: future.result() for which, future in run_in_workers(estimate_qpos, tasks, 1)}
     for which, task in enumerate(tasks):

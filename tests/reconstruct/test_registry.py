@@ -17,27 +17,27 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 
 @pytest.mark.parametrize("name", sorted(registry.list_methods()))
 def test_every_name_makes_its_method(name: str) -> None:
-    method = registry.find_method(name)
+    method = registry.make_method(name)
     assert method.name == name
     assert registry.summary(name) == method.summary
     assert 10 < len(method.summary) < 110
     assert "\n" not in method.summary
-    assert repr(method) == repr(registry.find_method(name))
+    assert repr(method) == repr(registry.make_method(name))
 
 
 def test_clean_up_is_added_by_suffix() -> None:
-    method = registry.find_method("mean_pose+ik")
+    method = registry.make_method("mean_pose+ik")
     assert isinstance(method, CleanUp)
     assert (method.name, method.needs_examples) == ("mean_pose+ik", True)
 
 
 def test_presets_differ_in_their_repr() -> None:
     assert repr(Ik()) != repr(GAUSSIAN)
-    assert registry.find_method("ik:gaussian") == GAUSSIAN
+    assert registry.make_method("ik:gaussian") == GAUSSIAN
 
 
 def test_a_class_is_found_by_its_module() -> None:
-    assert registry.find_method("harness.reconstruct.methods.mean_pose:MeanPose") == MeanPose()
+    assert registry.make_method("harness.reconstruct.methods.mean_pose:MeanPose") == MeanPose()
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_class_is_found_by_its_module() -> None:
 )
 def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
     with pytest.raises(UnknownName) as caught:
-        registry.find_method(name)
+        registry.make_method(name)
     assert "mean_pose" in str(caught.value)
 
 
@@ -60,7 +60,7 @@ def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
 )
 def test_an_old_option_is_refused_with_its_new_name(name: str, new: str) -> None:
     with pytest.raises(RenamedKey, match=f"is now called {new!r}"):
-        registry.find_method(name)
+        registry.make_method(name)
 
 
 @pytest.mark.parametrize(
@@ -75,19 +75,19 @@ def test_an_old_option_is_refused_with_its_new_name(name: str, new: str) -> None
 )
 def test_a_removed_option_is_refused_with_what_to_write_instead(name: str, advice: str) -> None:
     with pytest.raises(RenamedKey, match=f"was removed. Leave it out: .*{advice}"):
-        registry.find_method(name)
+        registry.make_method(name)
 
 
 def test_a_near_miss_gets_a_suggestion() -> None:
     with pytest.raises(UnknownName, match="Did you mean 'ik:gaussian'"):
-        registry.find_method("ik:gausian")
+        registry.make_method("ik:gausian")
 
 
 def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
     with pytest.raises(UnknownName, match="Did you mean 'MeanPose'"):
-        registry.find_method("harness.reconstruct.methods.mean_pose:MeanPoze")
+        registry.make_method("harness.reconstruct.methods.mean_pose:MeanPoze")
     with pytest.raises(BadInput, match="no summary"):
-        registry.find_method("fractions:Fraction")
+        registry.make_method("fractions:Fraction")
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_module_or_class_that_cannot_be_used(
     (tmp_path / f"{module}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(BadInput, match=message):
-        registry.find_method(f"{module}:{name}")
+        registry.make_method(f"{module}:{name}")
 
 
 def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,20 +117,20 @@ def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPa
             yield EntryPoint(name, "harness.reconstruct.methods.mean_pose:MeanPose", group)
 
     monkeypatch.setattr(registry, "entry_points", installed)
-    assert registry.find_method("theirs") == MeanPose()
-    assert registry.find_method("ik") == Ik()
+    assert registry.make_method("theirs") == MeanPose()
+    assert registry.make_method("ik") == Ik()
 
 
 def test_options_are_the_fields_of_a_method() -> None:
-    method = registry.find_method("ik[loss.robust=false]")
+    method = registry.make_method("ik[loss.robust=false]")
     assert method == replace(Ik(), loss=replace(Ik().loss, robust=False), name="ik[loss.robust=false]")
     assert method.name == "ik[loss.robust=false]"
-    assert registry.find_method("ik") == Ik()
-    assert repr(registry.find_method("ik[jump_m=inf]")) == repr(replace(Ik(), jump_m=math.inf, name="ik[jump_m=inf]"))
+    assert registry.make_method("ik") == Ik()
+    assert repr(registry.make_method("ik[jump_m=inf]")) == repr(replace(Ik(), jump_m=math.inf, name="ik[jump_m=inf]"))
 
 
 def test_options_of_a_method_and_of_its_clean_up() -> None:
-    method = registry.find_method("ik:gaussian[stopping.most_steps=3]+ik[prior_sigma_rad=0.25]")
+    method = registry.make_method("ik:gaussian[stopping.most_steps=3]+ik[prior_sigma_rad=0.25]")
     assert isinstance(method, CleanUp)
     assert isinstance(method.method, Ik)
     assert method.prior_sigma_rad == 0.25
@@ -140,7 +140,7 @@ def test_options_of_a_method_and_of_its_clean_up() -> None:
 
 def test_options_of_a_class_from_outside() -> None:
     name = "harness.reconstruct.methods.ik:Ik[stopping.most_steps=2]"
-    method = registry.find_method(name)
+    method = registry.make_method(name)
     assert isinstance(method, Ik)
     assert (method.stopping.most_steps, method.name) == (2, name)
 
@@ -158,7 +158,7 @@ def test_options_of_a_class_from_outside() -> None:
 )
 def test_wrong_options_get_a_suggestion(name: str, message: str) -> None:
     with pytest.raises(UnknownName, match=message):
-        registry.find_method(name)
+        registry.make_method(name)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_wrong_options_get_a_suggestion(name: str, message: str) -> None:
 )
 def test_values_of_options_are_checked(name: str, message: str) -> None:
     with pytest.raises(BadInput, match=message):
-        registry.find_method(name)
+        registry.make_method(name)
 
 
 class Plain:
@@ -185,9 +185,9 @@ class Plain:
 def test_an_installed_package_is_imported_only_when_its_method_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = EntryPoint("theirs", "no_such_package.methods:Theirs", "harness.methods")
     monkeypatch.setattr(registry, "entry_points", lambda group: [broken])
-    assert registry.find_method("ik") == Ik()
+    assert registry.make_method("ik") == Ik()
     with pytest.raises(BadInput, match=r"theirs \(no_such_package.methods:Theirs\) cannot be made"):
-        registry.find_method("theirs")
+        registry.make_method("theirs")
 
 
 @pytest.mark.parametrize(

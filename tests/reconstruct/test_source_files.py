@@ -46,7 +46,7 @@ def test_an_edited_helper_changes_the_hash_and_other_files_do_not(folder: Path, 
     write(
         folder, {"mine.py": f"{statement}\n{CLASS}...\n", helper: "SIGMA = 1.0\n", "stranger.py": "", "notes.txt": ""}
     )
-    mine = registry.find_method("mine:Mine")
+    mine = registry.make_method("mine:Mine")
     before = source_hash(mine)
     write(folder, {"stranger.py": "OTHER = 2.0\n", "notes.txt": "more"})
     assert source_hash(mine) == before
@@ -66,7 +66,7 @@ def test_helpers_of_helpers_and_relative_imports_count(folder: Path) -> None:
             "tools/fourth.py": "SIGMA = 1.0\n",
         },
     )
-    found = {file.relative_to(folder).as_posix() for file in find_source_files(registry.find_method("mine:Mine")).files}
+    found = {file.relative_to(folder).as_posix() for file in find_source_files(registry.make_method("mine:Mine")).files}
     assert found == {
         "mine.py",
         *(f"tools/{name}.py" for name in ("__init__", "first", "second", "inner/third", "fourth")),
@@ -84,7 +84,7 @@ def test_every_module_of_the_own_package_counts_and_the_helpers_next_to_it(folde
             "stranger.py": "",
         },
     )
-    files = find_source_files(registry.find_method("lab.methods.mine:Mine"))
+    files = find_source_files(registry.make_method("lab.methods.mine:Mine"))
     assert files.folders == (folder,)
     assert {file.relative_to(folder).as_posix() for file in files.files} == {
         *("lab/__init__.py", "lab/methods/mine.py", "lab/plugins/found_by_name.py", "shared.py")
@@ -101,7 +101,7 @@ def test_declared_data_files_change_the_hash(folder: Path) -> None:
             "other.json": "",
         },
     )
-    mine = registry.find_method("mine:Mine")
+    mine = registry.make_method("mine:Mine")
     hashes = [source_hash(mine)]
     for file in ("weights.json", "tables/a.txt", "tables/new.txt"):
         write(folder, {file: "2.0"})
@@ -117,7 +117,7 @@ def test_declared_data_files_change_the_hash(folder: Path) -> None:
 def test_declarations_that_cannot_be_used_are_refused(folder: Path, files: str, message: str) -> None:
     write(folder, {"mine.py": f"{CLASS}files = {files}\n", "weights.json": ""})
     with pytest.raises(BadInput, match=message):
-        source_hash(registry.find_method("mine:Mine"))
+        source_hash(registry.make_method("mine:Mine"))
 
 
 def test_the_hash_does_not_depend_on_where_the_folder_lies(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,27 +127,27 @@ def test_the_hash_does_not_depend_on_where_the_folder_lies(folder: Path, monkeyp
         monkeypatch.setattr(sys, "path", [str(folder / place), *sys.path])
         for module in ("mine", "gains"):
             sys.modules.pop(module, None)
-        hashes.append(source_hash(registry.find_method("mine:Mine")))
+        hashes.append(source_hash(registry.make_method("mine:Mine")))
     assert hashes[0] == hashes[1]
 
 
 def test_two_files_that_swap_their_contents_change_the_hash(folder: Path) -> None:
     write(folder, {"mine.py": f"import a, b\n{CLASS}...\n", "a.py": "X = 1\n", "b.py": "X = 2\n"})
-    mine = registry.find_method("mine:Mine")
+    mine = registry.make_method("mine:Mine")
     before = source_hash(mine)
     write(folder, {"a.py": "X = 2\n", "b.py": "X = 1\n"})
     assert source_hash(mine) != before
 
 
 def test_methods_and_what_they_wrap_have_other_hashes() -> None:
-    hashes = {source_hash(registry.find_method(n)) for n in ("ik", "mean_pose", "best_match", "mean_pose+ik", "ik+ik")}
+    hashes = {source_hash(registry.make_method(n)) for n in ("ik", "mean_pose", "best_match", "mean_pose+ik", "ik+ik")}
     assert len(hashes) == 5
     assert source_hash(Ik()) == source_hash(GAUSSIAN)
 
 
 def test_a_wrapped_method_from_outside_counts(folder: Path) -> None:
     write(folder, {"mine.py": f"import gains\n{CLASS}...\n", "gains.py": "SIGMA = 1.0\n"})
-    mine = registry.find_method("mine:Mine+ik")
+    mine = registry.make_method("mine:Mine+ik")
     before = source_hash(mine)
     write(folder, {"gains.py": "SIGMA = 2.0\n"})
     assert source_hash(mine) != before

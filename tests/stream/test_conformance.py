@@ -133,7 +133,7 @@ def test_every_method_estimates_the_same_from_every_source(
     playback: Playback, frames_by_source: Sources, name: str
 ) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
-    reconstructor = playback.clip_evaluation.fit_method(registry.find_method(name), name)
+    reconstructor = playback.clip_evaluation.fit_method(registry.make_method(name), name)
     sources = {"simulation": list(playback.simulation.frames), **frames_by_source}
     first_s = max(frames[0].measured_s[0] for frames in sources.values())
 

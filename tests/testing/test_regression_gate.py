@@ -16,7 +16,6 @@ import pytest
 from harness.compare import baseline
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome
-from harness.experiment import engine
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.results import manifest
@@ -55,7 +54,7 @@ def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any
 
 
 def run(scenario: Scenario, out: Path, *, jobs: int, command: str, progress: ProgressCallback) -> Outcome:
-    """Instead of `engine.run`, in processes that have one thread each."""
+    """Instead of `harness.run`, in processes that have one thread each."""
     assert jobs > 1
     assert os.environ["OMP_NUM_THREADS"] == os.environ["OPENBLAS_NUM_THREADS"] == "1"
     measured(scenario, out, command=command)
@@ -66,7 +65,7 @@ def run(scenario: Scenario, out: Path, *, jobs: int, command: str, progress: Pro
 @pytest.fixture
 def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
     """Somebody's project with a baseline `main` of two methods; its methods are as good as `CHANGE` says."""
-    monkeypatch.setattr(engine, "run", run)
+    monkeypatch.setattr("harness.testing.regression_gate.run_scenario", run)
     monkeypatch.setitem(CHANGE, "now", 1.0)
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
@@ -117,7 +116,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
         measured(scenario, out, defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}})
         return Outcome.PASS
 
-    monkeypatch.setattr(engine, "run", otherwise)
+    monkeypatch.setattr("harness.testing.regression_gate.run_scenario", otherwise)
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
     result = gated(project, says=["*worse than A: inputs differ: tracker.rate_hz: 40* against 60*"], failed=1)
@@ -131,7 +130,7 @@ def test_cells_that_failed_are_told_with_their_traceback(
         measured(scenario, out, failed=("mine:Mine on walk_09",))
         return Outcome.INCOMPLETE
 
-    monkeypatch.setattr(engine, "run", failing)
+    monkeypatch.setattr("harness.testing.regression_gate.run_scenario", failing)
     gated(project, says=["*planned cells are missing*mine:Mine on walk_09*", "Traceback: no pose"], failed=1)
 
 

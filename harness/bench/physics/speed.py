@@ -26,7 +26,7 @@ from harness.mocap import synthetic
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 from harness.simulate.components.stationary import Clock
 from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics import physical_tracker
+from harness.simulate.physics.physical_tracker import PhysicalTracker
 from harness.simulate.physics.settings import Physics
 from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.stream.is900.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
@@ -97,13 +97,13 @@ def _memory_rows(seed: int) -> list[BenchmarkStatement]:
 
 def _block_row(body: Body, take: BodyMotion, seed: int) -> BenchmarkStatement:
     digests = set()
-    default = physical_tracker.BLOCK_SLOTS
+    default = PhysicalTracker.block_slots
     try:
         for slots in _BLOCKS:
-            physical_tracker.BLOCK_SLOTS = slots
+            PhysicalTracker.block_slots = slots
             digests.add(hashlib.sha256(simulate_stations(body, take, 6, PHYSICAL, seed).wire.data).hexdigest())
     finally:
-        physical_tracker.BLOCK_SLOTS = default
+        PhysicalTracker.block_slots = default
     sizes = ", ".join(map(str, _BLOCKS))
     name, reference = "different bytes among block sizes", f"blocks of {sizes} slots"
     return hold_to_limit(name, len(digests) - 1.0, most=0.0, reference=reference)

@@ -83,7 +83,7 @@ class MethodWorker:
             serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
         self._audit.package = registry.defining_module(header["name"]).partition(".")[0]
-        method = registry.find_method(header["name"])
+        method = registry.make_method(header["name"])
         modules = tuple(sys.modules.values())
         self._audit.cover(find_source_files(method, modules), declared_environment(method))
         self.method = method
@@ -127,7 +127,7 @@ class MethodWorker:
 
 def _stable_options(method: Method, name: str) -> str:
     """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
-    made, again = describe_state(method, name), describe_state(registry.find_method(name), name)
+    made, again = describe_state(method, name), describe_state(registry.make_method(name), name)
     if made == again:
         return made.replace(tempfile.gettempdir(), "<TMPDIR>")  # each process has its own
     differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)

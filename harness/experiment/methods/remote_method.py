@@ -203,11 +203,11 @@ _remote_methods: dict[tuple[str, Isolation], RemoteMethod] = {}
 def resolve_method(name: str, isolation: Isolation) -> Method:
     """The method of a name, in a process of its own if it is from outside the package or `isolation` says so.
 
-    UnknownName, RenamedKey and BadInput as for `registry.resolve`; MethodFailure when its process fails.
+    UnknownName, RenamedKey and BadInput as for `registry.make_method`; MethodFailure when its process fails.
     """
     method = _remote_method(name, isolation)
     if method is None:
-        return registry.find_method(name)
+        return registry.make_method(name)
     method.describe()
     return method
 

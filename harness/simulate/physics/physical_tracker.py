@@ -7,7 +7,7 @@ Every part carries its state from block to block, and results do not depend on t
 """
 
 import math
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.settings import Physics
 from harness.simulate.readings import FilterReadings
 
-BLOCK_SLOTS = 160
-"""Slots of a block: two seconds."""
-
 
 class RangeSource(Protocol):
     """What measures the ranges of block after block of slots; see `Ranging`."""
@@ -36,6 +33,9 @@ class RangeSource(Protocol):
 
 class PhysicalTracker:
     """A device with S stations that are worn in a room. It measures one take, from its lead-in to the last record."""
+
+    block_slots: ClassVar[int] = 160
+    """Slots that are simulated at once: two seconds. The bytes do not depend on it."""
 
     def __init__(
         self,
@@ -80,8 +80,8 @@ class PhysicalTracker:
         outputs = empty_outputs(tick, time_s * tick_hz - tick)
         statistics = _RangeStatistics(self.schedule.emitters, time_s.shape[1])
         end = int(tick.max()) // TICKS_PER_SLOT + 1
-        for first in range(self._first_slot, end, BLOCK_SLOTS):
-            motion, qpos = self._true_motion(first, min(BLOCK_SLOTS, end - first))
+        for first in range(self._first_slot, end, self.block_slots):
+            motion, qpos = self._true_motion(first, min(self.block_slots, end - first))
             ranges = self.ranging.measure_ranges(first, motion, qpos)
             angle_rad, velocity_m_s = self.unit.measure_increments(*true_increments(motion, self._lever_m))
             self.fusion.filter_block(first, angle_rad, velocity_m_s, ranges.range_m, outputs)

@@ -238,4 +238,4 @@ def _left_out_rows(scenario: Scenario) -> list[tuple[str, ...]]:
 
 def _method_constants(study: PaperStudy) -> tuple[tuple[str, ...], ...]:
     names: Sequence[str] = list(dict.fromkeys(chain.from_iterable(s.methods for s in study.runs.values())))
-    return tuple((name, describe_state(registry.find_method(name), name)) for name in names)
+    return tuple((name, describe_state(registry.make_method(name), name)) for name in names)

@@ -1,4 +1,4 @@
-"""A paper study: named runs in one folder, which are run by `engine.run`, resumed, and read back.
+"""A paper study: named runs in one folder, which are run by `harness.run`, resumed, and read back.
 
 The folder has study.json (the identity of the study), a folder for each run, and measured/ for other measurements.
 Its quick form has a few short clips, to see that everything works. It decides no statement.
@@ -16,7 +16,7 @@ from harness.compare.units import Sampling, count_units
 from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
-from harness.experiment import engine
+from harness.experiment.engine import run as run_scenario
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.tasks import cell_names
 from harness.mocap.library import LibraryFolders
@@ -132,7 +132,7 @@ def run_scenarios(
 
         run_folder = out / name
         try:
-            engine.run(scenario, run_folder, folder=folder, jobs=jobs, command=command, progress=report)
+            run_scenario(scenario, run_folder, folder=folder, jobs=jobs, command=command, progress=report)
         except (OSError, SystemFault):
             raise
         except HarnessError as error:

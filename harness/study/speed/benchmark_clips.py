@@ -120,7 +120,7 @@ def simulate_clips(takes: Sequence[BodyMotion], seed: int, scenario: Scenario) -
 
 def fit_named_method(name: str, database: MotionDatabase, seed: int) -> Reconstructor:
     """Fit a registered method to a database."""
-    return fit_method(registry.find_method(name), build_common_body(), database, generator(seed, "method", name))
+    return fit_method(registry.make_method(name), build_common_body(), database, generator(seed, "method", name))
 
 
 def fit_method(method: Method, body: Body, database: MotionDatabase, rng: np.random.Generator) -> Reconstructor:

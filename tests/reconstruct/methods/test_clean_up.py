@@ -35,7 +35,7 @@ def _errors_deg(noise: Literal["clean", "default"], names: list[str]) -> Floats:
     truth = simulation.truth_qpos[simulation.frame_index][40:, 7:]
     errors = []
     for name in names:
-        session = evaluation.fit_method(registry.find_method(name), name).begin(simulation.calibration)
+        session = evaluation.fit_method(registry.make_method(name), name).begin(simulation.calibration)
         qpos = np.array([session.step(frame).qpos for frame in simulation.frames])
         errors.append(np.rad2deg(np.abs(wrap_difference(qpos[40:, 7:] - truth))).mean())
     return np.array(errors)
@@ -71,7 +71,7 @@ def test_the_prior_is_a_share_of_the_spread_over_the_examples() -> None:
 
 
 def test_without_examples_all_hinges_have_one_width() -> None:
-    method = CleanUp(registry.find_method("ik:previous"), prior_sigma_rad=0.3)
+    method = CleanUp(registry.make_method("ik:previous"), prior_sigma_rad=0.3)
     assert not method.needs_examples
     sigma_rad = method.fit(build_body(), [], np.random.default_rng(1)).hinge_sigma_rad
     np.testing.assert_array_equal(sigma_rad, np.full(48, 0.3))

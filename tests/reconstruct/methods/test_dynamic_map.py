@@ -223,7 +223,7 @@ def unseen(behaviour: str) -> tuple[Scene, list[BodyMotion]]:
 @cache
 def answers(name: str, behaviour: str) -> list[Estimate]:
     shown, examples = unseen(behaviour)
-    fitted = registry.find_method(name).fit(shown.body, examples, np.random.default_rng(1))
+    fitted = registry.make_method(name).fit(shown.body, examples, np.random.default_rng(1))
     session = fitted.begin(shown.calibration)
     return [session.step(frame) for frame in shown.frames][STARTED:]
 

@@ -18,7 +18,7 @@ SILENT = range(60, 90)
 def origins_of(name: str) -> list[Origin]:
     """Origins of the estimates of 120 frames, of which `SILENT` have no reading."""
     body = humanoid.build_body()
-    calibration, method = exact_calibration(body), registry.find_method(name)
+    calibration, method = exact_calibration(body), registry.make_method(name)
     examples = [BodyMotion(f"s{n}", "nobody", "s", "", RATE_HZ, swaying_motion(body, 160, n)) for n in (2, 3)]
     session = method.fit(body, examples, generator(1, "fit")).begin(calibration)
     frames = exact_frames(body, calibration, swaying_motion(body, 120), RATE_HZ)

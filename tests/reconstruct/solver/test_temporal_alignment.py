@@ -312,7 +312,7 @@ METHODS = {
 @pytest.mark.parametrize(("name", "without"), METHODS.items())
 def test_every_method_has_the_option(name: str, without: str, boxing: Scene) -> None:
     """Off by default; on, it changes no bit of readings of one time, and removes error where stations take turns."""
-    plain, aligned = registry.find_method(without), registry.find_method(name)
+    plain, aligned = registry.make_method(without), registry.make_method(name)
     exact = boxing.frames[:12]
     for one, other in zip(boxing.run(plain, exact), boxing.run(aligned, exact), strict=True):
         np.testing.assert_array_equal(one.qpos, other.qpos)
@@ -322,7 +322,7 @@ def test_every_method_has_the_option(name: str, without: str, boxing: Scene) -> 
     truth = joint_centres_m(boxing.body.skeleton, simulated.truth_qpos[simulated.frame_index])
 
     def error_m(method: str) -> float:
-        found = np.array([e.qpos for e in scene.run(registry.find_method(method))])
+        found = np.array([e.qpos for e in scene.run(registry.make_method(method))])
         return float(np.linalg.norm(joint_centres_m(boxing.body.skeleton, found) - truth, axis=2)[10:].mean())
 
     assert error_m(name) < 0.9 * error_m(without)

@@ -15,8 +15,8 @@ from harness.report.kit.motion_player import (
     PlayerStations,
     PlayerTrack,
     encode,
-    player_card,
     pack_motion,
+    player_card,
 )
 
 FRAMES, JOINTS = 50, 25

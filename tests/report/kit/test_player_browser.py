@@ -57,7 +57,9 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         clips.append(PlayerClip(behaviour, behaviour, time_s, 0.0, truth, tracks, stations))
     moment = PlayerMoment("map: worst", 1, "map", 0.5, 0.6)
     player = player_card(PlayerMotion(skeleton, clips, [moment]), "bodies")
-    page = html_document(title="t", kicker="k", heading="h", facts={}, missing=[], sections=[("In 3-D", "look", player)])
+    page = html_document(
+        title="t", kicker="k", heading="h", facts={}, missing=[], sections=[("In 3-D", "look", player)]
+    )
     path = tmp_path_factory.mktemp("player") / "page.html"
     path.write_text(page, encoding="utf-8")
     return path

@@ -3,7 +3,7 @@
 import re
 
 from harness.report.kit.page import Page, Section
-from harness.report.kit.page_html import render_html, page_table
+from harness.report.kit.page_html import page_table, render_html
 from harness.report.kit.page_text import join_blocks, table_lines
 from harness.report.run.expectations import expected_orders, recovery_table
 

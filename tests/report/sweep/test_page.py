@@ -16,7 +16,7 @@ from harness.compare.paired_statistics import mean_interval
 from harness.compare.units import Sampling
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
-from harness.report.kit.page_html import render_html, page_table
+from harness.report.kit.page_html import page_table, render_html
 from harness.report.sweep.charts import (
     MAX_SERIES,
     _dot_chart_height_in,

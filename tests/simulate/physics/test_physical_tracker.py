@@ -8,7 +8,6 @@ import pytest
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
-from harness.simulate.physics import physical_tracker
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
@@ -27,7 +26,7 @@ PHYSICS = Physics(fusion=Fusion(prediction_ms={"head": 30}, enhancement={"left_w
 def test_bytes_do_not_depend_on_the_size_of_the_blocks(slots: int, monkeypatch: pytest.MonkeyPatch) -> None:
     noise = physical("default", PHYSICS)
     whole = observed(noise)
-    monkeypatch.setattr(physical_tracker, "BLOCK_SLOTS", slots)
+    monkeypatch.setattr(PhysicalTracker, "block_slots", slots)
     pieces = observed(noise)
     assert pieces.wire.data == whole.wire.data
     assert pieces.health == whole.health

@@ -10,7 +10,6 @@ from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
-from harness.results import manifest
 from harness.results.findings.paper_findings import BarChart
 from harness.study.papers import published_speed as module
 from harness.study.papers.paper_study import PaperStudy
@@ -165,7 +164,7 @@ def test_a_database_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     np.testing.assert_array_equal(first.posture, again.posture)
     assert not asked
     assert len(build_database(tmp_path, {"seed": 2}, takes)) == 60
-    monkeypatch.setattr(manifest, "source_hash", lambda: "edited")
+    monkeypatch.setattr("harness.study.speed.benchmark_clips.source_hash", lambda: "edited")
     assert len(build_database(tmp_path, {"seed": 1}, takes)) == 60
     assert asked == ["again", "again"]
 

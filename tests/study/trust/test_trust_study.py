@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment import evaluation
 from harness.experiment.methods.remote_method import run_over_frames
 from harness.experiment.playback import prepare_playback
 from harness.measure.unit_file import UnitFile, write_unit_file
@@ -135,7 +134,7 @@ def test_finished_cells_are_read_and_the_findings_have_the_same_bytes(
         ran.append(calibration)
         return run_over_frames(fitted, calibration, frames)
 
-    monkeypatch.setattr(evaluation, "run_over_frames", count_runs)
+    monkeypatch.setattr("harness.experiment.evaluation.run_over_frames", count_runs)
     run_trust_study(small_study.plan, small_study.captures, out)
     assert len(ran) == len(cells[::5])
     assert (out / FINDINGS).read_bytes() == (finished / FINDINGS).read_bytes()
@@ -280,7 +279,7 @@ def test_a_method_that_fails_costs_its_cells(
             raise ZeroDivisionError("the method divides by zero")
         return run_over_frames(fitted, calibration, frames)
 
-    monkeypatch.setattr(evaluation, "run_over_frames", fail_for_four)
+    monkeypatch.setattr("harness.experiment.evaluation.run_over_frames", fail_for_four)
     found = run_trust_study(small_study.plan, small_study.captures, tmp_path / "out").findings
     assert found.outcome is Outcome.INCOMPLETE
     assert len(found.failures) == len(CLIPS) * 3 * 3
