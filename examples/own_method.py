@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
+from harness.body import Body, tpose
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
 from harness.core.rotations import rotate
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.regression_gate import RegressionGate
 
 

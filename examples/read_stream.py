@@ -7,8 +7,8 @@ import sys
 from itertools import islice
 
 import harness
-from harness.experiment.playback import prepare_playback
-from harness.stream.is900.driver import DriverConfig
+from harness.experiment import prepare_playback
+from harness.stream.is900 import DriverConfig
 
 
 def read(port: str, stations: tuple[str, ...] | None = None, frames: int = 40) -> None:

@@ -23,19 +23,16 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.compare.comparison import compare_runs
+    from harness.compare import compare_runs
     from harness.core.package_data import VERSION as __version__
     from harness.errors import HarnessError
-    from harness.experiment.clip_simulation import simulate_clip
-    from harness.experiment.engine import run
-    from harness.experiment.scenarios.scenario_reader import load_scenario
-    from harness.mocap.clip_file import read_clip
-    from harness.reconstruct.registry import list_methods as methods
-    from harness.results.reader import load_run as load
-    from harness.score.score import score_estimate
-    from harness.stream.is900.driver.is900 import Is900
-    from harness.stream.is900.emulator.emulator import Emulator
-    from harness.stream.is900.emulator.server import serve_emulator
+    from harness.experiment import run, simulate_clip
+    from harness.experiment.scenarios import load_scenario
+    from harness.mocap import read_clip
+    from harness.reconstruct import list_methods as methods
+    from harness.results import load_run as load
+    from harness.score import score_estimate
+    from harness.stream.is900 import Emulator, Is900, serve_emulator
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -13,12 +13,9 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args, get_origin, get_type_hints
 
-from harness.experiment.scenarios.scenario import CalibrationSettings, Scenario, Station
-from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.score.metrics import DEFINITIONS
-from harness.score.uncertainty import SIGMA_DEFINITIONS
-from harness.simulate.disturbance import Disturbance
-from harness.simulate.link import TrackerConfig
+from harness.experiment.scenarios import CalibrationSettings, Scenario, ScenarioMotion, Station
+from harness.score import DEFINITIONS, SIGMA_DEFINITIONS
+from harness.simulate import Disturbance, TrackerConfig
 from tests.test_prose import ROOT
 
 _SCENARIO = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from harness.body.kinematics import pose_from_qpos
+from harness.body import pose_from_qpos
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 

@@ -20,7 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from harness.core.files import TEMPORARY
-from harness.results.reader import load_results
+from harness.results import load_results
 from tests.experiment.test_sweep_killed import kept
 from tests.short_demo import short_demo
 

@@ -16,17 +16,10 @@ from scipy.ndimage import gaussian_filter1d
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
-from harness.experiment import cells
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.evaluation import Evaluation
-from harness.experiment.methods.method_run import MethodAnswers
-from harness.experiment.observed_take import ObservedTake
-from harness.experiment.tasks import PlannedCell
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method
-from harness.reconstruct.methods.mean_pose import MeanPose
-from harness.results.cell import Cell
-from harness.results.reader import select_cells
+from harness.experiment import ClipEvaluation, Evaluation, ObservedTake, PlannedCell, cells
+from harness.experiment.methods import MethodAnswers
+from harness.reconstruct import MeanPose, Method, registry
+from harness.results import Cell, select_cells
 from tests.products import Make, run_verb
 
 METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}

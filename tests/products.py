@@ -18,18 +18,15 @@ from harness.bench.physics import error_statistics
 from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
 from harness.cli import main
 from harness.errors import Outcome
-from harness.experiment.playback import prepare_playback
-from harness.measure.reports.unit_report import UnitReport
-from harness.measure.reports.validation_report import ValidationReport
+from harness.experiment import prepare_playback
+from harness.measure.reports import UnitReport, ValidationReport
 from harness.report.coverage import page as coverage
 from harness.report.coverage.content import CoverageContent
 from harness.report.coverage.page import coverage_page
-from harness.report.kit.page import Page
+from harness.report.kit import Page
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.results.findings.placement_findings import PlacementFindings, read_placement
-from harness.results.findings.trust_findings import TrustFindings
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.station_readings import CaptureReader
+from harness.results.findings import PlacementFindings, TrustFindings, read_placement
+from harness.stream.recording import CaptureReader, record_capture
 from harness.study.placement.placement_study import run_placement
 from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.characterization import characterize_capture

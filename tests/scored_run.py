@@ -10,9 +10,9 @@ import pytest
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Status
 from harness.core.humanoid24 import pack, standard_skeleton
-from harness.results import storage
+from harness.results import Cell, cell_key
 from harness.results.cell import IDENTITY
-from harness.score.score import Scores, score_estimate
+from harness.score import Scores, score_estimate
 
 RATE_HZ = 40.0
 FRAMES = 400
@@ -47,10 +47,10 @@ def judge(truth_qpos: Floats) -> Judge:
 
 
 @pytest.fixture
-def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., storage.Cell]:
+def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., Cell]:
     """A cell whose estimate is off by some metres along x; other fields can be named."""
 
-    def cell(off_m: float = 0.01, frames: int = FRAMES, **fields: object) -> storage.Cell:
+    def cell(off_m: float = 0.01, frames: int = FRAMES, **fields: object) -> Cell:
         estimate = truth_qpos[:frames].copy()
         estimate[:, 0] += off_m
         content: dict[str, Any] = {
@@ -86,8 +86,8 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., storage.Cell]:
             "suspect": np.zeros((frames, 2)),
         } | fields
         described = {name: content[name] for name in IDENTITY}
-        key = storage.cell_key(described, {"off_m": off_m, "frames": frames}, "source")
-        return storage.Cell(key=key, **content)
+        key = cell_key(described, {"off_m": off_m, "frames": frames}, "source")
+        return Cell(key=key, **content)
 
     return cell
 

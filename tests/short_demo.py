@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from harness.experiment.scenarios.scenario_reader import find_scenario
+from harness.experiment.scenarios import find_scenario
 from harness.mocap import synthetic
 
 

@@ -12,7 +12,7 @@ import pytest
 from harness.cli import build_parser, main
 from harness.commands.flags import repeat_flags
 from harness.commands.run import _named_methods
-from harness.reconstruct import registry
+from harness.reconstruct import list_methods
 from tests.command import Command
 from tests.short_demo import short_demo
 
@@ -72,7 +72,7 @@ def test_all_methods_are_the_scenario_s_and_every_other_one() -> None:
     named = _named_methods("all,mine:Mine,ik", own)
     assert named[:2] == own
     assert named[-1] == "mine:Mine"
-    assert set(named) == {*own, *registry.list_methods(), "mine:Mine"}
+    assert set(named) == {*own, *list_methods(), "mine:Mine"}
     assert len(set(named)) == len(named)
 
 

@@ -16,7 +16,7 @@ from harness.errors import (
     name_file,
     shorten,
 )
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import load_scenario
 
 
 @pytest.mark.parametrize("text", ["two\nlines", "a\0b", "x" * 100_000, "\ud800" * 1000, "\x1b[31mred"])

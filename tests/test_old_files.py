@@ -11,19 +11,16 @@ import numpy as np
 import pytest
 
 import harness
-from harness.calibrate.calibration_file import read_calibration
+from harness.calibrate import read_calibration
 from harness.cli import main
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs
 from harness.errors import BadFile, Outcome
-from harness.experiment.scenarios.fitted_unit import read_fitted_unit
-from harness.measure.unit_file import read_unit_file
-from harness.results.findings.paper_findings import read_findings
-from harness.results.findings.placement_findings import read_placement
-from harness.results.reader import load_results
-from harness.results.storage import open_study
-from harness.simulate.physics.emitters import read_mcf
-from harness.stream.recording.recording import read_recording
-from harness.stream.recording.replay import RecordingStream
+from harness.experiment.scenarios import read_fitted_unit
+from harness.measure import read_unit_file
+from harness.results import load_results, open_study
+from harness.results.findings import read_findings, read_placement
+from harness.simulate.physics import read_mcf
+from harness.stream.recording import RecordingStream, read_recording
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
 from tests.command import Command

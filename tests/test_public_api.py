@@ -50,8 +50,7 @@ def test_a_run_is_loaded_cell_by_cell_and_as_a_table(tmp_path: Path) -> None:
 
 
 def test_a_table_without_pandas_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from harness.results.manifest import Manifest
-    from harness.results.reader import LoadedRun, ResultSet
+    from harness.results import LoadedRun, Manifest, ResultSet
 
     monkeypatch.setitem(sys.modules, "pandas", None)
     empty = LoadedRun(tmp_path, ResultSet("none", Manifest({}, {}, {}), (), 0))

@@ -15,11 +15,11 @@ from harness.cli import build_parser, main
 from harness.commands.catalogue import build_catalogue
 from harness.core.options import expand_alternatives
 from harness.errors import Outcome
-from harness.experiment.engine import run as run_scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.reconstruct import registry
+from harness.experiment import run as run_scenario
+from harness.experiment.scenarios import load_scenario
+from harness.reconstruct import list_methods, make_method
 from harness.report.run.text import run_table
-from harness.results.storage import read_summary
+from harness.results import read_summary
 from harness.testing.contract_case import make_case
 from tests.short_demo import short_demo
 from tests.test_doors import DOORS
@@ -108,7 +108,7 @@ def test_every_block_of_the_page_on_own_methods_runs(tmp_path: Path, monkeypatch
     monkeypatch.syspath_prepend(str(tmp_path))
     hinges = [
         np.array([estimate.qpos[7:] for estimate in case.run(case.frames)])
-        for case in (make_case(registry.make_method(name)) for name in ("ridge", "steady:Steady"))
+        for case in (make_case(make_method(name)) for name in ("ridge", "steady:Steady"))
     ]
     np.testing.assert_array_equal(hinges[1][0], hinges[0][0])
     np.testing.assert_allclose(hinges[1][1], 0.5 * (hinges[0][0] + hinges[0][1]), atol=1e-12)
@@ -146,9 +146,9 @@ def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, mo
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: upright\nVersion: 1.0\n")
     lines = [f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in names.items()) for group, names in points.items()]
     (info / "entry_points.txt").write_text("\n".join(lines))
-    assert "upright" not in registry.list_methods()
+    assert "upright" not in list_methods()
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert registry.make_method("upright+ik").name == "upright+ik"
+    assert make_method("upright+ik").name == "upright+ik"
     assert "upright" in build_catalogue()["methods"]
     monkeypatch.chdir(short_demo(tmp_path / "demo").parent)
     out = tmp_path / "run"
@@ -158,9 +158,9 @@ def test_the_documented_entry_point_gives_the_method_its_name(tmp_path: Path, mo
 
 def test_documented_options_are_those_of_the_method() -> None:
     (named,) = re.findall(r"`--methods '([^']*)'`", OWN_METHOD)
-    assert registry.make_method(named).name == named
+    assert make_method(named).name == named
     for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", OWN_METHOD):
-        assert [registry.make_method(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
+        assert [make_method(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")  # befo
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from harness.body.rendering import RenderScene
+from harness.body import RenderScene
 from harness.commands.viewed_motion import open_motion
 from harness.core.skeleton import Skeleton
-from harness.report.kit.motion_player import PlayerClip, bone_radii_mm
+from harness.report.kit import PlayerClip, bone_radii_mm
 from harness.view.movie_worker import TRUTH, CapsuleMesh, error_colours, rgb, station_capsules
 
 SIZE_PX = (480, 480)

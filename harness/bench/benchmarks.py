@@ -15,7 +15,7 @@ from harness.bench.startup import bench_startup
 from harness.bench.sweep import bench_sweep
 from harness.bench.wire import bench_wire
 from harness.errors import BadInput, MissingExtra, UnknownName
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 
 def _ik(seed: int, large: bool, runs: int) -> list[BenchmarkStatement]:

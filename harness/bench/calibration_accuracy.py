@@ -10,11 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.bench.common import MOUNTS
-from harness.body.humanoid import build_body
-from harness.calibrate.hold import UnusableHold
-from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
-from harness.calibrate.poses import POSES, pose_configuration
-from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
+from harness.body import build_body
+from harness.calibrate import (
+    POSES,
+    PoseCalibration,
+    SkeletonPrior,
+    UnusableHold,
+    calibrate_poses,
+    fit_skeleton_prior,
+    pose_configuration,
+)
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
@@ -22,15 +27,11 @@ from harness.core.progress import ProgressCallback
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
-from harness.experiment.simulated_calibration import TrackerSession
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import POPULATION_SIZE, read_skeletons
+from harness.experiment import TrackerSession
+from harness.mocap import POPULATION_SIZE, LibraryFolders, read_skeletons
 from harness.mocap.synthetic import sample_skeletons
-from harness.simulate import noise as noises
-from harness.simulate.calibration_motion import hold_poses, hold_times_s
-from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.simulate import TrackerConfig, hold_poses, hold_times_s, noise_preset, perturb_mounts, simulate_tracker
+from harness.stream import TrackerFrame
 
 HOLD_S, MOVE_S, HOLD_MARGIN_S = 3.0, 1.5, 0.2
 """Duration of a hold, of the move to the next, and of the margin that is left out at both ends of a hold [s]."""
@@ -206,7 +207,7 @@ def _bone_space_without(known: Mapping[str, Skeleton], name: str) -> SkeletonPri
 def _session(name: str, own: Skeleton, noise: str, seed: int) -> TrackerSession:
     worn = perturb_mounts(MOUNTS, beside_m=MOUNT_OFFSET_SD_M, turned_rad=np.pi, seed=seed, session=name)
     tracker = TrackerConfig(slot_s=0.0) if noise == "clean" else TrackerConfig()
-    return TrackerSession(name, seed, build_body(own), MOUNTS, worn, tracker, noises.noise_preset(noise))
+    return TrackerSession(name, seed, build_body(own), MOUNTS, worn, tracker, noise_preset(noise))
 
 
 def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> CalibrationErrors:

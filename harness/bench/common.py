@@ -8,21 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Body, Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.experiment.cells import clear_caches
-from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.methods.remote_method import close_methods
-from harness.experiment.plan import check_names
-from harness.experiment.scenarios.scenario import Scenario
-from harness.mocap.library import LibraryFolders
-from harness.results.storage import open_study
-from harness.simulate.link import TrackerConfig
-from harness.simulate.simulation import exact_calibration
+from harness.experiment import BatchResults, check_names, clear_caches, run_cells
+from harness.experiment.methods import close_methods
+from harness.experiment.scenarios import Scenario
+from harness.mocap import LibraryFolders
+from harness.results import open_study
+from harness.simulate import TrackerConfig, exact_calibration
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 """Stations of the first paper (Liu et al. 2011)."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from harness.bench.limits import hold_to_limit
 from harness.core.arrays import Floats
-from harness.experiment.methods.method_run import ReferenceWorkload
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.experiment.methods import ReferenceWorkload
+from harness.results.findings import BenchmarkStatement
 
 REFERENCE_RUNS = 1000
 """Runs of the reference workload that are one unit of CPU time; about 0.14 s on one core of a shared x86 machine."""

@@ -20,9 +20,7 @@ import numpy as np
 
 from harness.bench.common import MOUNTS, world_calibration
 from harness.bench.limits import hold_to_limit
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import Body, Kinematics, build_body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -31,12 +29,10 @@ from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.core.working_folder import plain_import
 from harness.mocap import synthetic
-from harness.reconstruct.methods.ik import Ik
-from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
-from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import Ik
+from harness.reconstruct.solver import HingeLimits, IKSolver, Loss, Prior, Residuals, Stopping
+from harness.results.findings import BenchmarkStatement
+from harness.stream import TrackerFrame
 from harness.study.speed.round_robin_timing import MethodTimings, TimedStep, take_turns
 
 with plain_import():
@@ -57,7 +53,7 @@ MINK_DAMPING = 3.0
 class IKBenchmarkCase:
     """Input of all solvers; the tracker frame is the world frame."""
 
-    body: humanoid.Body
+    body: Body
     """The body with the stations as sites."""
     calibration: Calibration
     frames: list[TrackerFrame]
@@ -98,7 +94,7 @@ def make_case(seed: int, frames: int) -> IKBenchmarkCase:
     """Make a synthetic walk and noisy readings of it in the world frame."""
     performer = synthetic.performer_names()[0]
     clip = synthetic.generate("walking", performer, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
-    body = humanoid.build_body(clip.skeleton, MOUNTS)
+    body = build_body(clip.skeleton, MOUNTS)
     calibration = world_calibration(body)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)[:frames]
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
@@ -133,7 +129,7 @@ def registered_ik(case: IKBenchmarkCase) -> TimedStep:
     return timed_step
 
 
-def plain_solver(body: humanoid.Body, calibration: Calibration) -> TimedStep:
+def plain_solver(body: Body, calibration: Calibration) -> TimedStep:
     """The solver of `ik` without prior and robust loss."""
     residuals = Residuals(body, calibration, LEAST_SQUARES)
     solver = IKSolver(residuals, HingeLimits(body), STOPPING)
@@ -147,7 +143,7 @@ def plain_solver(body: humanoid.Body, calibration: Calibration) -> TimedStep:
     return timed_step
 
 
-def mink_solver(body: humanoid.Body, calibration: Calibration) -> TimedStep:
+def mink_solver(body: Body, calibration: Calibration) -> TimedStep:
     """mink's differential inverse kinematics with daqp, in full steps."""
     model, limits = copy.copy(body.model), HingeLimits(body)
     model.jnt_limited[1:] = np.isfinite(limits.high_rad)

@@ -14,11 +14,10 @@ import numpy as np
 from scipy import special, stats
 
 from harness.bench.limits import hold_to_limit
-from harness.compare.paired_statistics import CONFIDENCE_LEVEL, mean_interval
-from harness.compare.significance import SIGNIFICANCE, sign_flip_p
+from harness.compare import CONFIDENCE_LEVEL, SIGNIFICANCE, mean_interval, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 UNITS = (6, 8, 12, 15, 24, 32)
 STUDIES = 400

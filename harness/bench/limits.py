@@ -6,7 +6,7 @@ from typing import Any
 
 from harness.core.number_format import NOT_MEASURED, count_noun
 from harness.errors import Outcome
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
+from harness.results.findings import BenchmarkStatement, Verdict
 
 
 def state_verdict(

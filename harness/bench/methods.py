@@ -19,26 +19,28 @@ from harness.bench.common import in_world
 from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, time_cpu
 from harness.bench.limits import hold_to_limit
 from harness.bench.peak_memory import NO_METHOD, measure_peak_bytes
-from harness.body import humanoid
+from harness.body import build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.progress import ProgressBar, ProgressCallback
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import load_scenario
 from harness.mocap import synthetic
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method
-from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.local_experts import HISTORY_AXES
-from harness.reconstruct.features.moment_table import cells_for
-from harness.reconstruct.index import FlatIndex, make_index
-from harness.reconstruct.index.selection import AUTO_INDEX
-from harness.reconstruct.methods.dynamic_map import DynamicMap
-from harness.reconstruct.methods.expert_map import FEATURES, ExpertMap
-from harness.reconstruct.methods.local_pca import LocalPca
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import (
+    FEATURES,
+    HISTORY_AXES,
+    DynamicMap,
+    ExpertMap,
+    LocalPca,
+    Method,
+    MotionDatabase,
+    cells_for,
+    make_method,
+)
+from harness.reconstruct.index import AUTO_INDEX, FlatIndex, make_index
+from harness.reconstruct.solver import POSTURE_SIZE
+from harness.results.findings import BenchmarkStatement
+from harness.stream import TrackerFrame
 from harness.study.speed import benchmark_clips
 from harness.study.speed.benchmark_clips import BenchmarkClip
 from harness.study.speed.round_robin_timing import (
@@ -103,7 +105,7 @@ def _build_database(folder: Path, frames: int, seed: int) -> MotionDatabase:
 
 def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkStatement]) -> list[BenchmarkStatement]:
     """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
-    name, options = speed.method, config_hash(registry.make_method(speed.method))
+    name, options = speed.method, config_hash(make_method(speed.method))
     target, to_ik, to_mink = MIN_SPEED_RATIO.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
     more: dict[str, str | float] = {
         "method": name,
@@ -134,7 +136,7 @@ def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> 
 
     The tables of `expert_map` are counted apart.
     """
-    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.make_method(name)))
+    needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(make_method(name)))
     tables = _table_bytes(name, frames)
     used = peak_bytes - baseline_bytes - tables
     text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
@@ -202,7 +204,7 @@ def query_dimension(method: Method) -> int:
 
 def _table_bytes(name: str, frames: int) -> int:
     """Size of the moment tables of `expert_map` for a database of so many frames; 0 for other methods."""
-    if not isinstance(registry.make_method(name), ExpertMap):
+    if not isinstance(make_method(name), ExpertMap):
         return 0
     sizes = [size + POSTURE_SIZE for size in (FEATURES, HISTORY_AXES)]
     return sum(4 * cells_for(frames) * (size + size * (size + 1) // 2) for size in sizes)
@@ -218,7 +220,7 @@ def _mink_contender(clip: BenchmarkClip) -> TimedStep:
     from harness.bench.ik import mink_solver
 
     calibration = clip.simulation.calibration
-    body = humanoid.build_body(trackers=load_scenario(benchmark_clips.DEFAULT_SCENARIO).nominal_mounts)
+    body = build_body(trackers=load_scenario(benchmark_clips.DEFAULT_SCENARIO).nominal_mounts)
     solve = mink_solver(body, in_world(calibration))
 
     def timed_step(frame: TrackerFrame, previous_truth: Floats) -> tuple[Floats, float]:

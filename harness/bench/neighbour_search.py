@@ -15,20 +15,23 @@ import numpy as np
 
 from harness.bench.common import STATIONS, world_calibration
 from harness.bench.limits import hold_to_limit
-from harness.body import humanoid
-from harness.body.humanoid import Body
+from harness.body import Body, build_body
 from harness.core.arrays import Ints, Singles
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
-from harness.reconstruct.index import INDEXES, ArrayVectors, Lookup, Vectors
-from harness.reconstruct.index.inverted_file import cells_for, probes_for
-from harness.reconstruct.index.selection import FLAT_MAX_VECTORS, best_index
-from harness.reconstruct.methods.dynamic_map import DynamicMap
-from harness.reconstruct.methods.local_pca import LocalPca
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.reconstruct import DynamicMap, ExampleFeatures, FeatureWeights, LocalPca, MotionDatabase
+from harness.reconstruct.index import (
+    FLAT_MAX_VECTORS,
+    INDEXES,
+    ArrayVectors,
+    Lookup,
+    Vectors,
+    best_index,
+    cells_for,
+    probes_for,
+)
+from harness.results.findings import BenchmarkStatement
 from harness.study.speed import benchmark_clips
 
 SIZES = (6_600, 66_000)
@@ -56,7 +59,7 @@ class SearchProblem:
 
 def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkStatement]:
     """Medians over the queries, for all kinds of vectors and databases of `sizes` frames."""
-    body = humanoid.build_body()
+    body = build_body()
     held_out = benchmark_clips.generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
     rows: list[BenchmarkStatement] = []
     for size in sizes:

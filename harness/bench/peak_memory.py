@@ -14,9 +14,7 @@ from scipy.linalg import solve
 
 from harness.core.child_process import run_python
 from harness.core.seeds import generator
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Reconstructor
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct import MotionDatabase, Reconstructor, make_method
 from harness.study.speed import benchmark_clips
 
 NO_METHOD = "nothing"
@@ -34,7 +32,7 @@ def run_method(name: str, folder: Path, seed: int) -> int:
     """Run the method in this process; returns its peak resident memory [bytes]."""
     _load_libraries()
     body, clips = benchmark_clips.build_common_body(), benchmark_clips.generate_held_out_clips(seed, CLIP_S)
-    _run_sessions(registry.make_method("ik:previous").fit(body, [], generator(seed, "bench", "alone")), clips)
+    _run_sessions(make_method("ik:previous").fit(body, [], generator(seed, "bench", "alone")), clips)
     if name != NO_METHOD:
         database = MotionDatabase.open(folder)
         _run_sessions(benchmark_clips.fit_named_method(name, database, seed), clips)

@@ -18,26 +18,24 @@ import numpy as np
 from scipy import special
 
 from harness.bench.limits import hold_to_limit
-from harness.body.retargeting import retarget_to_common_body
+from harness.body import retarget_to_common_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.motion import Clip
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import evaluate_cell
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.experiment.tasks import ClipTask
-from harness.mocap import synthetic
-from harness.mocap.sources import (
+from harness.experiment import ClipEvaluation, ClipTask, evaluate_cell
+from harness.experiment.scenarios import ScenarioMotion
+from harness.mocap import (
     MOCAP_VARIABLE,
     MotionSource,
     SyntheticSource,
     folders_of_environment,
     open_motion_source,
+    synthetic,
 )
-from harness.reconstruct import registry
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.reconstruct import make_method
+from harness.results.findings import BenchmarkStatement
 from harness.study.speed.benchmark_clips import load_clean_scenario
 
 METHOD = "local_pca"
@@ -238,7 +236,7 @@ def _new_to_known(source: MotionSource, takes: dict[str, list[str]], behaviour: 
             scenario = replace(load_clean_scenario(), motion=motion, methods=(METHOD,), seed=seed, vary={})
             (cell,) = ClipTask(scenario, ClipPart.parse(motion.test[0]), behaviour, None, "").cells()
             evaluation = ClipEvaluation(scenario, source, cell.part, behaviour)
-            found = evaluate_cell(evaluation, registry.make_method(METHOD), cell, "", "")
+            found = evaluate_cell(evaluation, make_method(METHOD), cell, "", "")
             errors.append(float(found.scores.metrics["joint_angle_mean_deg"] or np.nan))
         logs.append(np.log(errors[0] / errors[1]))
     return np.array(logs)

@@ -15,12 +15,10 @@ from scipy import special
 from harness.bench.interval_coverage import coverage_rows, earlier_interval
 from harness.bench.limits import hold_to_limit
 from harness.bench.stored_errors import METRICS, load_null_errors
-from harness.compare.margins import margin_of
-from harness.compare.paired_statistics import CONFIDENCE_LEVEL, mean_interval
-from harness.compare.significance import SIGNIFICANCE, decide_verdicts, holm, sign_flip_p
+from harness.compare import CONFIDENCE_LEVEL, SIGNIFICANCE, decide_verdicts, holm, margin_of, mean_interval, sign_flip_p
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 COMPARISONS, CHANGED_COMPARISONS, COVERAGE_COMPARISONS = 1000, 200, 100
 RELATIVE_CHANGE = 0.03

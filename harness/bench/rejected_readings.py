@@ -11,10 +11,10 @@ from pathlib import Path
 
 from harness.bench.limits import hold_to_limit
 from harness.core.calibration import Calibration
-from harness.reconstruct.contract import Reconstructor, Session
-from harness.reconstruct.solver.outlier_gate import OutlierGate
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import Reconstructor, Session
+from harness.reconstruct.solver import OutlierGate
+from harness.results.findings import BenchmarkStatement
+from harness.stream import TrackerFrame
 from harness.study.speed import benchmark_clips
 
 GATED_METHODS = (

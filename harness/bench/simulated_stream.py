@@ -13,13 +13,11 @@ import numpy as np
 from harness.bench.common import MOUNTS, STATIONS, pose_all
 from harness.bench.cpu_time import time_cpu
 from harness.bench.limits import hold_to_limit
-from harness.body import retargeting
+from harness.body import retarget_to_own_body
 from harness.mocap import synthetic
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate import noise
-from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
-from harness.stream.is900.codec.decoder import Decoder
-from harness.stream.is900.codec.reader import CaptureStream
+from harness.results.findings import BenchmarkStatement
+from harness.simulate import Simulation, TrackerConfig, noise_preset, simulate_tracker
+from harness.stream.is900.codec import CaptureStream, Decoder
 
 MAX_RATIO = 13.0
 """Most CPU time of a frame, relative to MuJoCo's kinematics of one pose: as strict as 20,000 frames/s was."""
@@ -28,10 +26,10 @@ MAX_RATIO = 13.0
 def bench_stream(seed: int = 1, repeats: int = 7) -> list[BenchmarkStatement]:
     """Shortest times of `repeats` turns; each turn is one take of 20 s for each part."""
     clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=seed)
-    body, take = retargeting.retarget_to_own_body(clip)
+    body, take = retarget_to_own_body(clip)
 
     def simulate(preset: str) -> Simulation:
-        return simulate_tracker(body, take, MOUNTS, TrackerConfig(), noise.noise_preset(preset), seed=seed)
+        return simulate_tracker(body, take, MOUNTS, TrackerConfig(), noise_preset(preset), seed=seed)
 
     simulation = simulate("default")
     parts: tuple[Callable[[], object], ...] = (

@@ -19,7 +19,7 @@ from harness.bench.cpu_time import hold_cpu_to_limit, overbooked, process_times
 from harness.bench.limits import hold_to_limit
 from harness.core.working_folder import python_command, python_environment
 from harness.errors import HarnessError
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 _POLL_INTERVAL_S = 0.05
 MAX_HELP_RATIO = 15.0

@@ -23,7 +23,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.files import read_json, write_json
-from harness.results.reader import CellResult, load_results
+from harness.results import CellResult, load_results
 
 METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3")
 KINDS = ("settings", "draws")

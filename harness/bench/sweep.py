@@ -22,16 +22,11 @@ from harness.bench.limits import hold_to_limit
 from harness.core.arrays import Floats
 from harness.core.child_process import run_python
 from harness.core.split import ClipPart
-from harness.experiment.cells import evaluate_cell
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.tasks import ClipTask
-from harness.reconstruct import registry
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.index import CellIndex
-from harness.results.table import TIME_COLUMNS, compute_group_statistics, write_table
+from harness.experiment import ClipEvaluation, ClipTask, evaluate_cell
+from harness.experiment.scenarios import Scenario, load_scenario, open_scenario_motion
+from harness.reconstruct import make_method
+from harness.results import TIME_COLUMNS, CellIndex, compute_group_statistics, write_table
+from harness.results.findings import BenchmarkStatement
 
 MANY_CELLS = 100_000
 SMALL_SWEEP, TINY_SWEEP = 200, 20
@@ -113,7 +108,7 @@ def _small_scenario(cells: int) -> Scenario:
 def _time_scoring(scenario: Scenario) -> Floats:
     """Time to evaluate all cells but the first, which also makes what they share; as in `_time_call`."""
     task = ClipTask(scenario, ClipPart.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
-    method, evaluation, start = registry.make_method(scenario.methods[0]), None, process_times()
+    method, evaluation, start = make_method(scenario.methods[0]), None, process_times()
     for index, cell in enumerate(task.cells()):
         if evaluation is None:
             source = open_scenario_motion(cell.scenario.motion, None, scenario.seed)

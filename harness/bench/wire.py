@@ -21,12 +21,16 @@ from harness.bench.limits import hold_to_limit
 from harness.bench.wire_device import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
-from harness.experiment.playback import prepare_playback
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.stream.is900.codec.decoder import Decoder
-from harness.stream.is900.codec.items import STATION_CHARACTERS, record_type
-from harness.stream.is900.codec.reader import FrameReader
-from harness.stream.is900.codec.records import RecordFormat, format_records
+from harness.experiment import prepare_playback
+from harness.results.findings import BenchmarkStatement
+from harness.stream.is900.codec import (
+    STATION_CHARACTERS,
+    Decoder,
+    FrameReader,
+    RecordFormat,
+    format_records,
+    record_type,
+)
 
 METHOD = "expert_map"
 SECONDS, LONG_S = 15.0, 600.0

@@ -14,9 +14,9 @@ from threading import Thread
 
 import numpy as np
 
-from harness.experiment.playback import prepare_playback
-from harness.stream.is900.codec.items import SHORT_LIST, STANDARD_LIST, describe_list
-from harness.stream.is900.emulator import EmulatorConfig, SentMessage, serve_emulator
+from harness.experiment import prepare_playback
+from harness.stream.is900 import EmulatorConfig, SentMessage, serve_emulator
+from harness.stream.is900.codec import SHORT_LIST, STANDARD_LIST, describe_list
 
 SCENARIO, CLIP = "demo", "boxing_p1_01"
 

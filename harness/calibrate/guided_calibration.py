@@ -6,8 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.mounts import Mount
+from harness.body import Body, Mount
 from harness.calibrate.hold import UnusableHold
 from harness.calibrate.performer_preview import PerformerPose, PerformerPreview
 from harness.calibrate.pose_collector import CHECK_EVERY_S, HOLD_S, PoseCollector
@@ -15,7 +14,7 @@ from harness.calibrate.poses import CalibrationPose
 from harness.calibrate.tpose_calibration import TPOSE_S, TPoseCollector, calibrate_tpose
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 Notifier = Callable[[str], None]
 """Shows the user one line of text."""

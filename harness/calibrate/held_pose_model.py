@@ -12,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mounts
+from harness.body import Body, Kinematics, Mount, locate_mounts
 from harness.core import rotations
 from harness.core.arrays import Floats
 

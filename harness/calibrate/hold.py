@@ -12,7 +12,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadInput
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 LEAST_S, LEAST_FRAMES = 2.0, 10
 """Shortest hold: device errors have a correlation time of 1 s (docs/is900.md 13.5) and must average out."""

@@ -16,16 +16,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mounts
+from harness.body import Body, Kinematics, Mount, locate_mounts, tpose
 from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.hold import measure_hold
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 @dataclass(frozen=True, eq=False)

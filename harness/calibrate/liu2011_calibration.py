@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.mounts import Mount
+from harness.body import Mount
 from harness.calibrate.bundle_adjustment import BundleAdjustment
 from harness.calibrate.hold import UnusableHold
 from harness.calibrate.pose_calibration import calibration_of, measure_poses, pose_bundle
@@ -28,7 +28,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.skeleton import Skeleton
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _ROOT = [0, 1, 2, 5]
 """Free components of a root's step: translation, and rotation about the vertical."""

@@ -9,13 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body import ground, kinematics
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mounts
+from harness.body import Body, Kinematics, Mount, locate_mounts, pose_from_qpos, sole_heights_m
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.core.arrays import Floats
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _POSITION_SD_M, _HINGE_SD_RAD = 0.02, float(np.deg2rad(30.0))
 """Standard deviations of a station's position and of a hinge about the wanted pose [m, rad] [choice]."""
@@ -77,6 +74,6 @@ class PerformerPreview:
             step *= min(1.0, _LARGEST_STEP_RAD / max(float(np.abs(step).max()), 1e-9))
             qpos = kinematics_.integrate(qpos, step)
         skeleton = self._body.skeleton
-        soles_m = ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos[None]))
+        soles_m = sole_heights_m(skeleton, pose_from_qpos(skeleton, qpos[None]))
         qpos[2] -= float(soles_m.min())
         return qpos

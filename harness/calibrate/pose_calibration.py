@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body import ground, kinematics
-from harness.body.mounts import Mount
+from harness.body import Mount, pose_from_qpos, sole_heights_m
 from harness.calibrate import pose_checks
 from harness.calibrate.bundle_adjustment import BundleAdjustment
 from harness.calibrate.bundle_fit import BundleFit, CalibrationUncertainty, estimate_uncertainty, fit_bundle
@@ -28,7 +27,7 @@ from harness.core.arrays import Bools, Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 FLOOR_M, FLOOR_RAD = 5e-5, float(np.deg2rad(0.005))
 """Smallest standard deviation of a median reading [m, rad] [choice]; the scatter of each hold is added to it."""
@@ -167,7 +166,7 @@ def _world_from_level(skeleton: Skeleton, at: CalibrationSolution) -> tuple[Floa
     """
     root = rotations.from_matrix(at.world_from_root)
     qpos = humanoid24.pack(at.root_m, root, at.angles_rad)
-    soles_m = np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos)), axis=1)
+    soles_m = np.min(sole_heights_m(skeleton, pose_from_qpos(skeleton, qpos)), axis=1)
     turn = rotations.about_z(-float(rotations.yaw_rad(root[0])))
     origin_m = np.array([*at.root_m[0, :2], np.median(soles_m)])
     return turn, -rotations.rotate(turn, origin_m)

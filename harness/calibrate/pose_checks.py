@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.body.mounts import Mount, locate_mount
+from harness.body import Mount, locate_mount
 from harness.calibrate.bundle_adjustment import BundleAdjustment, ResidualScales
 from harness.calibrate.bundle_fit import BundleFit, levenberg_marquardt_step
 from harness.calibrate.hold import UnusableHold

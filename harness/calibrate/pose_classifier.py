@@ -9,9 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, locate_mounts
+from harness.body import Body, Kinematics, Mount, locate_mounts
 from harness.calibrate.hold import HoldReadings
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations

@@ -16,7 +16,7 @@ from harness.calibrate.hold import SWAY_M, HoldReadings, UnusableHold, measure_h
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 HOLD_S, EDGE_S = 2.7, 0.25
 """Length of a hold, and what is cut off at either end [s]. The rest is `hold.LEAST_S` plus two periods of 10 Hz."""

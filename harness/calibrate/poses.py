@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from harness.body import ground, kinematics
+from harness.body import pose_from_qpos, sole_heights_m
 from harness.core import humanoid24
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
@@ -37,7 +37,7 @@ def pose_angles_rad(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
 def pose_configuration(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
     """(55,) configuration of a body in the pose: upright at the origin, facing x, its lower sole on the floor."""
     qpos = humanoid24.pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), pose_angles_rad(pose, skeleton))
-    qpos[2] = -float(np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos[None]))))
+    qpos[2] = -float(np.min(sole_heights_m(skeleton, pose_from_qpos(skeleton, qpos[None]))))
     return qpos
 
 

@@ -13,15 +13,13 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri
 
-from harness.body.anatomy import body_scale
-from harness.body.humanoid import Body, tpose
-from harness.body.mounts import Mount
+from harness.body import Body, Mount, body_scale, tpose
 from harness.calibrate.held_pose_model import FREE_DOFS, HeldPoseFit, HeldPoseModel
 from harness.calibrate.hold import UnusableHold, measure_hold, span_s
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 TPOSE_S = 3.0
 LEVEL_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.mounts import Mount, locate_mount
+from harness.body import Mount, locate_mount
 from harness.calibrate.held_pose_model import MOUNT_ACROSS_SD_M, MOUNT_ALONG_SD_M
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.core import rotations

@@ -18,7 +18,7 @@ def add_baseline(verbs: Verbs) -> None:
 
 
 def run_baseline(args: argparse.Namespace) -> Outcome:
-    from harness.compare.baseline import write_baseline
+    from harness.compare import write_baseline
 
     folder = write_baseline(args.run, args.name, force=args.force)
     return print_result(

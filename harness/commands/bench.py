@@ -12,7 +12,7 @@ from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.results.findings.benchmark_statement import BenchmarkStatement
+    from harness.results.findings import BenchmarkStatement
 
 ACCURACY = "accuracy"
 """Name of the benchmark of accuracy, which runs alone."""
@@ -113,7 +113,7 @@ def _print_statements(
     The outcome is REGRESSED where a target is missed. Where none is, it is INCOMPLETE where benchmarks were left out.
     """
     from harness.bench.limits import count_missed, outcome_of
-    from harness.report.kit.statement_lines import format_statements
+    from harness.report.kit import format_statements
 
     content, outcome = {"rows": [row.as_dict() for row in rows], **content}, outcome_of(rows)
     if content.get("left_out") and outcome is not Outcome.REGRESSED:
@@ -142,7 +142,7 @@ def _bench_physics_truth(args: argparse.Namespace) -> Outcome:
 def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
     """Print the truth table of the lab's verbs."""
     from harness.bench.lab.truth import SEEDS, lab_truth_rows
-    from harness.experiment.workers.executors import process_executor
+    from harness.experiment.workers import process_executor
 
     seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / LAB
     with long_work(out, "captures") as progress, process_executor(args.jobs or 1) as executor:
@@ -180,7 +180,7 @@ def _bench_ranking(args: argparse.Namespace) -> Outcome:
 @contextmanager
 def _cells(args: argparse.Namespace, name: str) -> Iterator[dict[str, Any]]:
     """Options with which a benchmark runs the cells of scenarios in its folder."""
-    from harness.experiment.workers.executors import process_executor
+    from harness.experiment.workers import process_executor
 
     jobs, out = args.jobs or 1, args.out or Path("results") / name
     with long_work(out, "cells") as bar, process_executor(jobs) as executor:

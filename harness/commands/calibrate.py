@@ -24,8 +24,8 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate.guided_calibration import PoseDisplay
-    from harness.experiment.calibration_session import CalibrationOutcome
+    from harness.calibrate import PoseDisplay
+    from harness.experiment import CalibrationOutcome
 
 _SOURCES = ("recording", "port", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
@@ -84,9 +84,9 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
 
 
 def _draw_sheet(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.poses import POSES
+    from harness.calibrate import POSES
     from harness.core.humanoid24 import standard_skeleton
-    from harness.live.pose_sheet import draw_poses
+    from harness.live import draw_poses
 
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
@@ -98,7 +98,7 @@ def _draw_sheet(args: argparse.Namespace) -> Outcome:
 
 def _measure_accuracy(args: argparse.Namespace) -> Outcome:
     from harness.bench.calibration_accuracy import measure_calibration_accuracy
-    from harness.simulate.noise import noise_preset
+    from harness.simulate import noise_preset
 
     given = {"noise": args.noise, "seed": args.seed}
     if args.miss is not None:
@@ -114,7 +114,7 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
 
 
 def _calibrate_performer(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.calibration_file import EXPECTED, write_calibration
+    from harness.calibrate import EXPECTED, write_calibration
     from harness.core.files import require_writable
 
     if args.out is None:
@@ -131,12 +131,10 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
 
 def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
     """The calibration, and the command that uses it."""
-    from harness.experiment.calibration_session import CalibrationSession
-    from harness.experiment.playback import select_stations
-    from harness.experiment.scenarios.scenario_reader import load_scenario
-    from harness.live.pose_terminal import PoseTerminal
-    from harness.live.viewer import ViewerOutput
-    from harness.stream.is900.driver import DriverConfig, open_tracker
+    from harness.experiment import CalibrationSession, select_stations
+    from harness.experiment.scenarios import load_scenario
+    from harness.live import PoseTerminal, ViewerOutput
+    from harness.stream.is900 import DriverConfig, open_tracker
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
@@ -167,9 +165,8 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
 
 def _calibrate_from_recording(args: argparse.Namespace) -> "tuple[CalibrationOutcome, list[str]]":
     """The calibration, and the command that uses it."""
-    from harness.experiment.calibration_session import CalibrationSession
-    from harness.experiment.recorded_takes import name_recorded_stations
-    from harness.stream.recording.replay import RecordingStream
+    from harness.experiment import CalibrationSession, name_recorded_stations
+    from harness.stream.recording import RecordingStream
 
     stream = RecordingStream(args.recording)
     for lost in stream.recording.damage:

@@ -4,21 +4,24 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body.humanoid import build_body
-from harness.body.places import NAMED_PLACES
+from harness.body import NAMED_PLACES, build_body
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import count_noun
 from harness.core.split import declared_training_data, training_note
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
-from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep, shipped_sweeps
-from harness.experiment.tasks import cell_names
+from harness.experiment import cell_names
+from harness.experiment.scenarios import (
+    Scenario,
+    expand_sweep,
+    load_scenario,
+    load_sweep,
+    shipped_scenarios,
+    shipped_sweeps,
+)
 from harness.mocap import synthetic
-from harness.reconstruct import registry
+from harness.reconstruct import list_methods, make_method, method_origin
 from harness.report.figures.writer import KINDS
-from harness.score.metrics import DEFINITIONS
-from harness.score.uncertainty import SIGMA_DEFINITIONS
-from harness.stream.inputs import INPUT_COMBINATIONS
+from harness.score import DEFINITIONS, SIGMA_DEFINITIONS
+from harness.stream import INPUT_COMBINATIONS
 from harness.study.placement.config import load_placement_study, shipped_placements
 
 TUNING_PREFIXES = ("tune_", "validate_")
@@ -29,7 +32,7 @@ def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
     """Title -> name -> one line. `every`: also the scenarios that only choose or check constants."""
     scenarios = [path.stem for path in shipped_scenarios()]
     return {
-        "methods": {name: _describe_method(name) for name in registry.list_methods()},
+        "methods": {name: _describe_method(name) for name in list_methods()},
         "scenarios": {
             name: _describe_scenario(name) for name in scenarios if every or not name.startswith(TUNING_PREFIXES)
         },
@@ -53,10 +56,10 @@ def build_catalogue(*, every: bool = False) -> dict[str, dict[str, str]]:
 
 def _describe_method(name: str) -> str:
     """What it does, what it needs, and where it comes from."""
-    method = registry.make_method(name)
+    method = make_method(name)
     examples = "examples" if method.needs_examples else "no examples"
     note = training_note(declared_training_data(method))
-    said = [method.summary, f"needs {examples}, takes any inputs", note, registry.method_origin(name)]
+    said = [method.summary, f"needs {examples}, takes any inputs", note, method_origin(name)]
     return "; ".join(part for part in said if part)
 
 

@@ -22,7 +22,7 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.stream.recording.guided_capture import Stretch
+    from harness.stream.recording import Stretch
 
 _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
 """Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
@@ -44,9 +44,9 @@ def add_characterize(verbs: Verbs) -> None:
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
-    from harness.report.kit.page_text import render_text
+    from harness.report.kit import render_text
     from harness.report.lab.unit_page import unit_page
-    from harness.stream.recording.station_readings import CaptureReader
+    from harness.stream.recording import CaptureReader
     from harness.study.trust.characterization import characterize_capture
 
     options = UnitOptions(args.out, args.expect, args.force)
@@ -94,9 +94,9 @@ def _capture_of(args: argparse.Namespace) -> Path:
 
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
-    from harness.measure.episode_distributions import events_for_precision
-    from harness.stream.is900.driver import DriverConfig
-    from harness.stream.recording.guided_capture import capture_stretches, finished_stretches
+    from harness.measure import events_for_precision
+    from harness.stream.is900 import DriverConfig
+    from harness.stream.recording import capture_stretches, finished_stretches
 
     path: Path = args.out.with_suffix(".rec")
     minutes = args.minutes or _DEFAULT_STATIC_MIN
@@ -123,7 +123,7 @@ def _record_stretches(args: argparse.Namespace) -> Path:
 
 
 def _stretches(static_s: float) -> "tuple[Stretch, ...]":
-    from harness.stream.recording.guided_capture import Stretch
+    from harness.stream.recording import Stretch
 
     return (
         Stretch("static", static_s, "let all stations lie still, in sight of the emitters", True),

@@ -23,15 +23,15 @@ def add_check(verbs: Verbs) -> None:
 
 
 def run_check(args: argparse.Namespace) -> Outcome:
-    from harness.reconstruct import registry
+    from harness.reconstruct import is_built_in, list_methods, make_method
     from harness.testing.check_process import check_rules_apart
     from harness.testing.method_checks import check_rules
     from harness.testing.rules import RULES
 
     found: dict[str, list[RuleResult]] = {}
     with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        names = args.methods or sorted(registry.list_methods())
-        inside = {name: registry.make_method(name) for name in names if registry.is_built_in(name)}
+        names = args.methods or sorted(list_methods())
+        inside = {name: make_method(name) for name in names if is_built_in(name)}
         for name in names:
             found[name] = []
             for finding in check_rules(inside[name]) if name in inside else check_rules_apart(name):

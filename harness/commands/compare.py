@@ -26,7 +26,7 @@ def add_compare(verbs: Verbs) -> None:
 
 
 def run_compare(args: argparse.Namespace) -> Outcome:
-    from harness.compare.comparison import compare_runs
+    from harness.compare import compare_runs
     from harness.report.comparison.page import comparison_text, write_comparison_page
 
     if args.b is None and not args.methods:

@@ -26,8 +26,8 @@ from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.experiment.scenarios.scenario import Scenario
-    from harness.stream.is900.emulator.config import EmulatorConfig
+    from harness.experiment.scenarios import Scenario
+    from harness.stream.is900 import EmulatorConfig
 
 
 def add_emulate(verbs: Verbs) -> None:
@@ -70,10 +70,8 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
-    from harness.stream.is900.codec.capacity import check_emulated_capacity, check_range
-    from harness.stream.is900.codec.items import missing_items
-    from harness.stream.is900.emulator.server import open_port, play_samples
-    from harness.stream.is900.emulator.udp_broadcast import LOOPBACK, parse_udp_address
+    from harness.stream.is900 import LOOPBACK, open_port, parse_udp_address, play_samples
+    from harness.stream.is900.codec import check_emulated_capacity, check_range, missing_items
 
     if args.pty and args.anywhere and not args.udp:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
@@ -124,7 +122,7 @@ def _following(args: argparse.Namespace, port: str, *, quality: bool) -> list[st
 
 
 def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None) -> "EmulatorConfig":
-    from harness.stream.is900.emulator.config import EmulatorConfig
+    from harness.stream.is900 import EmulatorConfig
 
     options = {"firmware": args.firmware, "stylus_bytes": args.stylus_bytes, "udp_port": udp_port}
     options |= {"characters": parse_characters(args.stations)}

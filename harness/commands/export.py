@@ -25,7 +25,7 @@ def add_export(verbs: Verbs) -> None:
 
 
 def run_export(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.run_export import export_run
+    from harness.experiment import export_run
 
     folder = args.out or args.run / "export" / args.format
     clips, methods = _entries("clip", args.clip), _entries("method", args.method)

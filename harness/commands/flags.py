@@ -9,7 +9,7 @@ from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.experiment.methods.isolation import Isolation
+    from harness.experiment.methods import Isolation
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
@@ -267,6 +267,6 @@ def add_isolation_flags(verb: argparse.ArgumentParser) -> None:
 
 def read_isolation(args: argparse.Namespace) -> "Isolation":
     """The isolation that those flags ask for."""
-    from harness.experiment.methods.isolation import DEFAULT_TIME_LIMIT_S, Isolation
+    from harness.experiment.methods import DEFAULT_TIME_LIMIT_S, Isolation
 
     return Isolation(args.isolate, args.time_limit or DEFAULT_TIME_LIMIT_S, args.memory_limit)

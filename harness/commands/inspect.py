@@ -40,8 +40,8 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
 
         return inspect_constellation(args)
     refuse_flags(args, _OF_CONSTELLATIONS, f"with {args.file.name}", "It is for an MCF file of emitters.")
-    from harness.mocap.file_inspection import inspect_file as inspect
-    from harness.mocap.sources import folders_of_environment
+    from harness.mocap import folders_of_environment
+    from harness.mocap import inspect_file as inspect
 
     library = args.mocap or folders_of_environment() or None
     found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)

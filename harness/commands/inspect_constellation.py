@@ -16,11 +16,18 @@ from harness.report.coverage.content import (
     PlanView,
     StationRow,
 )
-from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
-from harness.simulate.physics.coverage import EmitterCoverage, emitter_coverage, grid_m, plan_axes_m
+from harness.simulate.physics import (
+    Constellation,
+    ConstellationSettings,
+    EmitterCoverage,
+    emitter_coverage,
+    grid_m,
+    load_constellation,
+    plan_axes_m,
+)
 
 if TYPE_CHECKING:
-    from harness.body.mounts import Mount
+    from harness.body import Mount
     from harness.core.motion import Clip
 
 HEIGHTS_M = (0.3, 1.0, 1.7)
@@ -42,8 +49,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     constellation = _load(args.file)
     from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page
-    from harness.report.kit.page_html import write_page
-    from harness.report.kit.page_text import render_text
+    from harness.report.kit import render_text, write_page
 
     with show_steps("parts"):
         report_step("coverage")
@@ -65,8 +71,7 @@ def _load(path: Path) -> Constellation:
     """The constellation in a file; a bare name that no file has is a shipped one."""
     from harness.core.input_file import names_input_file
     from harness.core.ranges import check_words
-    from harness.simulate.physics.constellation import constellation_path
-    from harness.simulate.physics.emitters import read_mcf
+    from harness.simulate.physics import constellation_path, read_mcf
 
     check_words(path)
     if path.parent == Path() and not names_input_file(path):
@@ -75,9 +80,8 @@ def _load(path: Path) -> Constellation:
 
 
 def _content(args: argparse.Namespace, constellation: Constellation) -> CoverageContent:
-    from harness.simulate.link import TrackerConfig
-    from harness.simulate.physics.inertial import Inertial
-    from harness.simulate.physics.schedule import Schedule
+    from harness.simulate import TrackerConfig
+    from harness.simulate.physics import Inertial, Schedule
 
     extent_m = np.ptp(constellation.position_m, axis=0)
     turn_s = len(constellation) * Schedule(Inertial().rate_hz, len(constellation)).slot_s
@@ -121,11 +125,10 @@ def _place_rows(constellation: Constellation, floor_m: float) -> list[CoverageRo
 
 def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tuple[str, list[StationRow]]:
     """The name of the clip, and the coverage of each station of its performer."""
-    from harness.body.retargeting import retarget_to_own_body
+    from harness.body import retarget_to_own_body
     from harness.commands.viewed_motion import open_clip
-    from harness.simulate.link import TrackerConfig
-    from harness.simulate.physics.coverage import station_coverage
-    from harness.simulate.simulation import exact_calibration
+    from harness.simulate import TrackerConfig, exact_calibration
+    from harness.simulate.physics import station_coverage
 
     mounts = _mounts(args.stations or DEFAULT_STATIONS)
     clip: Clip = open_clip(args.clip, args.mocap, args.rate)
@@ -140,8 +143,7 @@ def _station_rows(args: argparse.Namespace, constellation: Constellation) -> tup
 
 def _mounts(name: str) -> "list[Mount]":
     """The nominal mounts of a set of stations; UnknownName."""
-    from harness.experiment.scenarios.scenario import Station
-    from harness.experiment.scenarios.scenario_reader import read_station_sets
+    from harness.experiment.scenarios import Station, read_station_sets
 
     sets = read_station_sets()
     if name not in sets:

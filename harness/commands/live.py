@@ -23,11 +23,11 @@ from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate.calibration_file import CalibrationFile
-    from harness.experiment.playback import Playback
-    from harness.stream.is900.driver import DriverConfig, Tracker
-    from harness.stream.line_events import EventCounter
-    from harness.stream.recording.recorder import RecordingSwitch
+    from harness.calibrate import CalibrationFile
+    from harness.experiment import Playback
+    from harness.stream import EventCounter
+    from harness.stream.is900 import DriverConfig, Tracker
+    from harness.stream.recording import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
@@ -84,16 +84,12 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.guided_calibration import TPoseCalibrator
+    from harness.calibrate import TPoseCalibrator
     from harness.commands import live_summary
-    from harness.experiment.methods.isolation import DEFAULT_ISOLATION
-    from harness.experiment.methods.remote_method import resolve_method
-    from harness.live.outputs import OutputOptions, open_outputs
-    from harness.live.pose import SessionSetup
-    from harness.live.scheduling_jitter import JitterProbe
-    from harness.live.session import LiveOptions, run_session, warm_up
-    from harness.stream.line_events import EventCounter
-    from harness.stream.recording.recorder import RecordingSwitch
+    from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
+    from harness.live import JitterProbe, LiveOptions, OutputOptions, SessionSetup, open_outputs, run_session, warm_up
+    from harness.stream import EventCounter
+    from harness.stream.recording import RecordingSwitch
 
     output_options = OutputOptions(
         vmc=args.vmc,
@@ -172,8 +168,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 
 def _driver_config(args: argparse.Namespace, playback: "Playback") -> "DriverConfig":
     """How the tracker is set up for the stations and the motion of a playback."""
-    from harness.stream.is900.codec.items import position_range_m
-    from harness.stream.is900.driver import DriverConfig
+    from harness.stream.is900 import DriverConfig
+    from harness.stream.is900.codec import position_range_m
 
     options = {"items": playback.tracker.items, **line_options(args, args.port)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
@@ -190,7 +186,7 @@ def _open_device(
     recorder: "RecordingSwitch | None" = None,
 ) -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream.is900.driver import open_tracker
+    from harness.stream.is900 import open_tracker
 
     rate_hz = playback.tracker.rate_hz
     with open_tracker(port, config, observer=recorder, on_event=events) as device:
@@ -208,7 +204,7 @@ def _open_device(
 
 def _read_calibration(name: str) -> "CalibrationFile":
     """A calibration by `harness calibrate`; UnknownName for what names neither a file nor a kind."""
-    from harness.calibrate.calibration_file import read_calibration
+    from harness.calibrate import read_calibration
 
     if not Path(name).suffix:
         raise UnknownName("file or kind of calibration", name, _CALIBRATION_KINDS)
@@ -221,8 +217,8 @@ def _calibrate_by_poses(
     port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", options: PlaybackOptions
 ) -> "CalibrationFile":
     """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
-    from harness.experiment.calibration_session import CalibrationSession
-    from harness.live.pose_terminal import PoseTerminal
+    from harness.experiment import CalibrationSession
+    from harness.live import PoseTerminal
 
     session = CalibrationSession(options.scenario, tuple(playback.scenario.stations), folder=options.folder)
     with _open_device(port, config, playback, events) as device:

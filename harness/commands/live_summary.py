@@ -5,7 +5,7 @@ from typing import Any
 
 from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
-from harness.live.session import LiveResult
+from harness.live import LiveResult
 
 
 def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,8 +22,7 @@ def add_mocap(verbs: Verbs) -> None:
 
 
 def run_mocap_list(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.library import MotionLibrary, ignored_paths_note
-    from harness.mocap.sources import find_library_folders
+    from harness.mocap import MotionLibrary, find_library_folders, ignored_paths_note
 
     library = MotionLibrary(find_library_folders(args.mocap))
     entries = library.entries()
@@ -40,7 +39,7 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
 
 
 def run_mocap_fetch(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.fetch import fetch_cmu
+    from harness.mocap import fetch_cmu
 
     subjects = [s.strip() for s in args.subjects.split(",") if s.strip()]
     where = {"base_url": args.url} if args.url else {}

@@ -104,7 +104,7 @@ def recording_note(path: Path, more: str = ".") -> Iterator[None]:
 
 
 def _describe_progress(out: Path) -> str:
-    from harness.experiment.status import read_status
+    from harness.experiment import read_status
 
     if not out.is_dir():
         return f"Nothing is kept in {out}."

@@ -11,7 +11,7 @@ from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.results.findings.placement_findings import PlacementFindings, StatisticalPower
+    from harness.results.findings import PlacementFindings, StatisticalPower
     from harness.study.placement.question import PlacementQuestion
 
 _QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "physics", "minutes", "clips", "seed")
@@ -58,10 +58,10 @@ def parse_sizes(text: str) -> tuple[int, int]:
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.workers.executors import process_executor
+    from harness.experiment.workers import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
     from harness.report.placement.wording import placement_sentence
-    from harness.results.files.folder_kind import FINDINGS
+    from harness.results.files import FINDINGS
     from harness.study.placement import placement_study
 
     question = _read_question(args)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from harness.commands.flags import is_whole_number, parse_device_names
 
 if TYPE_CHECKING:
-    from harness.experiment.playback import Playback
-    from harness.experiment.scenarios.scenario import Scenario
-    from harness.mocap.library import LibraryFolders
+    from harness.experiment import Playback
+    from harness.experiment.scenarios import Scenario
+    from harness.mocap import LibraryFolders
 
 DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
@@ -41,8 +41,8 @@ class PlaybackOptions:
 
 def open_playback(options: PlaybackOptions) -> "Playback":
     """The playback that the options ask for; UnknownName, BadFile and BadInput as for a run of the scenario."""
-    from harness.experiment.playback import prepare_playback
-    from harness.experiment.scenarios.scenario_reader import load_scenario
+    from harness.experiment import prepare_playback
+    from harness.experiment.scenarios import load_scenario
 
     stations = options.stations
     if stations is None and not options.every_station:

@@ -23,7 +23,7 @@ from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.stream.recording.recording import RecordingWriter
+    from harness.stream.recording import RecordingWriter
 
 SIMULATION_PREFIX = "sim:"
 """Prefix of a scenario's name in place of a port: the simulated line is recorded."""
@@ -85,9 +85,9 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
-    from harness.mocap.synthetic.takes import stretch_marks
-    from harness.stream.is900.emulator.faults import add_byte_faults, unapplied_kinds
-    from harness.stream.recording.recording import RecordingWriter, record_capture
+    from harness.mocap.synthetic import stretch_marks
+    from harness.stream.is900 import add_byte_faults, unapplied_kinds
+    from harness.stream.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
     RecordingWriter(args.file, plan).close()  # refuses a file that cannot be written before a long simulation
@@ -125,7 +125,7 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     """The entry of a recording's note that names the plan it was made for; none without a plan."""
     if args.plan is None:
         return {}
-    from harness.stream.recording.recording import PLAN_FILE
+    from harness.stream.recording import PLAN_FILE
     from harness.study.trust.plan import plan_digest
 
     return {PLAN_FILE: plan_digest(args.plan)}
@@ -133,11 +133,15 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
 
 def _record_line(args: argparse.Namespace) -> Outcome:
     """Record a device that is set up here, that another program uses, or that is sent commands."""
-    from harness.stream.is900.driver import DriverConfig
-    from harness.stream.recording.command_recording import check_commands, format_exchanges, record_commands
-    from harness.stream.recording.line_server import serve_line
-    from harness.stream.recording.recorder import record_port
-    from harness.stream.recording.recording import RecordingWriter
+    from harness.stream.is900 import DriverConfig
+    from harness.stream.recording import (
+        RecordingWriter,
+        check_commands,
+        format_exchanges,
+        record_commands,
+        record_port,
+        serve_line,
+    )
 
     settings = [name for name in LINE_FLAGS if name != "baud"]
     if args.serve is not None:

@@ -15,10 +15,8 @@ from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
-    from harness.experiment.evaluation import Evaluation
-    from harness.experiment.observed_take import ObservedTake
-    from harness.stream.recording.recording import Recording
-    from harness.stream.recording.replay import RecordingStream
+    from harness.experiment import Evaluation, ObservedTake
+    from harness.stream.recording import Recording, RecordingStream
 
 
 def add_replay(verbs: Verbs) -> None:
@@ -44,8 +42,7 @@ def add_replay(verbs: Verbs) -> None:
 
 
 def run_replay(args: argparse.Namespace) -> Outcome:
-    from harness.stream.recording.recording import read_recording
-    from harness.stream.recording.replay import RecordingStream, parse_speed
+    from harness.stream.recording import RecordingStream, parse_speed, read_recording
 
     speed, recording = parse_speed(args.speed), read_recording(args.file)
     if recording.answers and not recording.formats:
@@ -61,15 +58,15 @@ def run_replay(args: argparse.Namespace) -> Outcome:
 
 def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
     """Print the commands of a recording that has no frames."""
-    from harness.stream.recording.command_recording import format_exchanges
+    from harness.stream.recording import format_exchanges
 
     content = {"frames": 0, "lost": recording.damage, "answers": recording.answers}
     return print_result(args, content, *format_exchanges(recording.answers))
 
 
 def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness.stream.recording.command_recording import format_exchanges
-    from harness.stream.station_counts import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
+    from harness.stream import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
+    from harness.stream.recording import format_exchanges
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:
@@ -111,9 +108,8 @@ def _format_counts(stream: "RecordingStream") -> str:
 
 
 def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness.calibrate.calibration_file import read_calibration
-    from harness.experiment.evaluation import check_methods, evaluate_each
-    from harness.experiment.recorded_takes import find_playback, has_station_names, recorded_take
+    from harness.calibrate import read_calibration
+    from harness.experiment import check_methods, evaluate_each, find_playback, has_station_names, recorded_take
 
     options = {
         "scenario": args.scenario,
@@ -163,7 +159,7 @@ def format_score_table(evaluations: Sequence["Evaluation"]) -> str:
 
 def _missing_records(take: "ObservedTake") -> list[str]:
     """A line if fewer records arrived than let anything be measured, unless the recording's scenario allows it."""
-    from harness.score.loops import COVERAGE_FLOOR
+    from harness.score import COVERAGE_FLOOR
 
     if take.records_arrived >= COVERAGE_FLOOR * take.records_expected:
         return []

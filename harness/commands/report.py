@@ -21,7 +21,7 @@ def add_report(verbs: Verbs) -> None:
 
 
 def run_report(args: argparse.Namespace) -> Outcome:
-    from harness.results.files.folder_kind import require_kind
+    from harness.results.files import require_kind
 
     kind = require_kind(args.run, "run", "sweep", "placement", "paper")
     if args.readme:
@@ -45,7 +45,7 @@ def run_report(args: argparse.Namespace) -> Outcome:
 
 def _report_sweep(args: argparse.Namespace) -> Outcome:
     from harness.report.sweep.page import write_sweep_page
-    from harness.results.files.integrity import check_cells
+    from harness.results.files import check_cells
 
     check_cells(args.run)
     with show_steps("parts of the report"):
@@ -63,8 +63,8 @@ def _report_placement(args: argparse.Namespace) -> Outcome:
 
 def _report_paper(args: argparse.Namespace) -> Outcome:
     from harness.report.paper.page import update_readme, write_paper_page
-    from harness.results.files.folder_kind import FINDINGS
-    from harness.results.findings.paper_findings import read_findings
+    from harness.results.files import FINDINGS
+    from harness.results.findings import read_findings
 
     with show_steps("parts of the report"):
         page = write_paper_page(args.run)

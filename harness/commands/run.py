@@ -38,11 +38,10 @@ def add_all_flag(verb: argparse.ArgumentParser) -> None:
 def run_scenario(args: argparse.Namespace) -> Outcome:
     from dataclasses import replace
 
-    from harness.experiment import engine
-    from harness.experiment.scenarios.scenario_checks import check_scenario
-    from harness.experiment.scenarios.scenario_reader import load_scenario
+    from harness.experiment import run
+    from harness.experiment.scenarios import check_scenario, load_scenario
     from harness.report.run.text import run_table
-    from harness.results.storage import read_summary
+    from harness.results import read_summary
 
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
@@ -52,7 +51,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with long_work(out, "cells") as bar:
-        outcome = engine.run(
+        outcome = run(
             scenario,
             out,
             folder=args.mocap,
@@ -82,10 +81,10 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
 
 def _named_methods(text: str, own: tuple[str, ...]) -> tuple[str, ...]:
     """The methods that `--methods` names; `all` stands for the scenario's `own` and the others that are installed."""
-    from harness.reconstruct import registry
+    from harness.reconstruct import list_methods
 
     named = parse_methods(text)
     if EVERY_METHOD not in named:
         return named
-    every = (*own, *registry.list_methods())
+    every = (*own, *list_methods())
     return tuple(dict.fromkeys(each for name in named for each in (every if name == EVERY_METHOD else (name,))))

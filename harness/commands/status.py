@@ -10,7 +10,7 @@ from harness.commands.output import print_result
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
-    from harness.experiment.status import RunStatus
+    from harness.experiment import RunStatus
 
 _MAX_FAILURES = 10
 
@@ -22,7 +22,7 @@ def add_status(verbs: Verbs) -> None:
 
 
 def run_status(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.status import read_status
+    from harness.experiment import read_status
 
     found = read_status(args.folder)
     content = {
@@ -44,7 +44,7 @@ def run_status(args: argparse.Namespace) -> Outcome:
 
 
 def _status_lines(found: "RunStatus") -> list[str]:
-    from harness.report.kit.text import last_line
+    from harness.report.kit import last_line
 
     counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
     state = "running" if found.running else "finished" if not found.remaining else "not running"

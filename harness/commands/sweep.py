@@ -30,12 +30,12 @@ def add_sweep(verbs: Verbs) -> None:
 
 
 def run_sweep(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.engine import run_sweep as run
-    from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
-    from harness.experiment.workers.executors import dask_executor, process_executor
+    from harness.experiment import run_sweep as run
+    from harness.experiment.scenarios import expand_sweep, load_sweep
+    from harness.experiment.workers import dask_executor, process_executor
     from harness.report.sweep.data import read_sweep
     from harness.report.sweep.page import sweep_text, write_sweep_page
-    from harness.results.files.integrity import read_summary_json
+    from harness.results.files import read_summary_json
 
     if args.dask and args.jobs and args.dask != "local":
         raise BadInput("--jobs with --dask.", "The scheduler has workers of its own: leave --jobs out.")

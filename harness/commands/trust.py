@@ -24,9 +24,8 @@ def add_trust(verbs: Verbs) -> None:
 
 
 def run_trust(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.workers.executors import process_executor
-    from harness.report.kit.page_html import write_page
-    from harness.report.kit.page_text import render_text
+    from harness.experiment.workers import process_executor
+    from harness.report.kit import render_text, write_page
     from harness.report.lab.trust_page import trust_page
     from harness.study.trust.trust_study import run_trust_study
 

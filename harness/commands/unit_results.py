@@ -11,9 +11,9 @@ from harness.core.progress import show_steps
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from harness.measure.reports.departures import Departure
-    from harness.measure.unit_file import UnitFile
-    from harness.report.kit.page import Page
+    from harness.measure import UnitFile
+    from harness.measure.reports import Departure
+    from harness.report.kit import Page
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def add_unit_flags(verb: argparse.ArgumentParser, out: str) -> None:
 def read_expected(options: UnitOptions) -> "UnitFile | None":
     """The unit file to compare with; None without one. Also checks that the one of `out` can be written."""
     from harness.core.files import require_writable
-    from harness.measure.unit_file import UNIT_FILE, read_unit_file
+    from harness.measure import UNIT_FILE, read_unit_file
 
     if options.out is not None:
         require_writable(options.out, UNIT_FILE, force=options.force)
@@ -57,8 +57,8 @@ def read_expected(options: UnitOptions) -> "UnitFile | None":
 
 def write_unit(options: UnitOptions, unit: "UnitFile", page: "Page") -> tuple[list[str], dict[str, str]]:
     """Write a unit file and its page: lines that say so, and content; nothing without `out`."""
-    from harness.measure.unit_file import write_unit_file
-    from harness.report.kit.page_html import write_page
+    from harness.measure import write_unit_file
+    from harness.report.kit import write_page
 
     if options.out is None:
         return [], {}

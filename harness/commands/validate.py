@@ -30,9 +30,9 @@ def add_validate(verbs: Verbs) -> None:
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
-    from harness.report.kit.page_text import render_text
+    from harness.report.kit import render_text
     from harness.report.lab.validation_page import validation_page
-    from harness.stream.recording.station_readings import CaptureReader
+    from harness.stream.recording import CaptureReader
     from harness.study.trust.capture_readings import read_capture
     from harness.study.trust.truth_source import TruthSource, load_truth
     from harness.study.trust.validation import evaluate_registered, session_unit, validate_capture

@@ -13,7 +13,7 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.view.page import ViewedMotion
+    from harness.view import ViewedMotion
 
 _MOST_SAVED_S = 60.0
 """Longest movie that the page may ask for [s]; `--save` has no such limit."""
@@ -41,7 +41,7 @@ def add_view(verbs: Verbs) -> None:
 
 
 def run_view(args: argparse.Namespace) -> Outcome:
-    from harness.view.movie import check_movie
+    from harness.view import check_movie
 
     if args.save is not None:
         check_movie(args.save)
@@ -76,7 +76,7 @@ def _open(args: argparse.Namespace) -> "ViewedMotion":
 
 
 def _save_movie(args: argparse.Namespace, motion: "ViewedMotion") -> int:
-    from harness.view.movie import MOST_METHODS, MoviePart, write_movie
+    from harness.view import MOST_METHODS, MoviePart, write_movie
 
     clip = motion.clip(0)
     names = [track.name for track in clip.estimates]
@@ -89,7 +89,7 @@ def _save_movie(args: argparse.Namespace, motion: "ViewedMotion") -> int:
 
 def _save_page(path: Path, motion: "ViewedMotion") -> None:
     from harness.core.files import write_text
-    from harness.view.page import write_page
+    from harness.view import write_page
 
     with ProgressBar("clips") as bar:
         write_text(path, write_page(motion, bar))
@@ -101,8 +101,7 @@ def _serve(args: argparse.Namespace, motion: "ViewedMotion") -> Outcome:
     import threading
     import webbrowser
 
-    from harness.view.page import ViewerContent
-    from harness.view.server import ViewServer
+    from harness.view import ViewerContent, ViewServer
 
     token = secrets.token_urlsafe(24)
     content = ViewerContent(motion, token)
@@ -126,9 +125,8 @@ def _save_for_page(content: Any, wanted: Mapping[str, Any]) -> Mapping[str, Any]
     """Make the movie that the page asks for, and serve it; BadInput for a request that makes no sense."""
     from tempfile import TemporaryDirectory
 
-    from harness.report.kit.text import to_file_name
-    from harness.view.movie import MOVIE_SUFFIXES, MoviePart, write_movie
-    from harness.view.server import Resource
+    from harness.report.kit import to_file_name
+    from harness.view import MOVIE_SUFFIXES, MoviePart, Resource, write_movie
 
     try:
         number, methods = int(wanted["clip"]), [str(name) for name in wanted["methods"]]

@@ -13,14 +13,20 @@ from harness.core.motion import Clip
 from harness.core.progress import ProgressCallback
 from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.clip_file import CLIP_FORMATS, read_clip
-from harness.mocap.library import LibraryFolders, MotionLibrary
-from harness.mocap.sources import SyntheticSource, find_library_folders, folders_of_environment
-from harness.report.kit.motion_player import NO_ESTIMATE, PlayerClip, PlayerStations, PlayerTrack, hold_last
-from harness.view.page import ViewedMotion
+from harness.mocap import (
+    CLIP_FORMATS,
+    LibraryFolders,
+    MotionLibrary,
+    SyntheticSource,
+    find_library_folders,
+    folders_of_environment,
+    read_clip,
+)
+from harness.report.kit import NO_ESTIMATE, PlayerClip, PlayerStations, PlayerTrack, hold_last
+from harness.view import ViewedMotion
 
 if TYPE_CHECKING:
-    from harness.stream.frame import TrackerFrame
+    from harness.stream import TrackerFrame
 
 _SEED = 1
 """Seed of built-in motion that is named by its take, as in the shipped scenarios."""
@@ -132,11 +138,10 @@ def _view_recording(
     progress: ProgressCallback,
 ) -> ViewedMotion:
     """The readings of a recording, with the truth and the estimates where the played scenario is known."""
-    from harness.experiment.evaluation import check_methods, evaluate_each
-    from harness.experiment.recorded_takes import find_playback, recorded_take
-    from harness.score.pair import compute_poses
-    from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig
-    from harness.stream.recording.replay import RecordingStream
+    from harness.experiment import check_methods, evaluate_each, find_playback, recorded_take
+    from harness.score import compute_poses
+    from harness.simulate import WORLD_FROM_TRACKER, TrackerConfig
+    from harness.stream.recording import RecordingStream
 
     stream = RecordingStream(path)
     lost = [f"Lost: {text}." for text in stream.recording.damage]

@@ -32,18 +32,9 @@ from harness.core.files import (
 )
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, shorten
-from harness.results.files.digests import file_digest, insert_digest, write_result_json
-from harness.results.files.folder_kind import CELLS_FILE
-from harness.results.files.integrity import read_summary_json
-from harness.results.reader import (
-    BASELINE_FILES,
-    BASELINES,
-    COUNT_METRICS,
-    SCHEMA,
-    ResultSet,
-    load_results,
-)
-from harness.score.metrics import DEFINITIONS
+from harness.results import BASELINE_FILES, BASELINES, COUNT_METRICS, SCHEMA, ResultSet, load_results
+from harness.results.files import CELLS_FILE, file_digest, insert_digest, read_summary_json, write_result_json
+from harness.score import DEFINITIONS
 
 _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "methods", "groups")
 """Keys of summary.json that a baseline keeps: a run has `methods`, a sweep has `groups`."""

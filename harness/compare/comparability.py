@@ -7,8 +7,7 @@ from harness.compare.differences import PairGroup
 from harness.compare.matching import RELAXABLE_KEYS, CellPairing, format_cell_name
 from harness.core.files import to_json_types
 from harness.errors import UnknownName
-from harness.results.manifest import flatten
-from harness.results.reader import ResultSet
+from harness.results import ResultSet, flatten
 
 EVERYTHING = "everything"
 """Allows differing inputs, any coverage and unpaired cells; the pairing of cells does not change."""

@@ -30,8 +30,7 @@ from harness.compare.units import Sampling
 from harness.core.files import to_json_types
 from harness.core.split import training_note
 from harness.errors import Outcome
-from harness.results.manifest import Manifest, flatten
-from harness.results.reader import ResultSet, load_results
+from harness.results import Manifest, ResultSet, flatten, load_results
 
 __all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare_results", "compare_runs"]
 

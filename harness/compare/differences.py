@@ -13,7 +13,7 @@ from harness.compare.matching import CellPair
 from harness.compare.significance import SignificanceResult, Verdict, decide_verdicts
 from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Floats
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,7 @@ from typing import Any
 
 from harness.core.files import content_key, to_json_types
 from harness.errors import BadInput, UnknownName
-from harness.results.cell import varied_text
-from harness.results.manifest import flatten
-from harness.results.reader import CellResult, ResultSet
+from harness.results import CellResult, ResultSet, flatten, varied_text
 
 PAIRING_KEYS = ("scenario", "clip", "seed", "method", "inputs", "split", "noise", "varied")
 RELAXABLE_KEYS = ("scenario", "seed", "inputs", "split", "noise", "varied")

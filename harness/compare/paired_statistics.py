@@ -19,7 +19,7 @@ from harness.compare.units import Sampling, average_units
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.findings.benchmark_statement import Verdict
+from harness.results.findings import Verdict
 
 MIN_UNITS = 6
 """Least number of units that can show a difference: with five, sign flips give a p of 2/32 or more."""

@@ -19,7 +19,7 @@ from scipy import special
 from harness.compare.paired_statistics import MIN_UNITS
 from harness.compare.significance import SIGNIFICANCE, holm
 from harness.core.arrays import Floats
-from harness.results.findings.trust_findings import PairAgreement, PairVerdict, SideDifference
+from harness.results.findings import PairAgreement, PairVerdict, SideDifference
 
 
 def tau_b(a: Floats, b: Floats) -> Floats:

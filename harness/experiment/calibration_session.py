@@ -7,18 +7,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from harness.body.humanoid import Body, build_body
-from harness.body.mounts import Mount
-from harness.calibrate import calibration_report
-from harness.calibrate.calibration_file import CalibrationFile
-from harness.calibrate.guided_calibration import Notifier, PoseDisplay, PoseGuide
-from harness.calibrate.performer_preview import PerformerPreview
-from harness.calibrate.pose_calibration import calibrate_poses
-from harness.calibrate.pose_classifier import PoseClassifier
-from harness.calibrate.pose_collector import PoseCollector
-from harness.calibrate.poses import POSES, CalibrationPose, pose_configuration
-from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
-from harness.calibrate.tpose_calibration import calibrate_tpose
+from harness.body import Body, Mount, build_body
+from harness.calibrate import (
+    POSES,
+    CalibrationFile,
+    CalibrationPose,
+    Notifier,
+    PerformerPreview,
+    PoseClassifier,
+    PoseCollector,
+    PoseDisplay,
+    PoseGuide,
+    SkeletonPrior,
+    calibrate_poses,
+    calibrate_tpose,
+    fit_skeleton_prior,
+    pose_configuration,
+    report_pose_calibration,
+    report_tpose_calibration,
+)
 from harness.core.arrays import Floats
 from harness.core.package_data import VERSION
 from harness.core.split import ClipPart
@@ -26,9 +33,8 @@ from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import MotionSource
-from harness.stream.frame import TrackerFrame
+from harness.mocap import LibraryFolders, MotionSource
+from harness.stream import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
 
@@ -118,14 +124,14 @@ class CalibrationSession:
             calibration, skeleton, (words, lines) = (
                 eight.calibration,
                 eight.skeleton,
-                calibration_report.report_pose_calibration(eight),
+                report_pose_calibration(eight),
             )
         else:
             tpose = calibrate_tpose(held[0], self.body, self.mounts)
             calibration, skeleton, (words, lines) = (
                 tpose.calibration,
                 self.body.skeleton,
-                calibration_report.report_tpose_calibration(tpose),
+                report_tpose_calibration(tpose),
             )
         made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {VERSION}"}
         made |= {"source": source, "scenario": self.resolved_scenario.name}

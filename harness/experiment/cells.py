@@ -26,12 +26,10 @@ from harness.experiment.observed_take import simulated_take
 from harness.experiment.scenarios.motion_source import forget_motion, open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.tasks import ClipTask, PlannedCell
-from harness.reconstruct.contract import Method
-from harness.results import manifest, storage
-from harness.results.cell import as_row, cell_folder, read_row
-from harness.score.loops import COVERAGE_FLOOR
-from harness.score.score import score_estimate
-from harness.stream.is900.codec.items import record_size
+from harness.reconstruct import Method
+from harness.results import Cell, as_row, cell_folder, has_cell, read_row, source_hash, write_cell
+from harness.score import COVERAGE_FLOOR, score_estimate
+from harness.stream.is900.codec import record_size
 
 _ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
 _READINGS = {"quality": float, "position_valid": bool, "orientation_valid": bool, "suspect": bool}
@@ -71,7 +69,7 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
         try:
             evaluation, method = _clip_evaluation(task, cell.scenario), find_method(cell.method, task.isolation).method
             key = evaluation.key(method, cell.method, cell.inputs, cell.identity)
-            if storage.has_cell(out, key):
+            if has_cell(out, key):
                 yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
                 continue
             evaluated = evaluate_cell(evaluation, method, cell, key, task.command)
@@ -82,12 +80,12 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             yield CellOutcome(str(cell), failure=describe_failure(error), refused=refused)
 
 
-def _write_cell(out: Path, cell: storage.Cell) -> None:
+def _write_cell(out: Path, cell: Cell) -> None:
     """Write a cell; SystemFault when the system refuses, which is no failure of the cell: all others would fail too."""
     with named_folder_fault(out):
         if not out.is_dir():  # it would be made anew, for one cell
             raise FileNotFoundError(out)
-        storage.write_cell(out, cell)
+        write_cell(out, cell)
 
 
 @cache
@@ -110,9 +108,7 @@ def _clip_evaluation(task: ClipTask, scenario: Scenario) -> ClipEvaluation:
     return _recent_evaluations[0]
 
 
-def evaluate_cell(
-    evaluation: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
-) -> storage.Cell:
+def evaluate_cell(evaluation: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
     """Fit a method, run it over the simulated stream, and score its estimates at the frames that they answer.
 
     A method with a lag leaves the last frames of the take unanswered: the cell has no rows for them. Its lag is one of
@@ -148,7 +144,7 @@ def evaluate_cell(
         estimate_skeleton=calibration.body.skeleton,
         floor=np.inf if too_slow else COVERAGE_FLOOR,
     )
-    return storage.Cell(
+    return Cell(
         key=key,
         method=planned.method,
         behaviour=evaluation.behaviour,
@@ -170,7 +166,7 @@ def evaluate_cell(
         calibration_errors=calibration.errors,
         bone_m=evaluation.body.skeleton.bone_m,
         estimate_bone_m=calibration.body.skeleton.bone_m,
-        source_hash=manifest.source_hash(),
+        source_hash=source_hash(),
         reproduce=command,
         notes=evaluation.notes(method),
         time_s=simulation.truth_s[frame_index],

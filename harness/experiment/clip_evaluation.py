@@ -11,9 +11,17 @@ from typing import Self
 
 import numpy as np
 
-from harness.body import humanoid, retargeting
-from harness.body.mounts import locate_mount
-from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
+from harness.body import (
+    Body,
+    RetargetReport,
+    build_body,
+    locate_mount,
+    retarget_to_common_body,
+    retarget_to_own_body,
+    retarget_with_same_angles,
+)
+from harness.calibrate import SkeletonPrior, fit_skeleton_prior
+from harness.core.files import digest
 from harness.core.humanoid24 import select_bones, standard_skeleton
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.seeds import generator
@@ -34,16 +42,11 @@ from harness.experiment.simulated_calibration import (
     simulate_tpose_calibration,
     use_exact_calibration,
 )
-from harness.mocap.shared_motion import find_shared_motion
-from harness.mocap.sources import MotionSource
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor
-from harness.results import manifest, storage
-from harness.score.loops import WARM_UP_S
-from harness.score.metrics import VERSIONS
-from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.simulation import Simulation, simulate_tracker
-from harness.simulate.trajectory import Trajectory
+from harness.mocap import MotionSource, find_shared_motion
+from harness.reconstruct import Method, Reconstructor, without_options
+from harness.results import cell_key, source_hash
+from harness.score import VERSIONS, WARM_UP_S
+from harness.simulate import Simulation, Trajectory, perturb_mounts, simulate_tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +75,11 @@ class Subject:
         return self.source.other_skeletons(without=self.source.subject(self.part.clip))
 
     @cached_property
-    def body(self) -> humanoid.Body:
+    def body(self) -> Body:
         """The performer's true body."""
         if self.motion.body == "own":
-            return humanoid.build_body(select_bones(self.clip.skeleton)[0])
-        return humanoid.build_body(standard_skeleton())
+            return build_body(select_bones(self.clip.skeleton)[0])
+        return build_body(standard_skeleton())
 
     @cached_property
     def full_take(self) -> BodyMotion:
@@ -84,19 +87,19 @@ class Subject:
         return self._retargeted[0]
 
     @property
-    def retarget_report(self) -> retargeting.RetargetReport | None:
+    def retarget_report(self) -> RetargetReport | None:
         """Errors of retargeting the test clip; None on the performer's own proportions."""
         return self._retargeted[1]
 
     @cached_property
-    def _retargeted(self) -> tuple[BodyMotion, retargeting.RetargetReport | None]:
+    def _retargeted(self) -> tuple[BodyMotion, RetargetReport | None]:
         return self.on_body(self.clip, self.body)
 
-    def on_body(self, clip: Clip, body: humanoid.Body) -> tuple[BodyMotion, retargeting.RetargetReport | None]:
+    def on_body(self, clip: Clip, body: Body) -> tuple[BodyMotion, RetargetReport | None]:
         """A clip on a body, and the errors of retargeting; None for the test clip on its performer's proportions."""
         kind = self.motion.body
         if clip.name == self.clip.name and kind == "own" and body is self.body:
-            return retargeting.retarget_to_own_body(clip)[1], None
+            return retarget_to_own_body(clip)[1], None
         if kind == "own" or body is not self.body:
             return _retarget(clip, kind, body.skeleton)
         return _retarget_to_standard(clip, kind)
@@ -174,16 +177,16 @@ class Training:
     """The examples of a subject on one body, and the methods that were fitted to them."""
 
     subject: Subject
-    body: humanoid.Body
+    body: Body
     """The body that methods are given: the performer's, or the one that a calibration estimated."""
     _fits: dict[str, Reconstructor] = field(default_factory=dict)
 
     @cached_property
-    def _retargeted(self) -> list[tuple[BodyMotion, retargeting.RetargetReport | None]]:
+    def _retargeted(self) -> list[tuple[BodyMotion, RetargetReport | None]]:
         return [self.subject.on_body(clip, self.body) for clip in self.subject.example_clips]
 
     @property
-    def retarget_reports(self) -> list[retargeting.RetargetReport | None]:
+    def retarget_reports(self) -> list[RetargetReport | None]:
         """Errors of retargeting each example clip."""
         return [report for _, report in self._retargeted]
 
@@ -202,7 +205,7 @@ class Training:
     def fit(self, method: Method, name: str) -> Reconstructor:
         """The method of that name, fitted once to the examples."""
         if name not in self._fits:
-            rng = generator(self.subject.seed, "method", registry.without_options(name))
+            rng = generator(self.subject.seed, "method", without_options(name))
             examples = [replace(take) for take in self.examples] if method.needs_examples else []
             self._fits[name] = method.fit(self.body, examples, rng)
         return self._fits[name]
@@ -288,9 +291,9 @@ class Observation:
             "disturbance": scenario.disturbance.as_dict(),
             "clip": str(subject.part),
             "motion_digest": _motion_digest(subject.clip),
-            "body_digest": storage.digest(skeleton.bone_m, skeleton.axes, subject.body.limits_rad),
-            "mounts_digest": storage.digest(*mounts),
-            **({"people_digest": storage.digest(*(p.bone_m for p in subject.people.values()))} if with_prior else {}),
+            "body_digest": digest(skeleton.bone_m, skeleton.axes, subject.body.limits_rad),
+            "mounts_digest": digest(*mounts),
+            **({"people_digest": digest(*(p.bone_m for p in subject.people.values()))} if with_prior else {}),
             "metric_versions": VERSIONS,
         }
 
@@ -343,7 +346,7 @@ class ClipEvaluation:
         return object.__new__(ClipEvaluation)._set(self.scenario, self.subject, self.observation, calibration)
 
     @property
-    def body(self) -> humanoid.Body:
+    def body(self) -> Body:
         """The performer's true body."""
         return self.subject.body
 
@@ -410,7 +413,7 @@ class ClipEvaluation:
         if name not in self._methods:
             self._methods[name] = NamedMethod(name, method).identity
         content = {**self.conditions_of(method, inputs), **identity}
-        return storage.cell_key(content, self._methods[name], manifest.source_hash())
+        return cell_key(content, self._methods[name], source_hash())
 
 
 def _replace_keys(scenario: Scenario, other: Scenario, keys: Sequence[str]) -> Scenario:
@@ -418,13 +421,13 @@ def _replace_keys(scenario: Scenario, other: Scenario, keys: Sequence[str]) -> S
 
 
 @lru_cache(maxsize=256)
-def _retarget_to_standard(clip: Clip, kind: str) -> tuple[BodyMotion, retargeting.RetargetReport]:
+def _retarget_to_standard(clip: Clip, kind: str) -> tuple[BodyMotion, RetargetReport]:
     """Retargeting to the standard skeleton. It is the same for every test clip, hence done once per process."""
     return _retarget(clip, kind, standard_skeleton())
 
 
-def _retarget(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[BodyMotion, retargeting.RetargetReport]:
-    onto = retargeting.retarget_with_same_angles if kind == "common" else retargeting.retarget_to_common_body
+def _retarget(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[BodyMotion, RetargetReport]:
+    onto = retarget_with_same_angles if kind == "common" else retarget_to_common_body
     return onto(clip, skeleton)
 
 
@@ -432,7 +435,7 @@ def _retarget(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[BodyMotion, re
 def _motion_digest(clip: Clip) -> str:
     skeleton = clip.skeleton
     where = np.array([clip.rate_hz]), skeleton.bone_m, skeleton.axes
-    return storage.digest(*where, clip.root_m, clip.world_from_root, clip.angles_rad)
+    return digest(*where, clip.root_m, clip.world_from_root, clip.angles_rad)
 
 
 def _cut_take(take: BodyMotion, frames: range, name: str) -> BodyMotion:
@@ -462,7 +465,7 @@ def thin_takes(takes: Sequence[BodyMotion], count: int) -> list[BodyMotion]:
     return out
 
 
-def _resample(body: humanoid.Body, take: BodyMotion, rate_hz: float) -> BodyMotion:
+def _resample(body: Body, take: BodyMotion, rate_hz: float) -> BodyMotion:
     """The take at the tracker's rate, on the same smooth trajectory that the simulation samples."""
     trajectory = Trajectory(body, take)
     count_steps(trajectory.duration_s, 1.0 / rate_hz, take.name)

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import retarget_to_own_body
 from harness.core.motion import Clip
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.simulate.simulation import Simulation, simulate_tracker
+from harness.simulate import Simulation, simulate_tracker
 
 
 def simulate_clip(clip: Clip, scenario: Scenario | Path | str = "demo") -> Simulation:

@@ -32,8 +32,8 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.sweep_config import Sweep
 from harness.experiment.workers.executors import TaskExecutor, process_executor, run_in_process
 from harness.experiment.workers.task_loop import evaluate_tasks
-from harness.mocap.library import LibraryFolders
-from harness.results.index import CellIndex
+from harness.mocap import LibraryFolders
+from harness.results import CellIndex
 
 
 @dataclass(frozen=True)

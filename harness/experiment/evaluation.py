@@ -21,11 +21,8 @@ from harness.experiment.methods.method_process import MethodFailure
 from harness.experiment.methods.method_run import NO_ANSWERS, MethodAnswers, describe_failure
 from harness.experiment.methods.remote_method import resolve_method, run_over_frames
 from harness.experiment.observed_take import ObservedTake
-from harness.reconstruct.contract import Method
-from harness.score.loops import LoopScores, score_loops
-from harness.score.metrics import FRAME_METRICS
-from harness.score.timing import step_times_ms
-from harness.score.uncertainty import score_sigma
+from harness.reconstruct import Method
+from harness.score import FRAME_METRICS, LoopScores, score_loops, score_sigma, step_times_ms
 
 
 @dataclass(frozen=True, eq=False)

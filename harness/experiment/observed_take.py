@@ -12,12 +12,9 @@ from harness.core.arrays import Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.score.loops import COVERAGE_FLOOR, LoopFrames
-from harness.score.pair import PoseSequence, compute_poses
-from harness.simulate.simulation import sampling_times_s
-from harness.simulate.trajectory import Trajectory
-from harness.stream.frame import TrackerFrame, split_frames
-from harness.stream.inputs import make_inputs
+from harness.score import COVERAGE_FLOOR, LoopFrames, PoseSequence, compute_poses
+from harness.simulate import Trajectory, sampling_times_s
+from harness.stream import TrackerFrame, make_inputs, split_frames
 
 
 @dataclass(frozen=True, eq=False)

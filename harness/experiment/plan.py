@@ -19,9 +19,8 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.tracker_setup import TrackerSetup
 from harness.experiment.tasks import ClipTask, cell_names, plan_tasks, split_task
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import MotionSource
-from harness.results.manifest import Manifest, describe_run
+from harness.mocap import LibraryFolders, MotionSource
+from harness.results import Manifest, describe_run
 
 _CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault", "unit")
 """Keys of a scenario that are no inputs of a sweep; the name is in the scenario's label."""

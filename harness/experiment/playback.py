@@ -10,11 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.humanoid import Body
-from harness.body.mounts import Mount
-from harness.calibrate.calibration_file import CalibrationFile
-from harness.calibrate.poses import POSES, pose_configuration
+from harness.body import Body, Mount, build_body
+from harness.calibrate import POSES, CalibrationFile, pose_configuration
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
@@ -25,10 +22,9 @@ from harness.experiment.scenarios.motion_source import expand_clips, open_scenar
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
-from harness.mocap.library import LibraryFolders
-from harness.simulate.loop import simulate_loop
-from harness.simulate.simulation import Simulation, TrackerConfig
-from harness.stream.is900.codec.samples import DeviceSamples
+from harness.mocap import LibraryFolders
+from harness.simulate import Simulation, TrackerConfig, simulate_loop
+from harness.stream.is900.codec import DeviceSamples
 
 
 class Playback:
@@ -88,7 +84,7 @@ class Playback:
         if kept.performer and self.performer and kept.performer != self.performer:
             who = shorten(f"the calibration is of performer {kept.performer}; {self.clip_evaluation.part} is of")
             say(f"{who} {self.performer}")
-        body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
+        body = self.body if chosen.skeleton is None else build_body(chosen.skeleton)
         calibrated = PerformerCalibration(chosen.calibration, body, {})
         evaluation = self.clip_evaluation.with_calibration(calibrated)
         return Playback(evaluation, posing=self.posing, performer=self.performer)

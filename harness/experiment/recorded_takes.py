@@ -21,15 +21,13 @@ from harness.experiment.observed_take import ObservedTake
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.measure.registration import Registration
-from harness.mocap.library import LibraryFolders
-from harness.score.loops import WARM_UP_S, LoopFrames
-from harness.simulate.simulation import sampling_times_s
-from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.items import STATION_CHARACTERS
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.recording.recording import EXPECTED_FILE
-from harness.stream.recording.replay import RecordingStream
+from harness.measure import Registration
+from harness.mocap import LibraryFolders
+from harness.score import WARM_UP_S, LoopFrames
+from harness.simulate import sampling_times_s
+from harness.stream import TrackerFrame
+from harness.stream.is900.codec import STATION_CHARACTERS, DeviceSamples
+from harness.stream.recording import EXPECTED_FILE, RecordingStream
 
 RATE_TOLERANCE = 0.02
 """Relative tolerance within which a rate measured by the driver counts as the scenario's."""

@@ -3,16 +3,12 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from harness.body.anatomy import body_geoms
-from harness.body.mounts import locate_mount
+from harness.body import body_geoms, locate_mount
 from harness.core.fields import build
 from harness.errors import BadInput
 from harness.experiment.scenarios.scenario import Station
-from harness.mocap.write.body_model import BodyModel, MountedStation
-from harness.mocap.write.export import export_motion
-from harness.mocap.write.posed_motion import PosedMotion
-from harness.results.cell import Cell
-from harness.results.reader import select_cells
+from harness.mocap.write import BodyModel, MountedStation, PosedMotion, export_motion
+from harness.results import Cell, select_cells
 
 
 def export_run(

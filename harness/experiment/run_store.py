@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_summary.run_statistics import compute_run_statistics
+from harness.compare.run_summary import compute_run_statistics
 from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY
 from harness.core.progress import ProgressCallback
@@ -16,8 +16,7 @@ from harness.errors import BadInput, Outcome
 from harness.experiment.cells import CellOutcome
 from harness.experiment.plan import CellPlan, RunPlan
 from harness.experiment.workers.cell_watcher import ProgressCount, graceful_stop
-from harness.results import storage
-from harness.results.index import CellIndex
+from harness.results import CellIndex, open_run, remove_leftovers, write_summary
 
 
 @dataclass
@@ -44,7 +43,7 @@ class CellStore:
         The first Ctrl-C makes the file `stop`, see `graceful_stop`.
         """
         (self.out / "cells").mkdir(exist_ok=True)
-        storage.remove_leftovers(self.out)
+        remove_leftovers(self.out)
         index, names, sources = self.index, self.plan.names, self.plan.sources
         index.expect(names)
         # While the code is the same, cells of the last time count as finished before they are looked at again.
@@ -61,7 +60,7 @@ class CellStore:
                 else:
                     yield
         finally:
-            storage.remove_leftovers(self.out)  # of workers that were stopped at once
+            remove_leftovers(self.out)  # of workers that were stopped at once
 
     def record(self, outcome: CellOutcome) -> None:
         """Put the outcome of one cell into the index."""
@@ -97,7 +96,7 @@ class RunFolder:
         If every cell is refused, the first refusal is raised (BadInput).
         """
         plan, out = self.plan, self.out
-        with storage.open_run(out, plan.manifest), named_folder_fault(out), CellIndex(out) as index:
+        with open_run(out, plan.manifest), named_folder_fault(out), CellIndex(out) as index:
             index.add_from_folders()
             index.plan(plan.names)
             index.note(kind=plan.kind, name=plan.name, command=plan.command)
@@ -114,7 +113,7 @@ class RunFolder:
     def _write_summary(self, index: CellIndex) -> Mapping[str, Any]:
         plan, manifest = self.plan, self.plan.manifest
         orders = plan.scenarios[0].expected_order
-        return storage.write_summary(
+        return write_summary(
             index,
             self.out,
             compute_run_statistics(index, self.out, orders, manifest.training_data) if plan.kind == "run" else {},

@@ -9,27 +9,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.body.humanoid import Body, build_body, tpose
-from harness.body.mounts import Mount
-from harness.calibrate.guided_calibration import PoseGuide
-from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
-from harness.calibrate.liu2011_calibration import calibrate_liu2011
-from harness.calibrate.pose_calibration import calibrate_poses
-from harness.calibrate.pose_classifier import PoseClassifier
-from harness.calibrate.pose_collector import PoseCollector
-from harness.calibrate.poses import POSES, pose_configuration
-from harness.calibrate.skeleton_prior import SkeletonPrior
-from harness.calibrate.tpose_calibration import calibrate_tpose
+from harness.body import Body, Mount, build_body, tpose
+from harness.calibrate import (
+    POSES,
+    PoseClassifier,
+    PoseCollector,
+    PoseGuide,
+    SensorMaps,
+    SkeletonPrior,
+    calibrate_kim2012,
+    calibrate_liu2011,
+    calibrate_poses,
+    calibrate_tpose,
+    pose_configuration,
+)
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.simulate.calibration_motion import hold_poses
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import Simulation, TrackerConfig, exact_calibration, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.simulate import Noise, Simulation, TrackerConfig, exact_calibration, hold_poses, simulate_tracker
+from harness.stream import TrackerFrame
 
 
 @dataclass(frozen=True, eq=False)

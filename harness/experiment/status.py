@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import BadFile
-from harness.results.files.folder_kind import is_running, require_kind
-from harness.results.files.integrity import check_folder, check_index
-from harness.results.index import INDEX_FILE, CellIndex
+from harness.results import INDEX_FILE, CellIndex
+from harness.results.files import check_folder, check_index, is_running, require_kind
 
 
 @dataclass(frozen=True)

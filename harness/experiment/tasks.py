@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 from harness.core.split import ClipPart
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.scenarios.scenario import Scenario
-from harness.mocap.library import LibraryFolders, absolute_folders
-from harness.results.cell import varied_text
+from harness.mocap import LibraryFolders, absolute_folders
+from harness.results import varied_text
 
 T = TypeVar("T")
 

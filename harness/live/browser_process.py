@@ -16,8 +16,7 @@ from harness.errors import BadInput
 from harness.live.live_statistics import LiveStatistics
 from harness.live.pose import SessionSetup
 from harness.live.shared_memory import PoseRing
-from harness.view.live_page import LiveContent
-from harness.view.server import ViewServer
+from harness.view import LiveContent, ViewServer
 
 _RATE_HZ = 30.0
 """Most frames per second that are sent to the page."""

@@ -15,7 +15,7 @@ from harness.core.interrupts import shield_children
 from harness.errors import BadFile, BadInput, HarnessError
 from harness.live.pose import LivePose, SessionSetup
 from harness.live.shared_memory import PoseRing, first_message
-from harness.stream.recording.recorder import RecordingSwitch
+from harness.stream.recording import RecordingSwitch
 
 _END_TIMEOUT_S = 2.0
 

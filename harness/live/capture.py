@@ -6,7 +6,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Generic, TypeVar
 
-from harness.stream.frame import TrackerFrame, TrackerStream
+from harness.stream import TrackerFrame, TrackerStream
 
 T = TypeVar("T")
 

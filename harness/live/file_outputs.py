@@ -18,7 +18,7 @@ from harness.core.fault_report import is_system_fault
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile
 from harness.live.pose import LivePose
-from harness.mocap.write.bvh import channel_values, format_row, hierarchy_lines
+from harness.mocap.write import channel_values, format_row, hierarchy_lines
 
 _SAVE_PERIOD_S = 1.0
 

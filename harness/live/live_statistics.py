@@ -14,8 +14,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.estimate import LOST_AFTER_S, Status
 from harness.core.number_format import format_fixed
-from harness.stream.frame import TrackerFrame
-from harness.stream.station_counts import StationCounts
+from harness.stream import StationCounts, TrackerFrame
 
 SECONDS_KEPT = 60
 """Number of summaries that are kept."""

@@ -15,7 +15,7 @@ from harness.live.lsl import LslOutput
 from harness.live.pose import Output, SessionSetup
 from harness.live.viewer import ViewerOutput
 from harness.live.vmc import VmcOutput
-from harness.stream.recording.recorder import RecordingSwitch
+from harness.stream.recording import RecordingSwitch
 
 
 @dataclass(frozen=True)

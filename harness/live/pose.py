@@ -6,13 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
+from harness.body import Body, Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate
 from harness.core.skeleton import Skeleton
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from harness.calibrate.poses import CalibrationPose, pose_configuration
+from harness.calibrate import CalibrationPose, pose_configuration
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.live.viewer import ViewerOutput

@@ -10,9 +10,8 @@ from typing import TextIO
 
 import numpy as np
 
-from harness.body import kinematics
-from harness.calibrate.guided_calibration import GuidedPose
-from harness.calibrate.pose_collector import HOLD_S
+from harness.body import pose_from_qpos
+from harness.calibrate import HOLD_S, GuidedPose
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 
@@ -80,7 +79,7 @@ def guided_lines(guided: GuidedPose, skeleton: Skeleton, *, figures: bool) -> li
 
 def draw_figure(qpos: Floats, skeleton: Skeleton) -> list[str]:
     """`ROWS` lines of `COLUMNS` braille characters: the bones of a configuration (55,), the root in the middle."""
-    pose = kinematics.pose_from_qpos(skeleton, qpos[None])
+    pose = pose_from_qpos(skeleton, qpos[None])
     start_m = pose.start_m[0]
     end_m = start_m + (pose.world_from_bone[0] @ skeleton.bone_m[:, :, None])[..., 0]
     share = np.linspace(0.0, 1.0, 40)[:, None, None]

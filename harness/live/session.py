@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Thread
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.calibrate.guided_calibration import Calibrator, Notifier
+from harness.body import Body, Kinematics
+from harness.calibrate import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Origin, Status
 from harness.core.number_format import count_noun
@@ -20,9 +19,8 @@ from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
 from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
 from harness.live.pose import LivePose, Output
-from harness.reconstruct.contract import Reconstructor, Session
-from harness.stream.frame import TrackerFrame, TrackerStream
-from harness.stream.host_clock import HostClockEstimator
+from harness.reconstruct import Reconstructor, Session
+from harness.stream import HostClockEstimator, TrackerFrame, TrackerStream
 
 QUEUE_FRAMES = 32
 """Length of the queue of frames, a quarter of a second at 120 Hz. Solving is several times faster than the frame rate,

@@ -9,7 +9,7 @@ from harness.core.arrays import Floats
 from harness.core.child_process import FunctionProcess
 from harness.core.estimate import Status
 from harness.live.pose import LivePose
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 ViewerKind = Literal["window", "frames"]
 _START_TIMEOUT_S = 60.0

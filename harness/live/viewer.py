@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from harness.calibrate.guided_calibration import GuidedPose
+from harness.calibrate import GuidedPose
 from harness.core.arrays import Floats
 from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children

@@ -11,8 +11,7 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
 import numpy as np
 from PIL import Image
 
-from harness.body.humanoid import tpose
-from harness.body.rendering import BodyMesh, RenderScene
+from harness.body import BodyMesh, RenderScene, tpose
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Status

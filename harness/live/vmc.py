@@ -15,7 +15,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body.humanoid import tpose
+from harness.body import tpose
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Status

@@ -1,0 +1,61 @@
+"""What a stream shows of a device: its errors, its timing, its registration, and unit files."""
+
+from typing import TYPE_CHECKING
+
+from harness.core.door import lazy_names
+
+if TYPE_CHECKING:
+    from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
+    from harness.measure.episode_distributions import events_for_precision
+    from harness.measure.episodes import Episodes, find_excursions, find_gaps
+    from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
+    from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
+    from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
+    from harness.measure.profile import QualityClass, StretchLength, UnitProfile, measure_profile
+    from harness.measure.registration import (
+        LEAST_OVERLAP_S,
+        Registration,
+        StationResiduals,
+        register_poses,
+        require_stamps,
+    )
+    from harness.measure.rigid_pair import RigidPair
+    from harness.measure.timing import TIMING_KEYS
+    from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
+
+else:
+    __getattr__, __dir__ = lazy_names(__name__)
+
+__all__ = [
+    "CUT_ADVICE",
+    "LEAST_OVERLAP_S",
+    "NOISE_KEYS",
+    "TIMING_KEYS",
+    "UNIT_FILE",
+    "Episodes",
+    "ErrorProcess",
+    "ErrorSpectrum",
+    "MeasuredPoses",
+    "QualityClass",
+    "Registration",
+    "RigidPair",
+    "StationResiduals",
+    "StretchLength",
+    "TruthPoses",
+    "TruthSpline",
+    "UnitFile",
+    "UnitProfile",
+    "coarse_offset",
+    "events_for_precision",
+    "find_excursions",
+    "find_gaps",
+    "identify_stations",
+    "measure_profile",
+    "measure_spectrum",
+    "pool_spectra",
+    "read_unit_file",
+    "record_period_s",
+    "register_poses",
+    "require_stamps",
+    "write_unit_file",
+]

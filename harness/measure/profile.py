@@ -22,7 +22,7 @@ from harness.measure.noise_fit import NoiseFit, fit_noise, start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
 from harness.measure.timing import TimingAccumulator, TimingMeasurement
-from harness.stream.recording.station_readings import CaptureBlock, CaptureReader, StationReadings
+from harness.stream.recording import CaptureBlock, CaptureReader, StationReadings
 
 STATIC_CORRELATIONS = 10.0
 """Least length of a rest, in correlation times of the drift."""

@@ -7,7 +7,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, find_runs, freeze
 from harness.core.motion import count_steps
-from harness.stream.recording.station_readings import StationReadings
+from harness.stream.recording import StationReadings
 
 MIN_REST_S = 5.0
 """Shortest rest that is used [s]."""

@@ -14,7 +14,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.core.seeds import generator
-from harness.stream.recording.station_readings import CaptureBlock, StationReadings
+from harness.stream.recording import CaptureBlock, StationReadings
 
 TIMING_KEYS = (
     "timing.rate_hz",

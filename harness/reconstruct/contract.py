@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 if TYPE_CHECKING:
-    from harness.reconstruct.database import MotionDatabase
+    from harness.reconstruct.database.motion_database import MotionDatabase
 
 
 class Session(Protocol):

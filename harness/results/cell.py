@@ -30,8 +30,7 @@ from harness.results.files.content_types import (
     find_impossible_sigma,
 )
 from harness.results.files.digests import check_file, check_key, insert_digest, read_result_json
-from harness.score.metrics import FRAME_METRICS, VERSIONS
-from harness.score.score import Scores
+from harness.score import FRAME_METRICS, VERSIONS, Scores
 
 IDENTITY = (
     "method",

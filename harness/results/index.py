@@ -20,7 +20,7 @@ from harness.core.input_file import check_input_file
 from harness.core.parsing import parse_json
 from harness.errors import BadFile
 from harness.results.cell import IDENTITY, OPTIONAL_COLUMNS, TRAILING_COLUMNS, read_row
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 INDEX_FILE = "index.sqlite"
 TEXTS = (

@@ -21,7 +21,7 @@ from harness.core.package_data import PACKAGE_FOLDER, VERSION, data_folder
 from harness.core.split import StatisticalUnit
 from harness.errors import BadFile, UnknownName
 from harness.results.files.digests import read_result_json
-from harness.score.metrics import VERSIONS
+from harness.score import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "ezc3d", "mink")
 """Packages whose versions are listed; "absent" if not installed."""

@@ -18,7 +18,7 @@ from harness.results.files.integrity import check_folder, check_row
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest, flatten
 from harness.results.storage import read_cells
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 if TYPE_CHECKING:
     from pandas import DataFrame

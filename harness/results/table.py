@@ -12,8 +12,7 @@ from harness.core.csv_text import csv_line
 from harness.core.files import write_parts
 from harness.results.cell import EXTRA_IDENTITY, IDENTITY, OPTIONAL_COLUMNS, varied_text
 from harness.results.index import CellIndex
-from harness.score.metrics import DEFINITIONS
-from harness.score.uncertainty import SIGMA_DEFINITIONS
+from harness.score import DEFINITIONS, SIGMA_DEFINITIONS
 
 FIRST_METRICS = (
     "frames_matched",

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.body import ground, kinematics
-from harness.body.humanoid import Body
+from harness.body import Body, pose_from_qpos, sole_heights_m
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
@@ -83,6 +82,6 @@ def _put_on_floor(body: Body, qpos: Floats, shift_m: Floats, yaw_rad: float) -> 
     out = np.array(qpos)
     out[:2] += shift_m
     out[3:7] = rotations.multiply(rotations.about_z(yaw_rad), out[3:7])
-    soles_m = ground.sole_heights_m(body.skeleton, kinematics.pose_from_qpos(body.skeleton, out[None]))
+    soles_m = sole_heights_m(body.skeleton, pose_from_qpos(body.skeleton, out[None]))
     out[2] -= float(soles_m.min())
     return out

@@ -10,8 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.mounts import Mount
+from harness.body import Body, Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
@@ -23,7 +22,7 @@ from harness.simulate.readings import SimulatedReadings
 from harness.simulate.rest_pieces import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec.samples import DeviceSamples, FilterSamples
+from harness.stream.is900.codec import DeviceSamples, FilterSamples
 
 SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 """Shortest duration of the return [s], and the walking speed and turning rate that may lengthen it."""

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.body.kinematics import pose_from_qpos
-from harness.body.mounts import Mount
+from harness.body import Mount, pose_from_qpos
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -23,7 +22,7 @@ from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.readings import FilterReadings, SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec.samples import FilterSamples
+from harness.stream.is900.codec import FilterSamples
 
 _LEAD_OUT_S = 0.5
 """Motion after the take: the last slot may end later than it [s]."""

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.mounts import Mount, locate_mount
+from harness.body import Body, Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
@@ -20,10 +19,15 @@ from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import apply_device_settings, simulate_physical_readings
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.items import position_range_m
-from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
-from harness.stream.is900.codec.records import RecordValues, encode_records
+from harness.stream import TrackerFrame
+from harness.stream.is900.codec import (
+    ByteCapture,
+    FrameReader,
+    RecordValues,
+    WireFormat,
+    encode_records,
+    position_range_m,
+)
 
 __all__ = ["Simulation", "TrackerConfig", "simulate_readings", "simulate_tracker", "transmit_readings"]
 

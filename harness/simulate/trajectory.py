@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration

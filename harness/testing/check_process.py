@@ -8,11 +8,19 @@ from contextlib import closing
 from functools import cached_property
 
 from harness.errors import SystemFault
-from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.methods.method_messages import MAX_TEXT, Arrays, Header, Message
-from harness.experiment.methods.method_process import MethodFailure, MethodProcess
-from harness.experiment.methods.method_worker import MethodWorker, serve
-from harness.experiment.methods.remote_method import RemoteMethod
+from harness.experiment.methods import (
+    DEFAULT_ISOLATION,
+    MAX_TEXT,
+    Arrays,
+    Header,
+    Isolation,
+    Message,
+    MethodFailure,
+    MethodProcess,
+    MethodWorker,
+    RemoteMethod,
+    serve,
+)
 from harness.testing.contract_case import ContractCase, make_case
 from harness.testing.method_checks import RuleResult, check_rule
 from harness.testing.rules import RULES

@@ -7,17 +7,14 @@ simulated, so that the first run need not wait.
 
 import numpy as np
 
-from harness.body.mounts import DEFAULT_MOUNTS
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import DEFAULT_MOUNTS, retarget_to_own_body
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError
 from harness.mocap import synthetic
-from harness.reconstruct import registry
-from harness.simulate.components.soft_tissue import SoftTissueArtefact
-from harness.simulate.noise import Noise
-from harness.simulate.physics.settings import Physics
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import list_methods, make_method
+from harness.simulate import Noise, SoftTissueArtefact, TrackerConfig, simulate_tracker
+from harness.simulate.physics import Physics
+from harness.stream import TrackerFrame
 from harness.testing.contract_case import keep_positions, make_case, run_session
 
 _FRAMES = 8
@@ -25,12 +22,10 @@ _FRAMES = 8
 
 def compile_all(progress: ProgressCallback = lambda name, done, planned: None) -> None:
     """Run every registered method on a few frames; HarnessError when an estimate is not finite."""
-    names = [
-        name for name in (*registry.list_methods(), "ik[align=true]") if ":" not in name
-    ]  # a preset is the same code
+    names = [name for name in (*list_methods(), "ik[align=true]") if ":" not in name]  # a preset is the same code
     for done, name in enumerate(names):
         progress(name, done, len(names) + 1)
-        case = make_case(registry.make_method(name))
+        case = make_case(make_method(name))
         frames: list[TrackerFrame] = list(case.frames[:_FRAMES])
         for readings in (frames, [keep_positions(frame) for frame in frames]):
             estimates = run_session(case.reconstructor.begin(case.calibration), readings)

@@ -11,16 +11,15 @@ from functools import cached_property
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.humanoid import Body
+from harness.body import Body, build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status, answer_lag
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.reconstruct.contract import Method, Reconstructor, Session
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import Method, Reconstructor, Session
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_calibration, exact_frames, swaying_motion
 
 RATE_HZ, FRAMES = 40.0, 60
@@ -89,7 +88,7 @@ class ContractCase:
 
 
 def make_case(method: Method) -> ContractCase:
-    body = humanoid.build_body()
+    body = build_body()
     return ContractCase(method, body, exact_calibration(body), swaying_motion(body, LONG_FRAMES))
 
 

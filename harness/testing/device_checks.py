@@ -10,9 +10,8 @@ from serial.tools import list_ports
 
 from harness.core.arrays import Floats
 from harness.errors import HarnessError
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver import DriverConfig, open_tracker
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900 import DriverConfig, EmulatorConfig, open_tracker, serve_emulator
+from harness.stream.is900.codec import DeviceSamples
 
 _STATIONS = ("head", "torso", "left_hand", "right_hand")
 _RATE_HZ, _LOOP_S, _FRAMES = 20.0, 4.0, 20

@@ -12,9 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.body import humanoid, retargeting
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Kinematics, retarget_to_own_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
@@ -22,15 +20,10 @@ from harness.core.motion import BodyMotion, Clip
 from harness.core.progress import report_step
 from harness.core.skeleton import Skeleton
 from harness.errors import HarnessError
-from harness.mocap import synthetic
-from harness.mocap.library import LibraryFolders, MotionLibrary
-from harness.mocap.sources import MOCAP_VARIABLE, find_library_folders
-from harness.report.kit.render_process import RenderJob, RenderProcess
-from harness.score.metrics import DEFINITIONS
-from harness.score.null_methods import score_null_methods
-from harness.score.score import Scores, score_estimate
-from harness.simulate import noise
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
+from harness.mocap import MOCAP_VARIABLE, LibraryFolders, MotionLibrary, find_library_folders, synthetic
+from harness.report.kit import RenderJob, RenderProcess
+from harness.score import DEFINITIONS, Scores, score_estimate, score_null_methods
+from harness.simulate import TrackerConfig, noise_preset, simulate_tracker
 from harness.testing.compilation_check import check_compilation, describe_cache
 from harness.testing.device_checks import check_emulated_device, describe_serial_ports
 from harness.testing.results_checks import check_results
@@ -79,7 +72,7 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
     checks = [("functions are compiled", *check_compilation()), ("machine code", True, describe_cache())]
     report_step("scores")
     clips = [synthetic.generate(b, "p1", 1, seed=1, duration_s=6.0) for b in synthetic.BEHAVIOURS]
-    scores = check_scores([retargeting.retarget_to_own_body(clip)[1] for clip in clips])
+    scores = check_scores([retarget_to_own_body(clip)[1] for clip in clips])
     report_step("stream")
     stream = _check_stream(clips[0])
     report_step("results")
@@ -94,9 +87,9 @@ def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]
 
 def _check_stream(clip: Clip) -> InstallationCheck:
     """Stations without noise, decoded from device bytes, must be where MuJoCo puts them, within float32 rounding."""
-    body, take = retargeting.retarget_to_own_body(clip)
+    body, take = retarget_to_own_body(clip)
     mounts = [DEFAULT_MOUNTS[station] for station in _STATIONS]
-    simulation = simulate_tracker(body, take, mounts, TrackerConfig(slot_s=0.0), noise.noise_preset("clean"), seed=1)
+    simulation = simulate_tracker(body, take, mounts, TrackerConfig(slot_s=0.0), noise_preset("clean"), seed=1)
     calibration, kinematics, worst_m = simulation.calibration, Kinematics(body), 0.0
     bones = [body.skeleton.index(bone) for bone in calibration.bones]
     for frame, index in zip(simulation.frames, simulation.frame_index, strict=True):
@@ -127,7 +120,7 @@ def _check_optional_parts() -> list[InstallationCheck]:
 
 def _rendering_problem() -> str:
     """Render a picture: the reason why that failed, or "" where it worked."""
-    standing, bone_m = humanoid.tpose(standard_skeleton())[None], standard_skeleton().bone_m
+    standing, bone_m = tpose(standard_skeleton())[None], standard_skeleton().bone_m
     with TemporaryDirectory(prefix="harness-doctor-") as folder:
         file = Path(folder) / "picture.png"
         with RenderProcess([RenderJob(file, bone_m, bone_m, standing, standing)]) as rendering:

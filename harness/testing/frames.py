@@ -5,16 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Body, Kinematics, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.seeds import generator
-from harness.simulate import simulation
-from harness.simulate.link import TrackerConfig
-from harness.stream.frame import TrackerFrame
+from harness.simulate import TrackerConfig
+from harness.simulate import exact_calibration as place_exactly
+from harness.stream import TrackerFrame
 
 SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
@@ -22,7 +20,7 @@ SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso
 def exact_calibration(body: Body, stations: Sequence[str] = SIX_STATIONS) -> Calibration:
     """Exact calibration of the default mounts of these stations, with a tracker frame that is not the world frame."""
     room = TrackerConfig(origin_m=(1.0, -2.0, 2.5))
-    exact = simulation.exact_calibration(body, [DEFAULT_MOUNTS[station] for station in stations], room)
+    exact = place_exactly(body, [DEFAULT_MOUNTS[station] for station in stations], room)
     return replace(exact, world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])))
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from harness.core.fault_report import find_system_fault
 from harness.errors import HarnessError, was_interrupted
-from harness.reconstruct.contract import Method
+from harness.reconstruct import Method
 from harness.testing.contract_case import ContractCase, RuleViolation, make_case
 from harness.testing.rules import RULES
 

@@ -9,22 +9,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from harness.compare import baseline
-from harness.compare.comparison import Comparison, compare_results
-from harness.compare.margins import margin_of
+from harness.compare import Comparison, compare_results, margin_of, write_baseline
 from harness.core.fields import build
 from harness.core.files import content_key
 from harness.core.progress import ProgressCallback
 from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.engine import run as run_scenario
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment import run as run_scenario
+from harness.experiment.scenarios import Scenario, load_scenario
 from harness.report.comparison.page import comparison_text
 from harness.report.comparison.wording import groups_vary, line_interval
-from harness.results.manifest import Manifest
-from harness.results.reader import BASELINES, ResultSet, load_results
-from harness.results.storage import read_summary
+from harness.results import BASELINES, Manifest, ResultSet, load_results, read_summary
 
 DEFAULT_SCENARIO = "gate"
 """Scenario on which a new baseline is measured by default."""
@@ -113,7 +108,7 @@ class RegressionGate:
             planned = scenario_from_manifest(self._read(name).manifest)
         else:
             planned = load_scenario(scenario or DEFAULT_SCENARIO)
-        return baseline.write_baseline(
+        return write_baseline(
             self._run(replace(planned, methods=(method,), expected_order=())), name, self.baselines, force=True
         )
 

@@ -7,15 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs
 from harness.errors import BadFile, Outcome
-from harness.experiment.engine import run
-from harness.experiment.methods.isolation import Isolation
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap import synthetic
-from harness.mocap.shared_motion import find_shared_motion
-from harness.results.reader import load_run
+from harness.experiment import run
+from harness.experiment.methods import Isolation
+from harness.experiment.scenarios import Scenario, load_scenario
+from harness.mocap import find_shared_motion, synthetic
+from harness.results import load_run
 
 _METHODS = ("ik:previous", "harness.testing.results_checks:Exit")
 _METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3")

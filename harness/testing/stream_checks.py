@@ -15,7 +15,7 @@ from itertools import islice, pairwise
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.stream.frame import TrackerFrame, TrackerStream
+from harness.stream import TrackerFrame, TrackerStream
 
 MAX_SPAN_PERIODS = 1.5
 """Longest time between the measurements of one frame, in periods."""

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 
 from harness.core.skeleton import Skeleton
-from harness.report.kit.document import page_style
-from harness.report.kit.markup import tag
-from harness.report.kit.motion_player import describe_body, player_element, player_script
+from harness.report.kit import describe_body, page_style, player_element, player_script, tag
 from harness.view.page import viewer_page
 from harness.view.server import Resource
 

@@ -13,8 +13,7 @@ from harness.core.files import write_npz
 from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra, SystemFault, UnknownName
-from harness.report.kit.motion_player import PlayerClip, bone_radii_mm
-from harness.report.kit.render_process import finish_renderer, start_renderer
+from harness.report.kit import PlayerClip, bone_radii_mm, finish_renderer, start_renderer
 
 MOVIE_SUFFIXES = (".mp4", ".gif")
 MOST_METHODS = 3

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.rendering import RenderScene
+from harness.body import RenderScene
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.files import atomic_path

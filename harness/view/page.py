@@ -9,16 +9,19 @@ from typing import Any
 from harness.core.progress import ProgressCallback
 from harness.core.skeleton import Skeleton
 from harness.errors import UnknownName
-from harness.report.kit.document import html_document, page_style
-from harness.report.kit.markup import Markup, join, tag
-from harness.report.kit.motion_player import (
+from harness.report.kit import (
+    Markup,
     PlayerClip,
     PlayerMotion,
     describe_body,
+    html_document,
+    join,
     pack_clip,
+    page_style,
     player_card,
     player_element,
     player_script,
+    tag,
 )
 from harness.view.server import COMMAND_HEADER, Resource
 

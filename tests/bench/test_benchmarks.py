@@ -11,7 +11,7 @@ from harness.bench.limits import hold_to_limit, state_verdict
 from harness.bench.startup import DemoTimes, demo_rows
 from harness.errors import MissingExtra, Outcome, UnknownName
 from harness.report.physics.error_comparison import ErrorModelComparison
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 from tests.command import Command
 
 

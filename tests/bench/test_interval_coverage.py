@@ -5,7 +5,7 @@ import pytest
 
 from harness.bench import interval_coverage
 from harness.bench.interval_coverage import WORLDS, Coverage, World, coverage_rows, earlier_interval, measure_coverage
-from harness.compare.paired_statistics import mean_interval
+from harness.compare import mean_interval
 from harness.core.seeds import generator
 
 BY_NAME = {world.name: world for world in WORLDS}

@@ -6,7 +6,7 @@ import pytest
 
 from harness.bench.limits import hold_to_limit, state_verdict
 from harness.core.fields import build
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
+from harness.results.findings import BenchmarkStatement, Verdict
 
 
 @pytest.mark.parametrize(

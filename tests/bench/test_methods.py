@@ -11,8 +11,7 @@ pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
 from harness.bench import methods, peak_memory
 from harness.bench.peak_memory import NO_METHOD
-from harness.reconstruct import registry
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct import MotionDatabase, make_method
 from harness.study.speed import benchmark_clips
 from harness.study.speed.round_robin_timing import measure_speed
 
@@ -72,8 +71,8 @@ def test_learning_is_timed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_options_change_the_hash() -> None:
-    plain, other = (registry.make_method(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
-    assert methods.config_hash(plain) == methods.config_hash(registry.make_method("ik")) != methods.config_hash(other)
+    plain, other = (make_method(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
+    assert methods.config_hash(plain) == methods.config_hash(make_method("ik")) != methods.config_hash(other)
 
 
 def test_memory_is_that_of_the_process_alone(folder: Path) -> None:

@@ -5,8 +5,7 @@ import pytest
 
 from harness.bench import regression_gate
 from harness.bench.stored_errors import KINDS, METRICS, load_null_errors
-from harness.compare.margins import GATED_METRICS
-from harness.compare.significance import decide_verdicts
+from harness.compare import GATED_METRICS, decide_verdicts
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 

@@ -13,13 +13,13 @@ from harness.bench.rejected_readings import (
     count_rejected,
     find_gate,
 )
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.sources import open_motion_source
-from harness.reconstruct import registry
+from harness.experiment import ClipEvaluation
+from harness.experiment.scenarios import load_scenario
+from harness.mocap import open_motion_source
+from harness.reconstruct import make_method
 from harness.testing.frames import exact_calibration, swaying_motion
 
 
@@ -44,7 +44,7 @@ def test_no_more_than_one_true_reading_in_a_thousand_is_rejected_on_boxing(mocap
     readings = rejected = 0
     for clip in motion.test:
         evaluation = ClipEvaluation(scenario, source, ClipPart.parse(clip), "boxing")
-        fitted = evaluation.fit_method(registry.make_method(name), name)
+        fitted = evaluation.fit_method(make_method(name), name)
         counts = count_rejected(fitted, evaluation.simulation.calibration, evaluation.simulation.frames)
         readings, rejected = readings + counts[0], rejected + counts[1]
     assert readings > 4000
@@ -57,7 +57,7 @@ def test_echoes_are_counted() -> None:
     source = open_motion_source("builtin", None, seed=scenario.seed, rate_hz=None)
     scenario = replace(scenario, vary={}, noise="clean", components={"echo": {"share": 0.1}})
     evaluation = ClipEvaluation(scenario, source, ClipPart.parse("boxing_p1_01"), "boxing")
-    fitted = evaluation.fit_method(registry.make_method("ik"), "ik")
+    fitted = evaluation.fit_method(make_method("ik"), "ik")
     readings, rejected = count_rejected(fitted, evaluation.simulation.calibration, evaluation.simulation.frames)
     assert 0.02 * readings < rejected < 0.15 * readings
 
@@ -65,7 +65,7 @@ def test_echoes_are_counted() -> None:
 def test_a_method_without_a_gate_is_refused() -> None:
     body = build_body()
     example = BodyMotion("sway", "p1", "builtin", "swaying", 40.0, swaying_motion(body, 40))
-    fitted = registry.make_method("mean_pose").fit(body, [example], np.random.default_rng(1))
+    fitted = make_method("mean_pose").fit(body, [example], np.random.default_rng(1))
     session = fitted.begin(exact_calibration(body))
     with pytest.raises(TypeError, match="has no outlier gate"):
         find_gate(session)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from harness.bench import sweep
-from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
+from harness.experiment.scenarios import expand_sweep, load_sweep
 
 
 def test_what_is_judged_beside_are_the_cells_of_the_sweep(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable, Sequence
 
 from harness.bench.limits import count_missed, outcome_of
-from harness.report.kit.statement_lines import format_statements
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.report.kit import format_statements
+from harness.results.findings import BenchmarkStatement
 from tests.benchmarks.leak_check import bench_leak_check
 from tests.benchmarks.live_viewer import bench_live_viewer
 from tests.benchmarks.load import bench_load

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 from harness.bench.cpu_time import hold_cpu_to_limit, time_cpu
 from harness.core.motion import Clip
-from harness.mocap import synthetic
-from harness.mocap.shared_motion import find_shared_motion
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.mocap import find_shared_motion, synthetic
+from harness.results.findings import BenchmarkStatement
 
 EXAMPLES = 500
 MAX_UNITS = 7.0

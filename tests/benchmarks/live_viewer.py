@@ -20,8 +20,8 @@ from harness.bench.wire import start_device
 from harness.bench.wire_device import SCENARIO
 from harness.core.child_process import PythonProcess
 from harness.errors import HarnessError
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.view.server import EVENTS_PATH
+from harness.results.findings import BenchmarkStatement
+from harness.view import EVENTS_PATH
 
 PAIRS = 5
 """Pairs of sessions in one run of the benchmark."""

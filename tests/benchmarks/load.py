@@ -10,8 +10,8 @@ from harness.bench.limits import hold_to_limit
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.mocap.read import amc
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.mocap import read_amc
+from harness.results.findings import BenchmarkStatement
 
 FRAMES = 5000
 MAX_RATIO = 3.0
@@ -45,7 +45,7 @@ def amc_text(skeleton: Skeleton, rng: np.random.Generator) -> str:
 
 def _time_loading(path: Path, skeleton: Skeleton) -> float:
     start = time.process_time()
-    clip = amc.read_amc(path, skeleton, rate_hz=120.0)
+    clip = read_amc(path, skeleton, rate_hz=120.0)
     seconds = time.process_time() - start
     if len(clip) != FRAMES:
         raise RuntimeError(f"read {len(clip)} of {FRAMES} frames")

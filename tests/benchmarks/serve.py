@@ -22,12 +22,10 @@ from harness.bench.limits import hold_to_limit
 from harness.bench.wire import SECONDS, start_device
 from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
-from harness.live.scheduling_jitter import JitterProbe
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.stream.is900.codec import commands
-from harness.stream.is900.codec.items import STANDARD_LIST
-from harness.stream.recording.blocks import RECEIVED
-from harness.stream.recording.recording import read_recording
+from harness.live import JitterProbe
+from harness.results.findings import BenchmarkStatement
+from harness.stream.is900.codec import BINARY, CENTIMETRES, STANDARD_LIST, STOP, STREAM, ZERO_CLOCK, station_command
+from harness.stream.recording import RECEIVED, read_recording
 
 STATIONS, RATE_HZ = 4, 75.0
 MAX_ABOVE_TIMER_MS = 1.0
@@ -117,10 +115,10 @@ def _read_client(link: Path, seconds: float) -> tuple[bytes, list[int], list[flo
     port = os.open(link, os.O_RDWR | os.O_NOCTTY)
     try:
         tty.setraw(port)
-        os.write(port, commands.BINARY + commands.CENTIMETRES)
+        os.write(port, BINARY + CENTIMETRES)
         for station in range(STATIONS):
-            os.write(port, commands.station_command("O", str(station + 1), STANDARD_LIST))
-        os.write(port, commands.ZERO_CLOCK + commands.STREAM)
+            os.write(port, station_command("O", str(station + 1), STANDARD_LIST))
+        os.write(port, ZERO_CLOCK + STREAM)
         data, ends, received_s = bytearray(), [], []
         until_s = time.monotonic() + seconds
         while (left_s := until_s - time.monotonic()) > 0.0:
@@ -128,7 +126,7 @@ def _read_client(link: Path, seconds: float) -> tuple[bytes, list[int], list[flo
                 data += os.read(port, 4096)
                 received_s.append(time.monotonic())
                 ends.append(len(data))
-        os.write(port, commands.STOP)
+        os.write(port, STOP)
     finally:
         os.close(port)
     return bytes(data), ends, received_s

@@ -8,7 +8,7 @@ import pytest
 from harness.body import retargeting
 from harness.core import humanoid24
 from harness.core.arrays import Floats
-from harness.mocap.library import MotionLibrary
+from harness.mocap import MotionLibrary
 
 CLIPS = (
     *("13_17", "14_02", "16_16", "16_22", "16_31", "02_01", "07_05", "29_01", "49_01"),

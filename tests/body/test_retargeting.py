@@ -15,8 +15,7 @@ from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import Pose, Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap.clip_file import read_clip
-from harness.mocap.library import MotionLibrary
+from harness.mocap import MotionLibrary, read_clip
 from tests.body.conftest import clip_on, random_qpos
 
 STANDARD = humanoid24.standard_skeleton()

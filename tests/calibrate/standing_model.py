@@ -6,9 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from harness.body.humanoid import build_body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
+from harness.body import DEFAULT_MOUNTS, Kinematics, Mount, build_body, locate_mount
 from harness.calibrate.poses import POSES, pose_configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
@@ -19,7 +17,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic import sample_skeletons
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 FIVE = ("left_hand", "right_hand", "left_ankle", "right_ankle", "pelvis")

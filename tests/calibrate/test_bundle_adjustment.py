@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS
 from harness.calibrate.bundle_adjustment import (
     BundleAdjustment,
     NormalEquations,

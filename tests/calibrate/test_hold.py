@@ -6,7 +6,7 @@ import pytest
 from harness.calibrate.hold import HoldReadings, UnusableHold, measure_hold, median_rotation, span_s
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.stream.frame import split_frames
+from harness.stream import split_frames
 
 
 def measured(

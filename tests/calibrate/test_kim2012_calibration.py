@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, build_body, tpose
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import locate_mount
+from harness.body import Body, Kinematics, build_body, locate_mount, tpose
 from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
 from harness.calibrate.poses import POSES, pose_configuration
 from harness.core import rotations

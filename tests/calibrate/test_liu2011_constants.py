@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from harness.bench.calibration_accuracy import simulate_pose_holds
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.calibrate.liu2011_calibration import Liu2011Constants, PrintedObjective
 from harness.calibrate.pose_calibration import measure_poses, pose_bundle
 from harness.calibrate.skeleton_prior import fit_skeleton_prior
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.simulated_calibration import TrackerSession
+from harness.experiment import TrackerSession
+from harness.experiment.scenarios import load_scenario
 from harness.mocap.synthetic import sample_skeletons
-from harness.simulate.components.mount import perturb_mounts
-from harness.simulate.noise import noise_preset
-from harness.simulate.simulation import TrackerConfig
+from harness.simulate import TrackerConfig, noise_preset, perturb_mounts
 
 SEED, PRIOR_SIZE, PERFORMERS = 11, 100, 8
 

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import locate_mounts
+from harness.body import Kinematics, locate_mounts
 from harness.calibrate.performer_preview import PerformerPreview
 from harness.core.arrays import Floats
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from tests.calibrate.test_pose_classifier import MOUNTS, body, classifier, hold, poses
 
 

@@ -19,7 +19,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from tests.calibrate.standing_model import FIVE, SIX, Model, reordered, somebody, space, turned
 
 BEYOND = ("head", "lwrist", "rwrist", "lhand", "rhand", "ltibia", "rtibia", "lfoot", "rfoot", "lradius", "rradius")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULT_MOUNTS, locate_mount
+from harness.body import DEFAULT_MOUNTS, locate_mount
 from harness.calibrate.pose_checks import estimate_boresight_rad, rotation_text, strap_hints
 from harness.core import rotations
 from harness.core.arrays import Floats

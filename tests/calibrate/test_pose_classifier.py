@@ -5,9 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, build_body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS, locate_mounts
+from harness.body import DEFAULT_MOUNTS, Body, Kinematics, build_body, locate_mounts
 from harness.calibrate.hold import HoldReadings
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.poses import POSES, pose_configuration

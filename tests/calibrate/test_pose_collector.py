@@ -7,9 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.mounts import DEFAULT_MOUNTS
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import DEFAULT_MOUNTS, Body, build_body, retarget_to_own_body
 from harness.calibrate.guided_calibration import PoseGuide
 from harness.calibrate.hold import UnusableHold, measure_hold
 from harness.calibrate.pose_classifier import PoseClassifier
@@ -19,10 +17,8 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.simulate.calibration_motion import hold_poses, hold_times_s
-from harness.simulate.noise import noise_preset
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.simulate import TrackerConfig, hold_poses, hold_times_s, noise_preset, simulate_tracker
+from harness.stream import TrackerFrame
 from tests.calibrate.test_tpose_calibration import changed
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -31,8 +27,8 @@ RATE_HZ = 25.0
 
 
 @cache
-def body() -> humanoid.Body:
-    return humanoid.build_body()
+def body() -> Body:
+    return build_body()
 
 
 def pose(number: int) -> Floats:
@@ -54,7 +50,7 @@ def stream(
     noise: str = "default",
     miss_deg: float = 2.5,
     seed: int = 1,
-    who: humanoid.Body | None = None,
+    who: Body | None = None,
 ) -> list[TrackerFrame]:
     whose = who or body()
     rng = generator(seed, "held")

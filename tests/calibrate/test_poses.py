@@ -4,10 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from harness.body import ground
-from harness.body.anatomy import sole_points_m
-from harness.body.humanoid import build_body
-from harness.body.kinematics import pose_from_qpos as forward
+from harness.body import build_body, sole_heights_m, sole_points_m
+from harness.body import pose_from_qpos as forward
 from harness.calibrate.poses import POSES, CalibrationPose, pose_angles_rad, pose_configuration
 from harness.core.humanoid24 import limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
@@ -32,7 +30,7 @@ def test_it_stands(pose: CalibrationPose, skeleton: Skeleton) -> None:
     shift as they must."""
     qpos = pose_configuration(pose, skeleton)
     at = forward(skeleton, qpos[None])
-    assert ground.sole_heights_m(skeleton, at).min() == pytest.approx(0.0, abs=1e-12)
+    assert sole_heights_m(skeleton, at).min() == pytest.approx(0.0, abs=1e-12)
     soles = [
         at.start_m[0, bone] + points @ at.world_from_bone[0, bone].T
         for bone, points in zip(

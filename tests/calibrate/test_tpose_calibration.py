@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import DEFAULT_MOUNTS, Body, Kinematics, Mount, build_body, locate_mount, retarget_to_own_body, tpose
 from harness.calibrate.hold import UnusableHold, median_rotation
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER, TPoseCollector, calibrate_tpose
 from harness.core import rotations
@@ -23,10 +19,9 @@ from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.mocap import synthetic
-from harness.reconstruct import registry
-from harness.simulate.noise import noise_preset
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import make_method
+from harness.simulate import TrackerConfig, noise_preset, simulate_tracker
+from harness.stream import TrackerFrame
 from tests.joint_centres import joint_centres_m
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -92,7 +87,7 @@ class Session:
 
     def held(self, qpos: Floats | None = None, seconds: float = 3.0) -> tuple[list[TrackerFrame], Calibration]:
         """The same of someone who holds a pose, T-pose if no other."""
-        pose = humanoid.tpose(self.body.skeleton) if qpos is None else qpos
+        pose = tpose(self.body.skeleton) if qpos is None else qpos
         return self.seen(np.tile(pose, (round(seconds * 40.0) + 2, 1)))
 
 
@@ -100,7 +95,7 @@ class Session:
 def bodies() -> tuple[Body, ...]:
     """The standard body, and three of other proportions."""
     clips = [synthetic.generate("walking", who, 1, seed=1, duration_s=3.0) for who in synthetic.performer_names()[:3]]
-    return (humanoid.build_body(), *(retarget_to_own_body(clip)[0] for clip in clips))
+    return (build_body(), *(retarget_to_own_body(clip)[0] for clip in clips))
 
 
 def off_deg(found: Floats, truth: Floats) -> Floats:
@@ -111,12 +106,12 @@ def missed(body: Body, miss_deg: float, seed: int) -> Floats:
     """T-pose with normal errors of every hinge and of the lean."""
     step = np.deg2rad(miss_deg) * generator(seed, "missed").normal(size=54)
     step[[0, 1, 2, 5]] = 0.0
-    return Kinematics(body).integrate(humanoid.tpose(body.skeleton), step)
+    return Kinematics(body).integrate(tpose(body.skeleton), step)
 
 
 def arms(body: Body, down_deg: float) -> Floats:
     """T-pose with both arms lower by this angle, to first order of the hinges."""
-    pose, kinematics = humanoid.tpose(body.skeleton), Kinematics(body)
+    pose, kinematics = tpose(body.skeleton), Kinematics(body)
     kinematics.set(pose)
     step = np.zeros(54)
     for side, sign in (("l", -1.0), ("r", 1.0)):
@@ -174,7 +169,7 @@ def test_noise_costs_what_it_must(noise: str, stations: tuple[str, ...], seed: i
 
 def test_a_stance_given_where_it_is_leads_back_to_its_place() -> None:
     """The performer stands elsewhere with another heading, and `pose` says so."""
-    session, pose = Session(bodies()[0]), humanoid.tpose(bodies()[0].skeleton)
+    session, pose = Session(bodies()[0]), tpose(bodies()[0].skeleton)
     pose[:2] = 2.0, -1.0
     pose[3:7] = rotations.about_z(2.0)
     frames, truth = session.held(pose)
@@ -192,7 +187,7 @@ def test_a_poor_stance_is_made_the_best_of() -> None:
         found = calibrate_tpose(frames, session.body, session.mounts).calibration
         found_deg.append(off_deg(found.bone_from_station, truth.bone_from_station))
         kinematics = Kinematics(session.body)
-        kinematics.set(humanoid.tpose(session.body.skeleton))
+        kinematics.set(tpose(session.body.skeleton))
         bones = kinematics.bone_poses()[1][[session.body.skeleton.index(bone) for bone in found.bones]]
         told = rotations.multiply(found.world_from_tracker, frames[0].tracker_from_station)
         plain = rotations.multiply(rotations.inverse(bones), told)
@@ -325,7 +320,7 @@ def test_hanging_arms_are_no_t_pose(down_deg: float, stations: tuple[str, ...]) 
 
 def test_a_body_of_another_size_is_no_t_pose_of_this_one() -> None:
     own = bodies()[0].skeleton
-    session = Session(humanoid.build_body(own.with_bones(0.8 * own.bone_m)))
+    session = Session(build_body(own.with_bones(0.8 * own.bone_m)))
     with pytest.raises(UnusableHold, match="not a T-pose of the body"):
         calibrate_tpose(session.held()[0], bodies()[0], session.mounts)
 
@@ -357,7 +352,7 @@ def test_a_method_reaches_nearly_as_far_as_with_the_truth(noise: str) -> None:
     frames, truth = session.seen(take.qpos)
     off_m = []
     for calibration in (truth, found):
-        walker = registry.make_method("ik:previous").fit(body, [], np.random.default_rng(1)).begin(calibration)
+        walker = make_method("ik:previous").fit(body, [], np.random.default_rng(1)).begin(calibration)
         poses = np.array([walker.step(frame).qpos for frame in frames])
         apart_m = joint_centres_m(body.skeleton, poses) - joint_centres_m(body.skeleton, take.qpos[: len(poses)])
         off_m.append(float(np.linalg.norm(apart_m, axis=2).mean()))

@@ -18,11 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.stream.is900.codec.records import from_yaw_pitch_roll_deg
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.faults import Fault
-from harness.stream.is900.emulator.server import serve_emulator
+from harness.stream.is900 import EmulatorConfig, Fault, serve_emulator
+from harness.stream.is900.codec import DeviceSamples, from_yaw_pitch_roll_deg
 
 RADIUS_M, LOOP_S, QUALITY = 0.3, 5.0, 214
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment import Playback, prepare_playback
 
 CLIP = "boxing_p1_01"
 

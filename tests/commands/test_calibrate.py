@@ -11,27 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, build_body
-from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
-from harness.calibrate.guided_calibration import GuidedPose
-from harness.calibrate.poses import POSES
+from harness.body import Body, build_body
+from harness.calibrate import POSES, CalibrationFile, GuidedPose, read_calibration, write_calibration
 from harness.cli import main
 from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion
-from harness.experiment.calibration_session import CalibrationSession
-from harness.experiment.playback import Playback, prepare_playback
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Session
-from harness.stream.frame import TrackerFrame
-from harness.stream.is900.emulator.server import serve_emulator
-from harness.stream.recording.replay import RecordingStream
+from harness.experiment import CalibrationSession, Playback, prepare_playback
+from harness.reconstruct import Session, make_method
+from harness.stream import TrackerFrame
+from harness.stream.is900 import serve_emulator
+from harness.stream.recording import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
-PREVIOUS = registry.make_method("ik:previous")
+PREVIOUS = make_method("ik:previous")
 CLIP = "boxing_p1_01"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 

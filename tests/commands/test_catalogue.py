@@ -5,11 +5,9 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
-from harness.body.places import NAMED_PLACES
+from harness.body import NAMED_PLACES, build_body
 from harness.commands.catalogue import build_catalogue
-from harness.reconstruct import registry
-from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.reconstruct import MeanPose, list_methods
 from tests.command import Command
 
 
@@ -27,7 +25,7 @@ class Undeclared(MeanPose):
 
 def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
     methods = build_catalogue()["methods"]
-    assert set(methods) == set(registry.list_methods())
+    assert set(methods) == set(list_methods())
     assert "needs examples, takes any inputs; Liu et al. 2011" in methods["dynamic_map"]
     assert "needs no examples" in methods["ik:previous"]
     assert all(line.count("needs ") >= 1 for line in methods.values())

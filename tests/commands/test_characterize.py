@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.measure.unit_file import read_unit_file
+from harness.experiment.scenarios import load_scenario
+from harness.measure import read_unit_file
 from tests.command import Command
 
 pytestmark = pytest.mark.long

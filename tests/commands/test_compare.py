@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.results.reader import ResultSet
+from harness.results import ResultSet
 from tests.command import Command
 from tests.compare.sides import manifest, side, write_run
 from tests.compare.test_comparison import ANGLE, STEADY, TORN

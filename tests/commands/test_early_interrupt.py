@@ -9,9 +9,8 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.commands.output import progress_note, recording_note
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording.recording import RecordingWriter, record_capture
-from harness.stream.recording.replay import RecordingStream
+from harness.stream.is900.codec import WireFormat
+from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.command import Command
 from tests.stream.wire import FOUR, device_bytes, in_chunks, stamps_s
 

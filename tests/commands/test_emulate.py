@@ -11,15 +11,12 @@ import pytest
 
 from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
-from harness.mocap.sources import open_motion_source
-from harness.reconstruct import registry
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.faults import FaultKind
+from harness.experiment import ClipEvaluation
+from harness.experiment.scenarios import Scenario, find_scenario, load_scenario
+from harness.mocap import open_motion_source
+from harness.reconstruct import make_method
+from harness.stream.is900 import EmulatorConfig, FaultKind, open_transport
+from harness.stream.is900.codec import DeviceSamples
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
@@ -58,7 +55,7 @@ def test_runs_know_nothing_of_faults() -> None:
 
     def inputs(of: Scenario) -> dict[str, object]:
         evaluation = ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking")
-        return evaluation.conditions_of(registry.make_method("ik:previous"), "pos+ori")
+        return evaluation.conditions_of(make_method("ik:previous"), "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))

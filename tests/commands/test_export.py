@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULT_MOUNTS, locate_mount
+from harness.body import DEFAULT_MOUNTS, locate_mount
 from harness.cli import main
 from harness.commands import export
 from harness.core.humanoid24 import standard_skeleton
-from harness.mocap.write.export import EXPORT_FORMATS
-from harness.results.reader import select_cells
+from harness.mocap.write import EXPORT_FORMATS
+from harness.results import select_cells
 from tests.command import Command
 from tests.mocap.write.glb_file import read_glb
 from tests.short_demo import short_demo

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.experiment.playback import Playback, prepare_playback
-from harness.reconstruct import registry
-from harness.stream.is900.emulator.server import serve_emulator
+from harness.experiment import Playback, prepare_playback
+from harness.reconstruct import make_method
+from harness.stream.is900 import serve_emulator
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
@@ -84,7 +84,7 @@ def test_ctrl_c_before_the_first_pose_is_an_interrupt(tmp_path: Path, played: Pl
 def _same_as_a_run(played: Playback, rows: list[dict[str, str]]) -> None:
     """Poses of the first lap are those of a run over the simulation."""
     frames = played.simulation.frames
-    session = played.clip_evaluation.fit_method(registry.make_method("ik"), "ik").begin(played.calibration)
+    session = played.clip_evaluation.fit_method(make_method("ik"), "ik").begin(played.calibration)
     stations = list(played.scenario.stations)
     for frame, row in zip(frames[: played.samples.take_frames], rows, strict=False):
         estimate = session.step(frame)

@@ -8,8 +8,8 @@ import pytest
 
 from harness.cli import build_parser
 from harness.commands.flags import LINE_FLAGS, repeat_flags
-from harness.experiment.playback import prepare_playback
-from harness.stream.recording.recording import record_capture
+from harness.experiment import prepare_playback
+from harness.stream.recording import record_capture
 from tests.command import Command
 from tests.planted import Plan, planted_run
 

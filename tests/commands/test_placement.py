@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.results.findings.placement_findings import read_placement
+from harness.results.findings import read_placement
 from harness.study.placement import question
 from tests.command import Command
 

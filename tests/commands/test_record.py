@@ -14,16 +14,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.experiment.playback import Playback
-from harness.experiment.scenarios.scenario_reader import find_scenario
-from harness.stream.is900.driver import DriverConfig, Is900
-from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
-from harness.stream.recording.blocks import CONFIGURED, RECEIVED
-from harness.stream.recording.recording import RecordingWriter, read_recording
-from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.station_readings import CaptureReader
-from harness.stream.station_counts import FRAME_COLUMNS
+from harness.experiment import Playback
+from harness.experiment.scenarios import find_scenario
+from harness.stream import FRAME_COLUMNS
+from harness.stream.is900 import DriverConfig, EmulatorConfig, Is900, open_transport, serve_emulator
+from harness.stream.recording import (
+    CONFIGURED,
+    RECEIVED,
+    CaptureReader,
+    RecordingStream,
+    RecordingWriter,
+    read_recording,
+)
 from harness.study.trust.plan import plan_digest
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness

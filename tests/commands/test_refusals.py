@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from harness.core.package_data import data_folder
-from harness.mocap.sources import MOCAP_VARIABLE
-from harness.stream.recording.blocks import FILE_HEADER
+from harness.mocap import MOCAP_VARIABLE
+from harness.stream.recording import FILE_HEADER
 from tests.command import Command
 from tests.stream.recording.test_recording import newer_file
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.report.sweep import page
-from harness.results.files.integrity import compute_digests
-from harness.results.index import CellIndex
+from harness.results import CellIndex
+from harness.results.files import compute_digests
 from tests.command import Command
 from tests.planted import Plan, planted_run
 

@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
-from harness.stream.is900.emulator.server import EmulatorServer
-from harness.stream.recording.recording import read_recording
-from harness.stream.recording.replay import RecordingStream
+from harness.stream.is900 import EmulatorConfig, EmulatorServer, serve_emulator
+from harness.stream.recording import RecordingStream, read_recording
 from tests.command import Command, Said
 from tests.stream.is900.emulator.played import make_samples
 

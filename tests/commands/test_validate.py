@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.measure.unit_file import read_unit_file
+from harness.measure import read_unit_file
 from tests.command import Command
 
 pytestmark = pytest.mark.long

@@ -10,12 +10,12 @@ import pytest
 
 from harness.commands.viewed_motion import open_motion, view_clip
 from harness.core import rotations
-from harness.experiment.playback import prepare_playback
-from harness.mocap.sources import MOCAP_VARIABLE, SyntheticSource
-from harness.report.kit.motion_player import NO_ESTIMATE
-from harness.results.reader import select_cells
-from harness.score.pair import compute_poses
-from harness.view.page import ViewedMotion
+from harness.experiment import prepare_playback
+from harness.mocap import MOCAP_VARIABLE, SyntheticSource
+from harness.report.kit import NO_ESTIMATE
+from harness.results import select_cells
+from harness.score import compute_poses
+from harness.view import ViewedMotion
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 from tests.planted import Plan, planted_run

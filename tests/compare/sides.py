@@ -8,13 +8,10 @@ import numpy as np
 
 from harness.core.files import content_key, to_json
 from harness.core.seeds import generator
+from harness.results import CellIndex, CellResult, Manifest, ResultSet
 from harness.results.cell import IDENTITY, TRAILING_COLUMNS
-from harness.results.files.digests import file_digest, insert_digest
-from harness.results.files.integrity import compute_digests
-from harness.results.index import CellIndex
-from harness.results.manifest import Manifest
-from harness.results.reader import CellResult, ResultSet
-from harness.score.metrics import DEFINITIONS, VERSIONS
+from harness.results.files import compute_digests, file_digest, insert_digest
+from harness.score import DEFINITIONS, VERSIONS
 
 SIZES = {"joint_angle_mean_deg": 2.0, "mpjpe_mm": 12.0, "jitter_m_s3": 700.0}
 

@@ -13,10 +13,8 @@ from harness.compare.baseline import write_baseline
 from harness.compare.comparison import compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
-from harness.results import storage
-from harness.results.files.digests import read_result_json, write_result_json
-from harness.results.index import CellIndex
-from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
+from harness.results import COUNT_METRICS, Cell, CellIndex, CellResult, ResultSet, load_results
+from harness.results.files import read_result_json, write_result_json
 from tests.compare.sides import manifest, side, write_run
 from tests.core.leftovers import leave_behind
 from tests.results.finish import make_run
@@ -87,7 +85,7 @@ def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Pa
     assert all(set(part) == {"clip"} for part in content["parts"].values()), "what all share stands once"
 
 
-def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., storage.Cell]) -> None:
+def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., Cell]) -> None:
     content = manifest()
     make_run(run_folder, content)
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]

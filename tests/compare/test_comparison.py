@@ -11,9 +11,9 @@ from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
 from harness.report.comparison.page import comparison_page, comparison_text
 from harness.report.comparison.wording import comparison_sentence, describe_parts
-from harness.report.kit.page_html import render_html
-from harness.results.reader import ResultSet
-from harness.score.metrics import DEFINITIONS
+from harness.report.kit import render_html
+from harness.results import ResultSet
+from harness.score import DEFINITIONS
 from tests.compare.sides import SIZES, cell, manifest, side
 
 ANGLE, *_ = SIZES

@@ -7,7 +7,7 @@ import pytest
 
 from harness.compare.matching import PAIRING_KEYS, RELAXABLE_KEYS, inputs_that_differ, pair_cells
 from harness.errors import BadInput, UnknownName
-from harness.results.reader import ResultSet
+from harness.results import ResultSet
 from tests.compare.sides import cell, manifest, side
 
 OTHER: dict[str, Any] = {

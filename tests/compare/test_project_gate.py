@@ -9,13 +9,12 @@ from harness.compare.margins import GATED_METRICS
 from harness.compare.significance import SIGNIFICANCE
 from harness.core.split import ClipPart
 from harness.errors import RenamedKey
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.sources import open_motion_source
+from harness.experiment import ClipEvaluation
+from harness.experiment.scenarios import Scenario, load_scenario
+from harness.mocap import open_motion_source
 from harness.mocap.synthetic import BEHAVIOURS
-from harness.reconstruct import registry
-from harness.results.reader import load_results
+from harness.reconstruct import list_methods
+from harness.results import load_results
 from harness.testing.regression_gate import scenario_from_manifest
 
 BASELINE = Path(__file__).parents[2] / "results" / "baselines" / "gate"
@@ -27,7 +26,7 @@ def scenario() -> Scenario:
 
 
 def test_every_family_of_methods_is_gated(scenario: Scenario) -> None:
-    families = {name for name in registry.list_methods() if ":" not in name}
+    families = {name for name in list_methods() if ":" not in name}
     assert families <= set(scenario.methods)
     assert any(name.endswith("+ik") for name in scenario.methods)
     assert {behaviour for behaviour in scenario.motion.behaviours if behaviour} == {

@@ -7,8 +7,7 @@ from harness.compare.comparison import compare_results
 from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, split_by_lag
 from harness.compare.units import Sampling
 from harness.core.seeds import generator
-from harness.results.reader import ResultSet
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, ResultSet
 from tests.compare.sides import side
 
 METRICS = (PRIMARY_METRIC, "mpjpe_mm", "jitter_m_s3")

@@ -8,7 +8,7 @@ import pytest
 
 from harness.core import cache_folder as module
 from harness.core.cache_folder import cache_folder, folder_bytes, keep_newest, remove_cache
-from harness.reconstruct import find_source_files
+from harness.reconstruct import source_files
 
 needs_owners = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has no owners and modes of folders")
 
@@ -96,11 +96,11 @@ def test_removal_says_how_much(home: Path) -> None:
 
 def test_it_is_no_folder_of_a_method(home: Path) -> None:
     """A method in the home folder reads machine code below its own folder."""
-    find_source_files._foreign_folders.cache_clear()
+    source_files._foreign_folders.cache_clear()
     try:
-        assert cache_folder() in find_source_files.foreign_folders()
+        assert cache_folder() in source_files.foreign_folders()
     finally:
-        find_source_files._foreign_folders.cache_clear()
+        source_files._foreign_folders.cache_clear()
 
 
 def test_only_the_newest_are_kept(tmp_path: Path) -> None:

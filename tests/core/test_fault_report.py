@@ -10,7 +10,7 @@ import pytest
 
 from harness.core.fault_report import describe_fault, find_system_fault
 from harness.errors import BadInput, SystemFault, was_interrupted
-from harness.experiment.methods.method_run import describe_failure
+from harness.experiment.methods import describe_failure
 
 
 def fail() -> None:

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core.network import resolve_host
 from harness.errors import BadInput
-from harness.live.vmc import VmcOutput
-from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator.tcp_port import TcpPort
-from harness.stream.is900.emulator.udp_broadcast import UdpPort
+from harness.live import VmcOutput
+from harness.stream.is900 import TcpPort, UdpPort, open_transport
 from tests.live.posing import configuration, live_pose
 
 IPV4, IPV6 = socket.AF_INET, socket.AF_INET6

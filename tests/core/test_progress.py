@@ -34,7 +34,7 @@ def test_steps_are_counted_on_a_terminal(stream: io.StringIO, monkeypatch: pytes
 
 
 def test_a_chart_is_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    from harness.report.kit.chart import draw_chart
+    from harness.report.kit import draw_chart
 
     steps: list[str] = []
     monkeypatch.setattr("harness.report.kit.chart.report_step", steps.append)

@@ -9,15 +9,13 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import pytest
 
 from harness.cli import main
-from harness.compare.baseline import write_baseline
+from harness.compare import write_baseline
 from harness.core.fields import build, replace_fields
 from harness.core.ranges import Label, Range, check_fields, check_words, constraints_of
 from harness.errors import BadInput, HarnessError
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.scenarios.sweep_config import Sweep, load_sweep
-from harness.reconstruct import registry
-from harness.simulate.noise import Noise
+from harness.experiment.scenarios import Scenario, Sweep, load_scenario, load_sweep
+from harness.reconstruct import list_methods, make_method
+from harness.simulate import Noise
 from harness.study.placement.config import PlacementStudy
 
 LONGEST_LINE = 1100
@@ -121,7 +119,7 @@ def test_ordinary_words_are_accepted() -> None:
     assert not Label().accepts(" head")
 
 
-METHODS = {type(registry.make_method(name)) for name in (*registry.list_methods(), "mean_pose+ik")}
+METHODS = {type(make_method(name)) for name in (*list_methods(), "mean_pose+ik")}
 ENDLESS = {"jump_m", "to_s"}
 """Fields that may be as large as you like; `inf` switches the outlier gate off, or lasts to the end."""
 NOT_CHOSEN = {"schema"}

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, QPOS_OF_DOF, limits_rad, pack, standard_skeleton, unpack
@@ -17,8 +17,8 @@ from harness.core.skeleton import (
     hinge_rotation,
     unwrap_angles,
 )
-from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.score.angles import wrap_difference
+from harness.reconstruct.solver import HingeLimits
+from harness.score import wrap_difference
 
 
 def _smooth(frames: int, size: float, rng: np.random.Generator) -> Floats:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.humanoid import tpose
+from harness.body import tpose
 from harness.core.estimate import Estimate, Status
 
 MODULE = "tests.experiment.evil_methods"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.estimate import Estimate
-from harness.reconstruct.methods.ik import Ik
+from harness.reconstruct import Ik
 
 SIGMA_RAD = np.deg2rad(np.linspace(1.0, 12.0, 48))
 

@@ -10,9 +10,9 @@ from harness.core.seeds import generator
 from harness.experiment import cells
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.tasks import PlannedCell
-from harness.reconstruct.contract import Method
-from harness.results.cell import Cell
-from harness.score.score import Scores
+from harness.reconstruct import Method
+from harness.results import Cell
+from harness.score import Scores
 from tests.planted import measured_cell
 
 FAILING = "ik:previous+ik"

@@ -15,8 +15,7 @@ from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.tasks import ClipTask
-from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
-from harness.results.storage import Cell
+from harness.results import Cell, as_row, cell_folder, read_cell, read_row, write_cell
 from tests.results.rewrite import read_json, write_json
 
 SMALL = Scenario(

@@ -16,14 +16,11 @@ from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.methods.method_run import run_method
 from harness.experiment.scenarios.scenario import Scenario, Station
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.mocap.sources import open_motion_source
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method
-from harness.reconstruct.methods.mean_pose import MeanPose
-from harness.simulate.components.stationary import WhiteNoise
-from harness.simulate.noise import Noise, noise_preset
+from harness.mocap import open_motion_source
+from harness.reconstruct import MeanPose, Method, make_method
+from harness.simulate import Noise, WhiteNoise, noise_preset
 
-PREVIOUS = registry.make_method("ik:previous")
+PREVIOUS = make_method("ik:previous")
 
 SCENARIO = Scenario(
     name="small",
@@ -160,7 +157,7 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02",), body="common", longest_s=1.5)
     scenario = replace(SCENARIO, motion=motion)
     elsewhere = replace(scenario, stations={"torso": Station("thorax", 0.6, 30.0), "knee": Station("ltibia", 0.1)})
-    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.make_method("dynamic_map")
+    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), make_method("dynamic_map")
     first = ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking")
     results = [_estimated(first, method)]
     shared = first.with_conditions(elsewhere)

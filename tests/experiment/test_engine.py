@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
-from harness.compare.comparison import compare_runs
-from harness.compare.run_summary.expected_orders import ExpectedOrder
+from harness.body import Body
+from harness.compare import compare_runs
+from harness.compare.run_summary import ExpectedOrder
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY
@@ -26,13 +26,11 @@ from harness.experiment import cells, engine
 from harness.experiment.scenarios.scenario import Scenario, Station
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.reconstruct.contract import Reconstructor, Session
+from harness.reconstruct import Reconstructor, Session
 from harness.report.comparison.wording import comparison_sentence
 from harness.report.run.text import run_table
-from harness.results.manifest import Manifest
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
-from harness.stream.frame import TrackerFrame
+from harness.results import Manifest, read_summary, select_cells
+from harness.stream import TrackerFrame
 from tests.interrupts import heeding_interrupts
 from tests.short_demo import short_demo
 

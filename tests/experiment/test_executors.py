@@ -18,7 +18,7 @@ import pytest
 from harness.errors import BadInput, MissingExtra
 from harness.experiment.workers import executors
 from harness.experiment.workers.executors import dask_executor, process_executor
-from harness.results.manifest import source_hash
+from harness.results import source_hash
 from tests.interrupts import heeding_interrupts
 
 R = TypeVar("R")

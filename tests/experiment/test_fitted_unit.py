@@ -10,8 +10,8 @@ from harness.errors import BadFile, BadInput
 from harness.experiment.scenarios.fitted_unit import read_fitted_unit
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.measure.unit_file import UnitFile, write_unit_file
-from harness.simulate.noise import noise_preset
+from harness.measure import UnitFile, write_unit_file
+from harness.simulate import noise_preset
 from tests.core.digested_toml import as_earlier_version
 
 SCENARIO = """

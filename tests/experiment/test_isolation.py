@@ -17,9 +17,7 @@ from harness.experiment.methods.isolation import Isolation
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.cell import Cell
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
+from harness.results import Cell, read_summary, select_cells
 from tests.experiment.evil_methods import FAILING, HANGING, HARMLESS, MARK, Honest, method_name
 
 HONEST = method_name(Honest)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.commands.replay import format_score_table
-from harness.compare.comparison import compare_results
+from harness.compare import compare_results
 from harness.core.messages import MessageError
 from harness.errors import Outcome, ShapeError
 from harness.experiment import engine
@@ -24,11 +24,8 @@ from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.run.data import read_run
 from harness.report.run.ranking import describe_rankings
 from harness.report.run.text import run_table
-from harness.results.cell import Cell
-from harness.results.reader import load_results
-from harness.results.storage import read_cells, read_summary
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.replay import RecordingStream
+from harness.results import Cell, load_results, read_cells, read_summary
+from harness.stream.recording import RecordingStream, record_capture
 from tests.experiment.late_methods import NAMES, SIGMA_RAD, Late, spoilt
 
 LATE, PROMPT = NAMES

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from harness.cli import main
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs
 from harness.core.split import ClipPart
 from harness.core.stream_health import describe_line_loss, excess_loss
 from harness.errors import Outcome
@@ -18,9 +18,9 @@ from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.scenarios.sweep_config import Sweep
 from harness.experiment.workers.executors import process_executor
-from harness.mocap.sources import open_motion_source
-from harness.results.storage import read_summary
-from harness.simulate.link import TrackerConfig
+from harness.mocap import open_motion_source
+from harness.results import read_summary
+from harness.simulate import TrackerConfig
 
 SCENARIO = """
 schema = 1

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
 from harness.experiment import engine
@@ -18,7 +18,7 @@ from harness.experiment.methods import remote_method
 from harness.experiment.methods.isolation import Isolation
 from harness.experiment.methods.method_process import MethodFailure
 from harness.experiment.methods.remote_method import NamedMethod, RemoteMethod, close_methods, resolve_method
-from harness.results.storage import read_cells, read_summary
+from harness.results import read_cells, read_summary
 from tests.experiment.test_isolation import ONE_CLIP
 
 UPRIGHT = Path(__file__).parents[1] / "testing" / "upright.py"

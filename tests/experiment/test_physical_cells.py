@@ -17,14 +17,11 @@ from harness.experiment.scenarios.motion_source import open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.reconstruct import registry
+from harness.reconstruct import make_method
 from harness.report.run.text import run_table
-from harness.results.storage import read_summary
-from harness.simulate.physics.constellation import ConstellationSettings
-from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sound import Sound
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.replay import RecordingStream
+from harness.results import read_summary
+from harness.simulate.physics import ConstellationSettings, Physics, Sound
+from harness.stream.recording import RecordingStream, record_capture
 
 PLAIN = Scenario(
     name="small",
@@ -41,7 +38,7 @@ def evaluation(scenario: Scenario) -> ClipEvaluation:
 
 
 def conditions(scenario: Scenario) -> dict[str, Any]:
-    return evaluation(scenario).conditions_of(registry.make_method("ik:previous"), "pos+ori")
+    return evaluation(scenario).conditions_of(make_method("ik:previous"), "pos+ori")
 
 
 def test_without_physics_conditions_do_not_name_it() -> None:
@@ -82,9 +79,9 @@ def test_a_station_that_hears_too_little_is_noted(tmp_path: Path) -> None:
     """Emitters that reach 1.6 m: none is heard at the ankles."""
     deaf = replace(PHYSICAL, physics=Physics(ConstellationSettings(range_m=1.6)), methods=("ik:previous",))
     made = evaluation(deaf)
-    note = next(text for text in made.notes(registry.make_method("ik:previous")) if "hears" in text)
+    note = next(text for text in made.notes(make_method("ik:previous")) if "hears" in text)
     assert note.startswith("left_ankle hears three emitters for 0 % of the time, right_ankle for 0 %")
-    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(registry.make_method("ik:previous")))
+    assert not any("hears" in text for text in evaluation(PHYSICAL).notes(make_method("ik:previous")))
     engine.run(deaf, tmp_path / "out")
     assert f"TOO FEW EMITTERS IN boxing_p1_01: {note}" in run_table(read_summary(tmp_path / "out"))
 

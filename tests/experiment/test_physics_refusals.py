@@ -12,7 +12,7 @@ from harness.experiment.plan import check_names
 from harness.experiment.playback import prepare_playback
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.simulate.noise import STATISTICAL_COMPONENTS
+from harness.simulate import STATISTICAL_COMPONENTS
 from harness.study.placement.config import base_scenario, load_placement_study
 
 SCENARIO = """

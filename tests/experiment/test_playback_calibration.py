@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.calibrate.calibration_file import CalibrationFile
+from harness.calibrate import CalibrationFile
 from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback
 

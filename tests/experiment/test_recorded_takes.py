@@ -15,11 +15,9 @@ from harness.experiment.observed_take import ObservedTake, simulated_take
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_takes import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenarios.scenario_reader import find_scenario
-from harness.stream.is900.codec import commands
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.emulator.device import Device
-from harness.stream.recording.recording import RecordingWriter, record_capture
-from harness.stream.recording.replay import RecordingStream
+from harness.stream.is900 import Device
+from harness.stream.is900.codec import BINARY, CENTIMETRES, STOP, STREAM, ZERO_CLOCK, WireFormat, station_command
+from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.stream.wire import frames_equal
 
 CLIP, METHODS = "boxing_p1_01", ("ik:previous", "best_match")
@@ -50,13 +48,13 @@ def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequ
     device, now_s = Device(played.samples), 0.0
     with RecordingWriter(path) as writer:
         for turn_s in turns_s:
-            device.receive(commands.STOP, now_s)
+            device.receive(STOP, now_s)
             for station in wire.characters.decode():
-                device.receive(commands.station_command("O", station, wire.items), now_s)
-            device.receive(commands.BINARY + commands.CENTIMETRES + commands.ZERO_CLOCK, now_s)
+                device.receive(station_command("O", station, wire.items), now_s)
+            device.receive(BINARY + CENTIMETRES + ZERO_CLOCK, now_s)
             device.advance(now_s)
             writer.on_configured(wire, now_s, now_s)
-            device.receive(commands.STREAM, now_s)
+            device.receive(STREAM, now_s)
             for at_s in (now_s + 0.01 * np.arange(1, round(100.0 * turn_s))).tolist():
                 if data := device.advance(at_s):
                     writer.on_received(data, at_s, at_s)

@@ -9,8 +9,7 @@ from harness.errors import Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.report.run.text import run_table
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
+from harness.results import read_summary, select_cells
 
 SCENARIO = """
 schema = 1

@@ -6,8 +6,8 @@ import pytest
 
 from harness.errors import BadInput
 from harness.experiment.run_export import body_model
-from harness.mocap.write.posed_motion import pose_truth_and_estimate
-from harness.results.cell import Cell
+from harness.mocap.write import pose_truth_and_estimate
+from harness.results import Cell
 
 
 def test_a_cell_has_its_surface_and_its_stations(make_cell: Callable[..., Cell]) -> None:

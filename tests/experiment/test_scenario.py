@@ -11,10 +11,8 @@ from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownN
 from harness.experiment.scenarios.motion_source import expand_clips
 from harness.experiment.scenarios.scenario import Station
 from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
-from harness.results.cell import varied_text
-from harness.simulate.components.faults import LostStation
-from harness.simulate.components.transient import Echo
-from harness.simulate.noise import noise_preset
+from harness.results import varied_text
+from harness.simulate import Echo, LostStation, noise_preset
 
 MINIMAL = """
 methods = ["ik"]

@@ -16,8 +16,7 @@ from harness.experiment.plan import check_names
 from harness.experiment.scenarios.motion_source import expand_clips
 from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.tasks import plan_tasks
-from harness.mocap.shared_motion import SharedMotion, find_shared_motion
-from harness.mocap.sources import MotionSource, open_motion_source
+from harness.mocap import MotionSource, SharedMotion, find_shared_motion, open_motion_source
 
 FOLDER = data_folder("scenarios")
 SCENARIOS = [

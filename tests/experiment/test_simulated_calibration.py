@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
-from harness.calibrate.poses import POSES, pose_configuration
-from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
+from harness.body import Body
+from harness.calibrate import POSES, SkeletonPrior, fit_skeleton_prior, pose_configuration
 from harness.core import rotations
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
@@ -27,18 +26,15 @@ from harness.experiment.simulated_calibration import (
     simulate_poses_calibration,
     simulate_tpose_calibration,
 )
-from harness.mocap import synthetic
-from harness.mocap.sources import open_motion_source
-from harness.reconstruct import registry
-from harness.reconstruct.methods.mean_pose import FittedMeanPose, MeanPose
+from harness.mocap import open_motion_source, synthetic
+from harness.reconstruct import FittedMeanPose, MeanPose, make_method
 from harness.report.run.text import run_table
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
-from harness.simulate.simulation import Simulation, exact_calibration, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.results import read_summary, select_cells
+from harness.simulate import Simulation, exact_calibration, simulate_tracker
+from harness.stream import TrackerFrame
 from tests.joint_centres import joint_centres_m
 
-PREVIOUS = registry.make_method("ik:previous")
+PREVIOUS = make_method("ik:previous")
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(

@@ -10,10 +10,8 @@ import pytest
 from harness.cli import main
 from harness.errors import BadFile
 from harness.experiment.status import read_status
-from harness.results.cell import as_row
-from harness.results.files.folder_kind import folder_lock
-from harness.results.index import CellIndex
-from harness.results.reader import select_cells
+from harness.results import CellIndex, as_row, select_cells
+from harness.results.files import folder_lock
 from tests.planted import Plan, planted_run
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)

@@ -14,10 +14,8 @@ from harness.experiment import engine
 from harness.experiment.evaluation import evaluate_each
 from harness.experiment.playback import prepare_playback
 from harness.experiment.recorded_takes import recorded_take
-from harness.results.reader import select_cells
-from harness.results.storage import read_summary
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.replay import RecordingStream
+from harness.results import read_summary, select_cells
+from harness.stream.recording import RecordingStream, record_capture
 from tests.experiment.strange_answers import FAILING, SCORED, Diverges, IsComplex, method_name
 from tests.experiment.test_isolation import HONEST, ONE_CLIP
 

@@ -24,9 +24,8 @@ from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
 from harness.experiment.tasks import ClipTask, cell_names, plan_tasks
 from harness.experiment.workers.executors import R, TaskExecutor, run_in_process
-from harness.results.files.folder_kind import folder_lock
-from harness.results.storage import read_cell
-from harness.results.table import TIME_COLUMNS
+from harness.results import TIME_COLUMNS, read_cell
+from harness.results.files import folder_lock
 from tests.experiment.made_up import FAILING, judge, made_up, sweep_file
 from tests.results.finish import folder_bytes
 

@@ -7,10 +7,9 @@ import pytest
 
 from harness.cli import main
 from harness.core.split import training_note
-from harness.reconstruct import registry
+from harness.reconstruct import list_methods, make_method
 from harness.report.run.data import last_varied, read_summary_only, series_name
-from harness.results.manifest import Manifest
-from harness.results.storage import read_summary
+from harness.results import Manifest, read_summary
 
 OUTSIDE = """
 from harness.reconstruct.methods.mean_pose import MeanPose
@@ -39,9 +38,9 @@ head = { bone = "head", along = 1.0 }
 NOTES = {"theirs:Silent": "training data unknown", "theirs:Corpus": "trained on AMASS"}
 
 
-@pytest.mark.parametrize("name", [*registry.list_methods(), "ik+ik", "ik:previous+ik", "mean_pose+ik"])
+@pytest.mark.parametrize("name", [*list_methods(), "ik+ik", "ik:previous+ik", "mean_pose+ik"])
 def test_every_shipped_method_declares_what_it_learns_from(name: str) -> None:
-    method = registry.make_method(name)
+    method = make_method(name)
     assert method.training_data == ("examples" if method.needs_examples else "none")  # type: ignore[attr-defined]
 
 

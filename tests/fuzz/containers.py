@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.stream.recording.blocks import CONFIGURED, FILE_HEADER, RECEIVED, RecordingBlock, encode_block, read_blocks
+from harness.stream.recording import CONFIGURED, FILE_HEADER, RECEIVED, RecordingBlock, encode_block, read_blocks
 from tests.fuzz.changes import BYTES, Change, change_json, json_value
 
 _SHAPES = ("(10**12,)", "(1000000000000,)", "(-1, 3)", "(2, 3", "(0,)", "()", "(3,)", "(True,)", "(" * 3000, "9" * 5000)

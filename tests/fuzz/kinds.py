@@ -10,31 +10,21 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from harness.body.humanoid import build_body
-from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
+from harness.body import build_body
+from harness.calibrate import CalibrationFile, read_calibration, write_calibration
 from harness.commands.status import _status_lines
-from harness.compare.baseline import write_baseline
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs, write_baseline
 from harness.core.calibration import Calibration
 from harness.core.files import content_key, to_json_types, write_text
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.package_data import data_folder
-from harness.experiment.playback import prepare_playback
-from harness.experiment.recorded_takes import find_playback
-from harness.experiment.scenarios.motion_source import expand_clips
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
-from harness.experiment.scenarios.sweep_config import expand_sweep, load_sweep
-from harness.experiment.status import read_status
-from harness.experiment.tasks import cell_names
-from harness.mocap.file_inspection import inspect_file
-from harness.mocap.library import MotionLibrary
-from harness.mocap.read.c3d import read_c3d
-from harness.reconstruct import registry
-from harness.reconstruct.database import MotionDatabase
+from harness.experiment import cell_names, find_playback, prepare_playback, read_status
+from harness.experiment.scenarios import Scenario, expand_clips, expand_sweep, find_scenario, load_scenario, load_sweep
+from harness.mocap import MotionLibrary, inspect_file, read_c3d
+from harness.reconstruct import MotionDatabase, make_method, without_options
 from harness.report.comparison.page import comparison_text
-from harness.report.kit.page_html import render_html
+from harness.report.kit import render_html
 from harness.report.paper.page import paper_page, paper_text
 from harness.report.placement.page import placement_page, placement_text
 from harness.report.run.data import read_run
@@ -42,17 +32,12 @@ from harness.report.run.page import write_run_page
 from harness.report.run.text import run_table
 from harness.report.sweep.data import read_sweep
 from harness.report.sweep.page import sweep_text, write_sweep_page
-from harness.results.findings.paper_findings import read_findings
-from harness.results.findings.placement_findings import read_placement
-from harness.results.index import INDEX_FILE
-from harness.results.reader import load_run
-from harness.results.storage import read_summary
-from harness.simulate.physics.emitters import read_mcf
-from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
-from harness.stream.line_events import LineEvent
-from harness.stream.recording.recording import RecordingWriter, record_capture
-from harness.stream.recording.replay import RecordingStream
-from harness.stream.station_counts import StreamSummary, format_csv_row, frame_rows
+from harness.results import INDEX_FILE, load_run, read_summary
+from harness.results.findings import read_findings, read_placement
+from harness.simulate.physics import read_mcf
+from harness.stream import LineEvent, StreamSummary, format_csv_row, frame_rows
+from harness.stream.is900 import DEFAULT_EMITTERS
+from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from harness.study.placement.config import base_scenario, load_placement_study
 from harness.study.placement.placement_study import run_placement
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
@@ -129,7 +114,7 @@ def _read_library(folder: Path) -> object:
 
 def _plan(scenario: Scenario) -> object:
     for method in scenario.methods:
-        registry.make_method(method)
+        make_method(method)
     return cell_names(scenario), content_key(to_json_types(scenario.vary))
 
 
@@ -154,7 +139,7 @@ def _read_placement(folder: Path) -> object:
 def _read_options(folder: Path) -> object:
     text = (folder / "x.txt").read_bytes().decode("utf-8", "replace")[:2000]
     names = (name for part in split_outside_brackets(text, ",") for name in expand_alternatives(part))
-    return [(registry.make_method(name), registry.without_options(name)) for name in names]
+    return [(make_method(name), without_options(name)) for name in names]
 
 
 def _copy_shipped(name: str) -> Callable[[Path], object]:

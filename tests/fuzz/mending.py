@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.toml_file import insert_toml_digest
-from harness.results.files.digests import insert_digest
-from harness.results.files.integrity import compute_digests
+from harness.results.files import compute_digests, insert_digest
 from harness.results.index import _content_digest
 
 

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body, tpose
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
 from harness.live.pose import LivePose
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 def frame(at_s: float, measured_s: float | None = None, stations: int = 2) -> TrackerFrame:
@@ -27,7 +26,7 @@ def frame(at_s: float, measured_s: float | None = None, stations: int = 2) -> Tr
 
 def configuration(rng: np.random.Generator, spread_rad: float = 0.3) -> Floats:
     """(55,) random configuration near the T-pose."""
-    qpos = np.array(humanoid.tpose(humanoid.build_body().skeleton))
+    qpos = np.array(tpose(build_body().skeleton))
     qpos[:3] += rng.normal(scale=0.5, size=3)
     qpos[3:7] = rng.normal(size=4)
     qpos[3:7] /= np.linalg.norm(qpos[3:7])
@@ -36,5 +35,5 @@ def configuration(rng: np.random.Generator, spread_rad: float = 0.3) -> Floats:
 
 
 def live_pose(qpos: Floats, number: int = 0, at_s: float = 0.0, kinematics: Kinematics | None = None) -> LivePose:
-    worn = kinematics or Kinematics(humanoid.build_body())
+    worn = kinematics or Kinematics(build_body())
     return LivePose(number, frame(at_s), at_s, at_s, at_s, Estimate(qpos, Status.SOLVED), worn)

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 class Paced:

@@ -14,22 +14,20 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body
 from harness.core import rotations
 from harness.errors import BadFile
 from harness.live.browser_view import BrowserOutput, _run_process
 from harness.live.pose import SessionSetup
 from harness.live.shared_memory import PoseRing
 from harness.live.viewer import _run_viewer_process
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording.recorder import RecordingSwitch
-from harness.stream.recording.recording import read_recording
-from harness.view.server import COMMAND_HEADER
+from harness.stream.is900.codec import WireFormat
+from harness.stream.recording import RecordingSwitch, read_recording
+from harness.view import COMMAND_HEADER
 from tests.live.posing import configuration, live_pose
 
 pytestmark = pytest.mark.long
-BODY = humanoid.build_body()
+BODY = build_body()
 ROOM = rotations.IDENTITY, np.array([0.0, 0.0, 2.5])
 SETUP = SessionSetup(BODY.skeleton, ("head", "torso"), 90.0, ROOM, "a session")
 

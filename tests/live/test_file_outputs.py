@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
@@ -17,13 +16,12 @@ from harness.core.humanoid24 import unpack
 from harness.errors import BadFile
 from harness.live.file_outputs import BvhOutput, PoseTableOutput
 from harness.live.pose import LivePose
-from harness.mocap.clip_file import read_clip
-from harness.mocap.write.bvh import bvh_files
-from harness.mocap.write.posed_motion import PosedMotion
+from harness.mocap import read_clip
+from harness.mocap.write import PosedMotion, bvh_files
 from tests.live.posing import configuration, frame, live_pose
 
 RATE_HZ = 40.0
-BODY = humanoid.build_body()
+BODY = build_body()
 
 
 def walked(rng: np.random.Generator, frames: int) -> Floats:

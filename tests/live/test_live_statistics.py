@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.core.estimate import Status
 from harness.live.live_statistics import SECONDS_KEPT, LiveStatistics
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 class Clock:

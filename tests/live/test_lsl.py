@@ -5,8 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body
 from harness.errors import BadInput, MissingExtra
 from harness.live.lsl import LslOutput, import_pylsl
 from tests.joint_centres import joint_centres_m
@@ -19,7 +18,7 @@ except MissingExtra as missing:
 
 
 def test_samples_arrive_with_their_times(rng: np.random.Generator) -> None:
-    body = humanoid.build_body()
+    body = build_body()
     name = f"test-{rng.integers(1 << 60)}"
     output = LslOutput(name, body.skeleton, 75.0)
     inlets = {}
@@ -50,4 +49,4 @@ def test_samples_arrive_with_their_times(rng: np.random.Generator) -> None:
 
 def test_a_stream_has_a_name() -> None:
     with pytest.raises(BadInput, match="needs a name"):
-        LslOutput(" ", humanoid.build_body().skeleton, 75.0)
+        LslOutput(" ", build_body().skeleton, 75.0)

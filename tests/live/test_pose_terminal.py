@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.humanoid import tpose
-from harness.calibrate.guided_calibration import GuidedPose
-from harness.calibrate.performer_preview import PerformerPose
-from harness.calibrate.poses import POSES, pose_configuration
+from harness.body import tpose
+from harness.calibrate import POSES, GuidedPose, PerformerPose, pose_configuration
 from harness.core.humanoid24 import standard_skeleton
 from harness.live.pose_terminal import COLUMNS, ROWS, PoseTerminal, draw_figure, guided_lines
 

@@ -10,24 +10,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.calibrate.guided_calibration import Notifier, TPoseCalibrator
-from harness.calibrate.hold import UnusableHold
+from harness.body import build_body, tpose
+from harness.calibrate import Notifier, TPoseCalibrator, UnusableHold
 from harness.commands import live_summary
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
-from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment import Playback, prepare_playback
 from harness.live.pose import LivePose
 from harness.live.scheduling_jitter import JitterProbe
 from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
-from harness.simulate.simulation import simulate_tracker
-from harness.stream.frame import TrackerFrame, TrackerStream
+from harness.simulate import simulate_tracker
+from harness.stream import TrackerFrame, TrackerStream
 from tests.live.posing import frame
 from tests.live.streams import Broken, Paced
 from tests.long_demo import write_long_demo
 
-BODY = humanoid.build_body()
+BODY = build_body()
 WORN = Calibration(
     "exact", ("a", "b"), ("head", "lhand"), np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1)),
     np.array([1.0, 0, 0, 0]), np.zeros(3),
@@ -52,7 +51,7 @@ class Counting:
         self.seen.append(frame)
         if len(self.seen) == self.fails_at:
             raise ZeroDivisionError("the method failed")
-        return Estimate(humanoid.tpose(BODY.skeleton), Status.SOLVED)
+        return Estimate(tpose(BODY.skeleton), Status.SOLVED)
 
 
 class Kept:
@@ -213,9 +212,9 @@ def test_nobody_in_t_pose_is_told_so(worn: Playback) -> None:
 
 
 def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
-    from harness.reconstruct import registry
+    from harness.reconstruct import make_method
 
-    upright = humanoid.tpose(worn.body.skeleton)
+    upright = tpose(worn.body.skeleton)
     take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
     noise = worn.scenario.noise_model
     standing = simulate_tracker(worn.body, take, worn.scenario.nominal_mounts, worn.tracker, noise, seed=1).frames
@@ -233,7 +232,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     run_session(
         Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
         worn.body,
-        worn.clip_evaluation.fit_method(registry.make_method("ik:previous"), "ik:previous"),
+        worn.clip_evaluation.fit_method(make_method("ik:previous"), "ik:previous"),
         TPoseCalibrator(worn.body, worn.scenario.nominal_mounts),
         [output],
         LiveOptions(40.0, queue_frames=999, host_timestamps=False),
@@ -246,10 +245,10 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
 
 
 def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
-    from harness.reconstruct import registry
+    from harness.reconstruct import make_method
 
     boxing = worn.simulation.frames[:60]
-    reconstructor = worn.clip_evaluation.fit_method(registry.make_method("ik"), "ik")
+    reconstructor = worn.clip_evaluation.fit_method(make_method("ik"), "ik")
     warm_up(reconstructor, worn.calibration, boxing[:3])
     session = reconstructor.begin(worn.calibration)
     offline = [session.step(frame) for frame in boxing]
@@ -268,7 +267,7 @@ class Late(Counting):
     def step(self, frame: TrackerFrame) -> Estimate:
         super().step(frame)
         lag = min(len(self.seen) - 1, 2)
-        qpos = humanoid.tpose(BODY.skeleton).copy()
+        qpos = tpose(BODY.skeleton).copy()
         qpos[2] = len(self.seen) - 1 - lag
         return Estimate(qpos, Status.SOLVED, lag=lag)
 

@@ -4,12 +4,11 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body
 from harness.live.shared_memory import PoseRing
 from tests.live.posing import configuration, live_pose
 
-KINEMATICS = Kinematics(humanoid.build_body())
+KINEMATICS = Kinematics(build_body())
 
 
 def test_a_frame_comes_back_as_it_was(rng: np.random.Generator) -> None:

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
-from harness.calibrate.guided_calibration import GuidedPose
-from harness.calibrate.performer_preview import PerformerPose
-from harness.calibrate.poses import POSES
+from harness.body import Kinematics, build_body, tpose
+from harness.calibrate import POSES, GuidedPose, PerformerPose
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile, BadInput
 from harness.live.pose_sheet import SHEET_NAME, draw_poses
@@ -20,7 +17,7 @@ from harness.live.viewer import ViewerOutput, _prepare_folder
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
-OWN = humanoid.build_body().skeleton
+OWN = build_body().skeleton
 
 
 def wait_for(pictures: int, folder: Path) -> list[Path]:
@@ -35,10 +32,10 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
 
     shown, kinematics = (
         ViewerOutput("frames", OWN, tmp_path / "frames", force=False),
-        Kinematics(humanoid.build_body()),
+        Kinematics(build_body()),
     )
     try:
-        qpos = np.array(humanoid.tpose(OWN))
+        qpos = np.array(tpose(OWN))
         shown.send(live_pose(qpos, 0))
         wait_for(1, tmp_path / "frames")
         qpos[7:] += 0.3
@@ -92,7 +89,7 @@ def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:
     """
     from matplotlib.image import imread
 
-    qpos = humanoid.tpose(OWN)
+    qpos = tpose(OWN)
     performer = PerformerPose(qpos, np.zeros(4))
     shown = ViewerOutput("frames", OWN, tmp_path, force=False)
     pictures = []

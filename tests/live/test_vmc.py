@@ -7,16 +7,13 @@ from contextlib import closing, contextmanager
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import Body, Kinematics, build_body, retarget_to_own_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.live.pose import LivePose
 from harness.live.vmc import HIPS, UNITY_BONES, UnityPose, VmcOutput, parse_address
-from harness.mocap.sources import SyntheticSource
+from harness.mocap import SyntheticSource
 from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose
 
@@ -110,7 +107,7 @@ def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator, real_poses: tu
 
 def rest_orientation(body: Body, bone: str) -> Floats:
     """`world_from_bone` (4,) in the T-pose."""
-    pose = live_pose(humanoid.tpose(body.skeleton), kinematics=Kinematics(body))
+    pose = live_pose(tpose(body.skeleton), kinematics=Kinematics(body))
     out: Floats = pose.bones[1][body.skeleton.index(bone)]
     return out
 
@@ -127,8 +124,8 @@ def test_bones_keep_their_distances(rng: np.random.Generator, real_poses: tuple[
 
 def test_the_neck_turns_as_both_of_its_bones() -> None:
     """A twist of the two bones about the neck by 20 and 40 deg is one of 30 deg below the head, which turned by 40."""
-    body = humanoid.build_body()
-    qpos = np.array(humanoid.tpose(body.skeleton))
+    body = build_body()
+    qpos = np.array(tpose(body.skeleton))
     for bone, angle_deg in (("lowerneck", 20.0), ("upperneck", 20.0)):
         qpos[int(body.model.joint(f"{bone}.ry").qposadr[0])] = np.deg2rad(angle_deg)
     unity = UnityPose(body.skeleton)
@@ -140,7 +137,7 @@ def test_the_neck_turns_as_both_of_its_bones() -> None:
 
 def test_the_messages_are_those_of_the_protocol(rng: np.random.Generator) -> None:
     with receiver() as ours:
-        output = VmcOutput(str(ours.getsockname()[1]), humanoid.build_body().skeleton)
+        output = VmcOutput(str(ours.getsockname()[1]), build_body().skeleton)
         output.send(live_pose(configuration(rng), at_s=5.0))
         received(ours, 2)
         output.send(live_pose(configuration(rng), at_s=5.5))
@@ -157,8 +154,8 @@ def test_the_messages_are_those_of_the_protocol(rng: np.random.Generator) -> Non
 
 
 def test_the_t_pose_turns_no_bone() -> None:
-    body = humanoid.build_body()
-    local = UnityPose(body.skeleton).local(live_pose(humanoid.tpose(body.skeleton)))
+    body = build_body()
+    local = UnityPose(body.skeleton).local(live_pose(tpose(body.skeleton)))
     np.testing.assert_allclose(local[:, 3:], np.tile([0.0, 0.0, 0.0, 1.0], (len(local), 1)), atol=1e-9)
     at_m = dict(zip((HIPS, *UNITY_BONES), local[:, :3], strict=True))
     assert at_m["LeftLowerArm"][0] < -0.2  # Unity's x is right
@@ -168,8 +165,8 @@ def test_the_t_pose_turns_no_bone() -> None:
 
 def test_a_raised_forearm_turns_as_in_unity() -> None:
     """Left elbow bent by 90 deg, the hand ahead: from pointing left (-x) to forward (+z) about y, left-handed: +90."""
-    body = humanoid.build_body()
-    qpos = np.array(humanoid.tpose(body.skeleton))
+    body = build_body()
+    qpos = np.array(tpose(body.skeleton))
     kinematics = Kinematics(body)
     hinge = int(body.model.joint("lradius.rx").qposadr[0])
     qpos[hinge] = np.pi / 2
@@ -193,4 +190,4 @@ def test_a_port_alone_is_on_this_computer() -> None:
     assert parse_address("39539") == parse_address(":39539") == ("127.0.0.1", 39539)
     assert parse_address("[::1]:39539") == ("::1", 39539)
     with pytest.raises(BadInput, match="no such host"):
-        VmcOutput("no..host:39539", humanoid.build_body().skeleton)
+        VmcOutput("no..host:39539", build_body().skeleton)

@@ -5,18 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import bone_poses
+from harness.body import Body, bone_poses
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import load_scenario
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import simulate_tracker
+from harness.simulate import Noise, TrackerConfig, simulate_tracker
 
 
 @dataclass(frozen=True)

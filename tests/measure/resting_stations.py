@@ -6,10 +6,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.measure.static_series import StaticSeries, find_rest, static_series
-from harness.simulate.components.stationary import DriftNoise, WhiteNoise
-from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.readings import SimulatedReadings
-from harness.stream.recording.station_readings import StationReadings
+from harness.simulate import DriftNoise, Noise, SimulatedReadings, WhiteNoise, noise_preset
+from harness.stream.recording import StationReadings
 
 QUIET = Noise(white=WhiteNoise(), drift=DriftNoise())
 STATIONS = ("one", "two", "three", "four", "five", "six")

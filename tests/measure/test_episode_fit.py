@@ -6,7 +6,7 @@ import pytest
 
 from harness.measure.episode_fit import EXCURSION_RATE, fit_episodes
 from harness.measure.gauss_markov import ErrorProcess
-from harness.simulate.noise import noise_preset
+from harness.simulate import noise_preset
 from tests.measure.resting_stations import QUIET, at_rest
 
 NOISE = ErrorProcess(0.00075, 0.0015, 1.0)

@@ -7,7 +7,7 @@ from harness.core.seeds import generator
 from harness.measure.excursions import THRESHOLD, ExcursionDetector, ExcursionEvent
 from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.transient import Excursion
+from harness.simulate import Excursion
 from tests.measure.resting_stations import (
     QUIET,
     RATE_HZ,

@@ -15,8 +15,7 @@ from harness.measure.gaps_and_echoes import (
     leaked_tilt_rad,
 )
 from harness.measure.static_series import StaticSeries
-from harness.simulate.components.transient import Dropout, Echo
-from harness.simulate.noise import Noise
+from harness.simulate import Dropout, Echo, Noise
 from tests.measure.resting_stations import (
     QUIET,
     RATE_HZ,

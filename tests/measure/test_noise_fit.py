@@ -11,9 +11,7 @@ from harness.errors import BadInput
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import fit_noise, start_values
 from harness.measure.static_series import StaticSeries, static_series
-from harness.simulate.components.stationary import DriftNoise, WhiteNoise
-from harness.simulate.components.transient import Echo, Excursion
-from harness.simulate.noise import Noise, noise_preset
+from harness.simulate import DriftNoise, Echo, Excursion, Noise, WhiteNoise, noise_preset
 from tests.measure.resting_stations import STATIONS, simulate_static, station_readings
 from tests.measure.test_gauss_markov import dense_covariance, dense_log_likelihood
 

@@ -20,7 +20,7 @@ from harness.measure.noise_spectra import (
     pool_allan,
     pool_spectra,
 )
-from harness.simulate.components.stationary import gauss_markov
+from harness.simulate import gauss_markov
 
 
 def noise(seed: int, count: int, axes: int, white: float, drift: float, correlation_s: float) -> np.ndarray:

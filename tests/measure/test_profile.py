@@ -14,7 +14,7 @@ from harness.errors import BadFile, BadInput
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.profile import UnitProfile, measure_profile
-from harness.stream.recording.station_readings import CaptureBlock, StationReadings
+from harness.stream.recording import CaptureBlock, StationReadings
 from tests.measure.resting_stations import QUIET
 from tests.measure.test_rigid_pair import LEVER_M, sweep
 from tests.measure.test_timing import capture

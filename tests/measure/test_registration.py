@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import build_body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
@@ -17,9 +16,8 @@ from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
 from harness.measure.registration import MountFit, Registration, register_poses
-from harness.mocap import synthetic
-from harness.mocap.library import MotionLibrary
-from harness.simulate.noise import noise_preset
+from harness.mocap import MotionLibrary, synthetic
+from harness.simulate import noise_preset
 from tests.measure.boxing_captures import BoxingCapture, capture_boxing
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
 

@@ -11,7 +11,7 @@ from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
 from harness.measure.static_series import StaticSeries
-from harness.simulate.noise import Noise
+from harness.simulate import Noise
 from tests.measure.test_gauss_markov import dense_covariance
 from tests.measure.test_noise_fit import PRESET, nothing, series_and_masks, truth
 

@@ -9,10 +9,8 @@ from harness.core import rotations
 from harness.core.arrays import Ints
 from harness.core.seeds import generator
 from harness.measure.static_series import StaticSeries, find_rest, static_series
-from harness.simulate.components.stationary import DriftNoise
-from harness.simulate.components.transient import Echo, Excursion
-from harness.simulate.noise import Noise, noise_preset
-from harness.stream.recording.station_readings import StationReadings
+from harness.simulate import DriftNoise, Echo, Excursion, Noise, noise_preset
+from harness.stream.recording import StationReadings
 from tests.measure.resting_stations import simulate_static, station_readings
 
 

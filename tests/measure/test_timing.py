@@ -10,10 +10,9 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share, robust_slope
-from harness.simulate.components.stationary import Clock, gauss_markov
-from harness.simulate.noise import Noise, noise_preset
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording.station_readings import CaptureBlock, StationReadings
+from harness.simulate import Clock, Noise, gauss_markov, noise_preset
+from harness.stream.is900.codec import WireFormat
+from harness.stream.recording import CaptureBlock, StationReadings
 from tests.measure.resting_stations import simulate_static, station_readings
 
 STATIONS = ("one", "two", "three", "four", "five", "six")

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
-from harness.body.retargeting import retarget_to_common_body, retarget_to_own_body
+from harness.body import Body, retarget_to_common_body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -16,8 +15,7 @@ from harness.mocap import synthetic
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.solver.normal_equations import normal_rows
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.stream.frame import TrackerFrame
-from harness.stream.inputs import make_inputs
+from harness.stream import TrackerFrame, make_inputs
 from harness.testing.frames import exact_calibration, exact_frames
 from tests.joint_centres import joint_centres_m
 

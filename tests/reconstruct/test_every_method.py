@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.body.retargeting import retarget_to_common_body
+from harness.body import retarget_to_common_body
 from harness.core.estimate import Status
 from harness.core.motion import BodyMotion
 from harness.core.workers import run_in_workers
@@ -18,7 +18,7 @@ from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
-from harness.score.angles import wrap_difference
+from harness.score import wrap_difference
 from harness.testing import method_checks
 from harness.testing.contract_case import make_case, require_identical
 from harness.testing.frames import exact_frames

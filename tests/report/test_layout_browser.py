@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.measure.reports.unit_report import UnitReport
-from harness.measure.reports.validation_report import ValidationReport
+from harness.measure.reports import UnitReport, ValidationReport
 from harness.report.comparison.page import write_comparison_page
 from harness.report.coverage.content import CoverageContent
 from harness.report.coverage.page import coverage_page
@@ -21,7 +20,7 @@ from harness.report.physics.page import write_physics_page
 from harness.report.placement import page as placement_page
 from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
-from harness.results.findings.trust_findings import TrustFindings
+from harness.results.findings import TrustFindings
 from tests.planted import Plan, planted_run, planted_sweep
 from tests.report.comparison.compared import compared
 from tests.report.paper.findings import liu, write_study

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.compare.run_summary.run_statistics import compute_run_statistics
+from harness.compare.run_summary import compute_run_statistics
 from harness.results import storage
 from harness.results.files.digests import write_result_json
 from harness.results.files.folder_kind import LOCK_FILE

@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.compare.baseline import write_baseline
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs, write_baseline
 from harness.errors import BadFile, Outcome
-from harness.experiment.status import read_status
+from harness.experiment import read_status
 from harness.report.figures.conditions import read_conditions
 from harness.report.run.data import read_run, read_summary_only
 from harness.results.cell import read_row

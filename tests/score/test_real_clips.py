@@ -7,7 +7,7 @@ import pytest
 
 from harness.core.humanoid24 import pack, standard_skeleton
 from harness.core.motion import BodyMotion
-from harness.mocap.library import MotionLibrary
+from harness.mocap import MotionLibrary
 from harness.score.null_methods import score_null_methods
 from harness.testing import doctor
 from harness.testing.doctor import check_scores

@@ -5,9 +5,7 @@ from typing import Protocol
 import numpy as np
 import pytest
 
-from harness.body import retargeting
-from harness.body.humanoid import Body
-from harness.body.mounts import DEFAULT_MOUNTS, Mount
+from harness.body import DEFAULT_MOUNTS, Body, Mount, retarget_to_own_body
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
@@ -55,10 +53,10 @@ def worn(*stations: str) -> list[Mount]:
 @pytest.fixture(scope="session")
 def boxer() -> tuple[Body, BodyMotion]:
     """Twelve seconds of the built-in performer, on the performer's own body."""
-    return retargeting.retarget_to_own_body(synthetic.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
+    return retarget_to_own_body(synthetic.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
 
 
 @pytest.fixture(scope="session")
 def walker() -> tuple[Body, BodyMotion]:
     """Five seconds of the built-in performer's walk, on the performer's own body."""
-    return retargeting.retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=5.0))
+    return retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=5.0))

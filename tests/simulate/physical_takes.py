@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import Body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion

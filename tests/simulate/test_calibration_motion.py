@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body import ground, kinematics
-from harness.body.humanoid import Body, build_body, tpose
-from harness.body.mounts import DEFAULT_MOUNTS, locate_mount
+from harness.body import DEFAULT_MOUNTS, Body, build_body, locate_mount, pose_from_qpos, sole_heights_m, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -16,7 +14,7 @@ from harness.simulate.components.mount import perturb_mounts
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, noise_preset
 from harness.simulate.simulation import simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 COUNT = 8
 SIX = [DEFAULT_MOUNTS[name] for name in ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")]
@@ -46,7 +44,7 @@ def test_each_pose_is_held_without_moving(body: Body) -> None:
         held = take.qpos[(times_s >= begin_s - 1e-9) & (times_s <= end_s + 1e-9)]
         np.testing.assert_allclose(held, np.broadcast_to(held[0], held.shape), atol=1e-12)
         still |= (times_s >= begin_s - 1e-9) & (times_s <= end_s + 1e-9)
-        soles_m = ground.sole_heights_m(body.skeleton, kinematics.pose_from_qpos(body.skeleton, held[:1]))
+        soles_m = sole_heights_m(body.skeleton, pose_from_qpos(body.skeleton, held[:1]))
         assert soles_m.min() == pytest.approx(0.0, abs=1e-12)
     assert (np.abs(np.diff(take.qpos, axis=0)).max(axis=1)[~still[:-1] & ~still[1:]] > 0.0).all()
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body import retargeting
-from harness.body.humanoid import Body
+from harness.body import Body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
@@ -79,7 +78,7 @@ def test_it_ends_when_it_says() -> None:
 @pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
 def test_no_sound_reading_of_a_simulation_is_suspect(behaviour: str, rate_hz: float) -> None:
     """With every noise preset and disturbance, and with the 16-bit list too."""
-    body, take = retargeting.retarget_to_own_body(synthetic.generate(behaviour, "p1", 1, seed=1))
+    body, take = retarget_to_own_body(synthetic.generate(behaviour, "p1", 1, seed=1))
     setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
     for preset, kind in setups:
         for items in ((40, 2, 11, 21, 1), (40, 18, 19, 21, 1)) if kind == "none" else ((40, 2, 11, 21, 1),):

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.motion import BodyMotion
 from harness.simulate.loop import loop_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.is900.codec.items import SHORT_LIST
-from harness.stream.is900.codec.reader import ByteCapture, FrameReader
-from harness.stream.is900.emulator.device import Device
+from harness.stream.is900 import Device
+from harness.stream.is900.codec import SHORT_LIST, ByteCapture, FrameReader
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount
+from harness.body import Body, Kinematics, Mount
 from harness.core import rotations
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Body, Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
@@ -22,8 +20,8 @@ from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
-from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import ByteCapture, CaptureStream, FrameReader
+from harness.stream import TrackerFrame
+from harness.stream.is900.codec import ByteCapture, CaptureStream, FrameReader
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 

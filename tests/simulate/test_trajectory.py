@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.experiment.playback import Playback
+from harness.experiment import Playback
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver import DriverConfig, Is900
-from harness.stream.is900.emulator import serve_emulator
+from harness.stream.is900.driver.config import DriverConfig
+from harness.stream.is900.driver.is900 import Is900
+from harness.stream.is900.emulator.server import serve_emulator
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.experiment.playback import Playback, prepare_playback
-from harness.reconstruct import registry
+from harness.experiment import Playback, prepare_playback
+from harness.reconstruct import list_methods, make_method
 from harness.stream.is900.codec.reader import ByteCapture, WireFormat
 from harness.stream.is900.codec.records import RecordValues, encode_records
-from harness.stream.is900.driver import Is900
-from harness.stream.is900.emulator import serve_emulator
+from harness.stream.is900.driver.is900 import Is900
+from harness.stream.is900.emulator.server import serve_emulator
 from harness.stream.recording.recording import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
@@ -127,13 +127,13 @@ def test_every_source_keeps_the_contract_of_streams(source: str, tmp_path: Path)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", sorted(registry.list_methods()))
+@pytest.mark.parametrize("name", sorted(list_methods()))
 @pytest.mark.parametrize("take", [None], indirect=True)
 def test_every_method_estimates_the_same_from_every_source(
     playback: Playback, frames_by_source: Sources, name: str
 ) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
-    reconstructor = playback.clip_evaluation.fit_method(registry.make_method(name), name)
+    reconstructor = playback.clip_evaluation.fit_method(make_method(name), name)
     sources = {"simulation": list(playback.simulation.frames), **frames_by_source}
     first_s = max(frames[0].measured_s[0] for frames in sources.values())
 

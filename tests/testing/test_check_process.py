@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.experiment.methods.isolation import Isolation
-from harness.experiment.methods.worker_process import close_fork_server
+from harness.experiment.methods import Isolation, close_fork_server
 from harness.testing import check_process
 from harness.testing.check_process import check_rules_apart
 from harness.testing.method_checks import check_rules

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, tpose
+from harness.body import Body, tpose
 from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
-from harness.reconstruct.solver.status_monitor import StatusMonitor
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct.solver import StatusMonitor
+from harness.stream import TrackerFrame
 from harness.testing import method_checks
 from harness.testing.contract_case import make_case
 from harness.testing.method_checks import MethodContractError, RuleResult, check_method, check_rules

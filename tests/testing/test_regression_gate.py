@@ -13,14 +13,11 @@ from typing import Any
 
 import pytest
 
-from harness.compare import baseline
+from harness.compare import write_baseline
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, Outcome
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results import manifest
-from harness.results.manifest import Manifest
-from harness.results.reader import load_results
+from harness.experiment.scenarios import Scenario, load_scenario
+from harness.results import Manifest, describe_run, load_results
 from harness.testing.plugin import format_annotations
 from harness.testing.regression_gate import RegressionGate, scenario_from_manifest
 from tests.compare.sides import side, write_run
@@ -49,7 +46,7 @@ CHANGE = {"now": 1.0}
 def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any) -> Path:
     """The folder of a run of eight clips that was never run, of errors as `CHANGE` has them."""
     sides = side(methods=dict.fromkeys(scenario.methods, CHANGE["now"]), scenario=scenario.name, **changes)
-    of_it = manifest.describe_run(asdict(scenario), motion_source="made up", command=command)
+    of_it = describe_run(asdict(scenario), motion_source="made up", command=command)
     return write_run(out, replace(sides, manifest=of_it))
 
 
@@ -70,7 +67,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     first = measured(replace(TINY, methods=("mine:Mine", "ik")), pytester.path / "first")
-    baseline.write_baseline(first, "main", pytester.path / "results/baselines")
+    write_baseline(first, "main", pytester.path / "results/baselines")
     return pytester
 
 
@@ -234,9 +231,7 @@ def test_annotations_are_escaped_as_github_reads_them() -> None:
 
 def test_a_scenario_is_read_off_a_manifest_and_only_a_runs() -> None:
     scenario = replace(load_scenario("builtin_walking"), expected_order=())
-    of_it = Manifest(
-        **json.loads(json.dumps(manifest.describe_run(asdict(scenario), motion_source="", command="").as_dict()))
-    )
+    of_it = Manifest(**json.loads(json.dumps(describe_run(asdict(scenario), motion_source="", command="").as_dict())))
     assert scenario_from_manifest(of_it) == replace(scenario, methods=(), fault=())
     with pytest.raises(BadInput, match="missing motion"):
         scenario_from_manifest(replace(of_it, inputs={"name": "a sweep"}))

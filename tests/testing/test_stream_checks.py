@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.stream.frame import TrackerFrame, TrackerStream
+from harness.stream import TrackerFrame, TrackerStream
 from harness.testing.stream_checks import StreamContractError, check_stream
 
 RATE_HZ = 40.0

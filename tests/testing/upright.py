@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from harness.body.humanoid import tpose
+from harness.body import tpose
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body, tpose
-from harness.body.kinematics import pose_from_qpos
+from harness.body import build_body, pose_from_qpos, tpose
 from harness.errors import BadInput
 from harness.view.live_page import LiveContent
 from harness.view.server import ViewServer

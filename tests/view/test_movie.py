@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from harness.errors import BadInput, MissingExtra, SystemFault, UnknownName
-from harness.report.kit.render_process import start_renderer
+from harness.report.kit import start_renderer
 from harness.view import movie
 from harness.view.movie import MoviePart, check_movie, write_movie
 from harness.view.page import ViewedMotion

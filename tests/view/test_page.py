@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.errors import BadInput, UnknownName
-from harness.report.kit.motion_player import PlayerClip
+from harness.report.kit import PlayerClip
 from harness.view import page
 from harness.view.page import ViewedMotion, ViewerContent, write_page
 from harness.view.server import ViewServer

@@ -11,8 +11,7 @@ from typing import Literal, get_args
 
 from harness.core.options import parse_name, split_outside_brackets
 from harness.errors import BadInput
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import Scenario, load_scenario
 
 Preset = Literal["clean", "noise", "default"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)

@@ -29,14 +29,12 @@ from harness.bench.accuracy.statements import compare_methods, find_worse_clips,
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.bench.common import fresh_methods, run_benchmark_cells
 from harness.bench.limits import outcome_of
-from harness.compare.ranking import MethodRanking
+from harness.compare import MethodRanking
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.experiment.methods.isolation import DEFAULT_ISOLATION
-from harness.experiment.methods.remote_method import resolve_method
-from harness.experiment.scenarios.scenario import Scenario
-from harness.results.cell import cell_folder, read_cell
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.manifest import current_circumstances
+from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
+from harness.experiment.scenarios import Scenario
+from harness.results import cell_folder, current_circumstances, read_cell
+from harness.results.findings import BenchmarkStatement
 
 _QUICK = "the quick form has one seed and few clips"
 

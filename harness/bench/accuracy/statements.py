@@ -13,9 +13,8 @@ from harness.bench.accuracy.clip_errors import ANGLE, SILENT_ANGLE, ErrorsByCond
 from harness.bench.accuracy.conditions import COMPARED_METHODS, LIMITING_METHODS, PRESETS, TABLE_SCENARIOS
 from harness.bench.accuracy.targets import require_mean
 from harness.bench.limits import state_verdict
-from harness.compare.paired_statistics import compare_paired
-from harness.compare.ranking import MethodRanking, rank_methods
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.compare import MethodRanking, compare_paired, rank_methods
+from harness.results.findings import BenchmarkStatement
 
 LARGEST_RATIO = 1.05
 """Largest ratio of an error to that of a limiting method on one clip."""

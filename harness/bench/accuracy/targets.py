@@ -18,7 +18,7 @@ from harness.bench.accuracy.clip_errors import (
 from harness.bench.limits import state_verdict
 from harness.core.number_format import format_fixed
 from harness.errors import BadInput
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 
 @dataclass(frozen=True)

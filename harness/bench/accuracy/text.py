@@ -9,7 +9,7 @@ from harness.bench.accuracy.targets import mean_of
 from harness.bench.limits import count_missed
 from harness.core.number_format import count_noun
 from harness.core.text_table import Table
-from harness.report.kit.statement_lines import format_statements
+from harness.report.kit import format_statements
 
 
 def format_report(report: AccuracyReport) -> str:

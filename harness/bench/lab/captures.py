@@ -10,25 +10,28 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.fields import replace_fields
 from harness.core.motion import Clip
 from harness.core.package_data import VERSION
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.mocap.synthetic.takes import generate_rig, stretch_marks
-from harness.simulate.components.stationary import SessionBias
-from harness.simulate.components.transient import Dropout
-from harness.simulate.link import TrackerConfig
-from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
-from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.is900.emulator.faults import Fault, add_byte_faults
-from harness.stream.recording.recording import record_capture
+from harness.mocap.synthetic import generate_rig, stretch_marks
+from harness.simulate import (
+    Dropout,
+    SessionBias,
+    TrackerConfig,
+    Trajectory,
+    sampling_times_s,
+    simulate_readings,
+    transmit_readings,
+)
+from harness.stream.is900 import Fault, add_byte_faults
+from harness.stream.is900.codec import ByteCapture, WireFormat
+from harness.stream.recording import record_capture
 
 SCENARIO = "lab"
 FIVE_MINUTES, TWENTY_MINUTES = "rig_p1_02", "rig_p1_03"

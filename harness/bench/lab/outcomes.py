@@ -10,11 +10,11 @@ from harness.bench.lab.captures import NO_FAULTS, PLANTED_FAULTS, planted_captur
 from harness.bench.lab.validated_captures import registration_errors, validate_planted
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError
-from harness.experiment.workers.executors import TaskExecutor
-from harness.measure.reports.departures import Departure
-from harness.results.files.digests import check_key, read_record, write_record
-from harness.results.manifest import source_hash
-from harness.stream.recording.station_readings import CaptureReader
+from harness.experiment.workers import TaskExecutor
+from harness.measure.reports import Departure
+from harness.results import source_hash
+from harness.results.files import check_key, read_record, write_record
+from harness.stream.recording import CaptureReader
 from harness.study.trust.characterization import characterize_capture
 
 _STORED = "an outcome of `harness bench lab --truth`"

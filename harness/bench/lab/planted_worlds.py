@@ -14,7 +14,7 @@ from harness.bench.limits import state_verdict
 from harness.bench.stored_errors import METRICS, load_planted_errors
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 from harness.study.trust.pair_agreement import ArmErrors, clip_means, judge_equivalence, judge_pairs
 
 CLIPS = 12

@@ -12,16 +12,14 @@ from harness.bench.cpu_time import hold_cpu_to_limit, overbooked
 from harness.bench.lab.captures import FIVE_MINUTES, SCENARIO, planted_capture, simulation_note
 from harness.bench.lab.verb_cost import BOXING_KIND, measure_verb
 from harness.bench.limits import hold_to_limit
-from harness.body.retargeting import retarget_to_own_body
-from harness.experiment.playback import prepare_playback
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.synthetic.takes import generate_rig
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate.simulation import sampling_times_s, simulate_readings, transmit_readings
-from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.body import retarget_to_own_body
+from harness.experiment import prepare_playback
+from harness.experiment.scenarios import Scenario, load_scenario
+from harness.mocap.synthetic import generate_rig
+from harness.results.findings import BenchmarkStatement
+from harness.simulate import Trajectory, sampling_times_s, simulate_readings, transmit_readings
+from harness.stream.is900.codec import ByteCapture, WireFormat
+from harness.stream.recording import RecordingWriter, record_capture
 from harness.study.trust.trust_study import run_trust_study
 
 RATE_HZ, BAUD = 120.0, 460_800

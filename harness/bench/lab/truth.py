@@ -22,8 +22,8 @@ from harness.bench.lab.planted_worlds import trust_rows
 from harness.bench.lab.validated_captures import registration_rows
 from harness.bench.limits import state_verdict
 from harness.core.progress import ProgressCallback
-from harness.experiment.workers.executors import TaskExecutor
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.experiment.workers import TaskExecutor
+from harness.results.findings import BenchmarkStatement
 from harness.study.trust.characterization import preset_values
 
 SEEDS = tuple(range(1, 101))

@@ -17,15 +17,13 @@ from harness.bench.lab.captures import (
     station_offset_m,
 )
 from harness.bench.limits import state_verdict
-from harness.body.kinematics import bone_poses
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import bone_poses, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.measure.pose_series import TruthPoses
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate.components.stationary import Clock, SpeedError
-from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
-from harness.stream.recording.station_readings import CaptureReader
+from harness.measure import TruthPoses
+from harness.results.findings import BenchmarkStatement
+from harness.simulate import WORLD_FROM_TRACKER, Clock, SpeedError, exact_calibration
+from harness.stream.recording import CaptureReader
 from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.truth_motion import TruthMotion, nominal_mounts
 from harness.study.trust.validation import Validation, session_unit, validate_capture

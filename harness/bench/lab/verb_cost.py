@@ -30,7 +30,7 @@ def measure_verb(verb: str, capture: Path, seed: int = 0) -> tuple[float, int]:
 
 def run_verb(verb: str, capture: Path, seed: int) -> None:
     """Run the library behind a verb in this process."""
-    from harness.stream.recording.station_readings import CaptureReader
+    from harness.stream.recording import CaptureReader
 
     if verb == "characterize":
         from harness.study.trust.characterization import characterize_capture

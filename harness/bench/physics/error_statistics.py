@@ -6,17 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.bench.physics.speed import MOUNTS, PHYSICAL
-from harness.body import retargeting
+from harness.body import retarget_to_own_body
 from harness.core.arrays import Floats, Ints
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure.episodes import Episodes, find_excursions, find_gaps
-from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
+from harness.measure import Episodes, ErrorSpectrum, find_excursions, find_gaps, measure_spectrum, pool_spectra
 from harness.mocap import synthetic
 from harness.report.physics.error_comparison import ERROR_QUANTILES, TrackerErrorStatistics
-from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
-from harness.simulate.trajectory import Trajectory
+from harness.simulate import Noise, TrackerConfig, Trajectory, noise_preset, sampling_times_s, simulate_readings
 
 LIMIT_M, MERGE_S, SEGMENT_S = 0.01, 0.5, 10.0
 """Errors beyond this are excursions [m]; excursions less than this apart are one [s]; segment of a spectrum [s]."""
@@ -138,7 +135,7 @@ def _recordings(seeds: Sequence[int], noise: Noise) -> Iterator[RecordedErrors]:
     for seed in seeds:
         performer = performers[seed % len(performers)]
         clip = synthetic.generate("boxing", performer, 1, seed=seed, duration_s=_SECONDS)
-        body, take = retargeting.retarget_to_own_body(clip)
+        body, take = retarget_to_own_body(clip)
         trajectory, mounts = Trajectory(body, take), MOUNTS[:_STATIONS]
         time_s = sampling_times_s(trajectory.duration_s, _TRACKER, _STATIONS)
         found, true = (

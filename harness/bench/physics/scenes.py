@@ -6,25 +6,38 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from harness.body.humanoid import build_body, tpose
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, build_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics.constellation import load_constellation
-from harness.simulate.physics.filter_state import RangingModel, range_variance
-from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource, random_motion
-from harness.simulate.physics.line_of_sight import LineOfSight
-from harness.simulate.physics.motion import TrackerMotion
-from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
-from harness.simulate.physics.ranging import Ranges
-from harness.simulate.physics.room import Box, PlacedRoom
-from harness.simulate.physics.settings import Physics
-from harness.simulate.simulation import WORLD_FROM_TRACKER, TrackerConfig, sampling_times_s, simulate_readings
-from harness.simulate.trajectory import Trajectory
+from harness.simulate import (
+    WORLD_FROM_TRACKER,
+    Noise,
+    TrackerConfig,
+    Trajectory,
+    noise_preset,
+    sampling_times_s,
+    simulate_readings,
+)
+from harness.simulate.physics import (
+    FACING_UP,
+    Box,
+    FreeMotionSource,
+    LineOfSight,
+    PhysicalTracker,
+    Physics,
+    PlacedRoom,
+    Ranges,
+    RangeSource,
+    RangingModel,
+    TrackerMotion,
+    lead_in_s,
+    load_constellation,
+    random_motion,
+    range_variance,
+)
 
 RATE_HZ = 40.0
 """Records per second of each station."""

@@ -17,19 +17,14 @@ from harness.bench import common
 from harness.bench.cpu_time import time_cpu
 from harness.bench.limits import hold_to_limit
 from harness.bench.peak_memory import peak_bytes
-from harness.body import retargeting
-from harness.body.humanoid import Body
-from harness.body.mounts import DEFAULT_MOUNTS, Mount
+from harness.body import DEFAULT_MOUNTS, Body, Mount, retarget_to_own_body
 from harness.core.child_process import run_python
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate.components.stationary import Clock
-from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics.physical_tracker import PhysicalTracker
-from harness.simulate.physics.settings import Physics
-from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
-from harness.stream.is900.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
+from harness.results.findings import BenchmarkStatement
+from harness.simulate import Clock, Noise, Simulation, TrackerConfig, noise_preset, simulate_tracker
+from harness.simulate.physics import PhysicalTracker, Physics
+from harness.stream.is900.codec import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 MOUNTS = (
     *common.MOUNTS,
@@ -82,7 +77,7 @@ def simulate_stations(body: Body, take: BodyMotion, count: int, noise: Noise, se
 @cache
 def _boxing(seed: int, seconds: float) -> tuple[Body, BodyMotion]:
     clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=seed, duration_s=seconds)
-    return retargeting.retarget_to_own_body(clip)
+    return retarget_to_own_body(clip)
 
 
 def _memory_rows(seed: int) -> list[BenchmarkStatement]:

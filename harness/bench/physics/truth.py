@@ -26,15 +26,14 @@ from harness.bench.physics.scenes import (
     with_furniture,
     without_shadow,
 )
-from harness.compare.paired_statistics import PairedDifference, compare_paired
+from harness.compare import PairedDifference, compare_paired
 from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
-from harness.measure.episodes import find_excursions
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate.physics.settings import Physics
-from harness.simulate.physics.sound import speed_of_sound_m_s
-from harness.simulate.readings import GRAVITY_M_S2
+from harness.measure import find_excursions
+from harness.results.findings import BenchmarkStatement
+from harness.simulate import GRAVITY_M_S2
+from harness.simulate.physics import Physics, speed_of_sound_m_s
 
 SEEDS = tuple(range(1, 21))
 """Seeds of each row. The defaults were chosen with other seeds, from 101 on."""

@@ -12,11 +12,9 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
-from harness.compare.significance import SIGNIFICANCE
+from harness.compare import MIN_UNITS, SIGNIFICANCE, compare_orders, tau_b, tau_interval
 from harness.core.arrays import Floats
-from harness.results.findings.trust_findings import PairAgreement, PairVerdict
+from harness.results.findings import PairAgreement, PairVerdict
 
 MIN_ITEMS = 3
 """Least number of items with a rank correlation."""

@@ -13,10 +13,9 @@ from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, comp
 from harness.core.package_data import data_folder
 from harness.core.split import performer_of
 from harness.errors import Outcome
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC
 
 BEHAVIOURS = ("walking", "boxing", "jumping")
 MOST_BUILTIN = 12

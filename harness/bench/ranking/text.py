@@ -8,7 +8,7 @@ from harness.bench.ranking.agreement import RankingAgreement
 from harness.bench.ranking.measurement import METHODS, PLACES_METHOD, RankingReport
 from harness.core.number_format import Interval, count_noun, format_fixed, format_p_value
 from harness.core.text_table import Table
-from harness.results.findings.trust_findings import PairAgreement, PairVerdict, SideDifference
+from harness.results.findings import PairAgreement, PairVerdict, SideDifference
 
 VERDICTS: Mapping[PairVerdict, str] = {"contradict": "reversed", "agree": "agree", "cannot tell": "cannot tell"}
 

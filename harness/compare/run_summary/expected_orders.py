@@ -25,8 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.results.cell import lag_of, varied_text
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, lag_of, varied_text
 
 DECIMALS = 2
 """Decimals of the printed errors."""

@@ -24,7 +24,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import LOST_AFTER_S, Status
 from harness.core.files import to_json_types
-from harness.results.cell import Cell
+from harness.results import Cell
 
 MAX_RECOVERED_RATIO = 1.5
 """Largest ratio to the undisturbed error that counts as recovered."""

@@ -14,12 +14,8 @@ from harness.compare.run_summary.expected_orders import ExpectedOrder, evaluate_
 from harness.compare.run_summary.recovery import RecoveryCollector
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
-from harness.results.cell import Cell, as_row, cell_folder, read_cell, varied_text
-from harness.results.index import CellIndex
-from harness.score.loops import pool_frames
-from harness.score.metrics import DEFINITIONS, FRAME_METRICS
-from harness.score.timing import step_relative, step_times_ms
-from harness.score.uncertainty import SigmaSums, score_sigma
+from harness.results import Cell, CellIndex, as_row, cell_folder, read_cell, varied_text
+from harness.score import DEFINITIONS, FRAME_METRICS, SigmaSums, pool_frames, score_sigma, step_relative, step_times_ms
 
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
 GROUP_KEYS = ("method", "inputs", "split", "performer", "varied", "lag")

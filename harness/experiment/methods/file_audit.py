@@ -15,14 +15,7 @@ from urllib.parse import unquote, urlsplit
 
 from harness.core.working_folder import THREAD_VARIABLES
 from harness.errors import HarnessError
-from harness.reconstruct.source_files import (
-    CACHE_FOLDER,
-    SourceFiles,
-    foreign_folders,
-    is_below,
-    is_own,
-    library_folders,
-)
+from harness.reconstruct import CACHE_FOLDER, SourceFiles, foreign_folders, is_below, is_own, library_folders
 
 _EVENTS = ("open", "sqlite3.connect", "ctypes.dlopen", "import")
 _METADATA = ("METADATA", "PKG-INFO", "RECORD", "SOURCES.txt", "entry_points.txt", "requires.txt", "top_level.txt")

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body.humanoid import Body, build_body
-from harness.body.mounts import Mount
+from harness.body import Body, Mount, build_body
 from harness.core.arrays import immutable
 from harness.core.calibration import Calibration
 from harness.core.estimate import HINGE_COUNT, QPOS_SIZE, check_sigma, find_impossible_pose, session_lag
@@ -17,7 +16,7 @@ from harness.core.messages import MessageError
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.experiment.methods.method_run import MethodAnswers
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 Message = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 Header = Mapping[str, Any]

@@ -20,8 +20,8 @@ from harness.core.fault_report import find_system_fault
 from harness.core.seeds import generator
 from harness.core.split import ExampleLeak
 from harness.errors import HarnessError, was_interrupted
-from harness.reconstruct.contract import Reconstructor
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import Reconstructor
+from harness.stream import TrackerFrame
 
 FRAMES_PER_TIMING = 8
 """Number of frames from one timing to the next. A cell of 8 s at 40 Hz has 40 timings, which take 3 % of the time of a

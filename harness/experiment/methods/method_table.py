@@ -8,7 +8,7 @@ from harness.core.files import content_key
 from harness.experiment.methods.isolation import Isolation
 from harness.experiment.methods.method_process import MethodFailure
 from harness.experiment.methods.remote_method import NamedMethod, find_method, start_methods
-from harness.results.manifest import source_hash
+from harness.results import source_hash
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,16 @@ from harness.experiment.methods.method_messages import (
     encode_answers,
 )
 from harness.experiment.methods.method_run import run_method
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor, Session
-from harness.reconstruct.source_files import declared_environment, find_source_files, source_hash
+from harness.reconstruct import (
+    Method,
+    Reconstructor,
+    Session,
+    declared_environment,
+    defining_module,
+    find_source_files,
+    make_method,
+    source_hash,
+)
 
 _KEPT_FITS = 2
 """Number of trained methods that are kept: those of the last two sets of examples."""
@@ -82,8 +89,8 @@ class MethodWorker:
         for folder, names in header["folders"].items():
             serve_folder(folder, names)
         _limit_memory(header["memory_bytes"])
-        self._audit.package = registry.defining_module(header["name"]).partition(".")[0]
-        method = registry.make_method(header["name"])
+        self._audit.package = defining_module(header["name"]).partition(".")[0]
+        method = make_method(header["name"])
         modules = tuple(sys.modules.values())
         self._audit.cover(find_source_files(method, modules), declared_environment(method))
         self.method = method
@@ -127,7 +134,7 @@ class MethodWorker:
 
 def _stable_options(method: Method, name: str) -> str:
     """Text of a method's attributes; BadInput unless another making of it has the same, so that its cells are found."""
-    made, again = describe_state(method, name), describe_state(registry.make_method(name), name)
+    made, again = describe_state(method, name), describe_state(make_method(name), name)
     if made == again:
         return made.replace(tempfile.gettempdir(), "<TMPDIR>")  # each process has its own
     differ = (place for place, (one, other) in enumerate(zip(made, again, strict=False)) if one != other)

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.messages import MessageError
@@ -38,10 +38,8 @@ from harness.experiment.methods.method_messages import (
 from harness.experiment.methods.method_process import MethodFailure, MethodProcess
 from harness.experiment.methods.method_run import MethodAnswers, run_method
 from harness.experiment.methods.worker_process import close_fork_server
-from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor
-from harness.reconstruct.source_files import source_hash
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import Method, Reconstructor, is_built_in, make_method, source_hash
+from harness.stream import TrackerFrame
 
 R = TypeVar("R")
 
@@ -203,11 +201,11 @@ _remote_methods: dict[tuple[str, Isolation], RemoteMethod] = {}
 def resolve_method(name: str, isolation: Isolation) -> Method:
     """The method of a name, in a process of its own if it is from outside the package or `isolation` says so.
 
-    UnknownName, RenamedKey and BadInput as for `registry.make_method`; MethodFailure when its process fails.
+    UnknownName, RenamedKey and BadInput as for `make_method`; MethodFailure when its process fails.
     """
     method = _remote_method(name, isolation)
     if method is None:
-        return registry.make_method(name)
+        return make_method(name)
     method.describe()
     return method
 
@@ -220,7 +218,7 @@ def start_methods(names: Iterable[str], isolation: Isolation) -> None:
 
 
 def _remote_method(name: str, isolation: Isolation) -> RemoteMethod | None:
-    if registry.is_built_in(name) and not isolation.every_method:
+    if is_built_in(name) and not isolation.every_method:
         return None
     if (name, isolation) not in _remote_methods:
         atexit.unregister(close_methods)

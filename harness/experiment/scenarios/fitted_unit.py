@@ -8,9 +8,8 @@ from typing import Any
 from harness.core.fields import build, replace_fields
 from harness.core.toml_file import EARLIER_SCHEMA
 from harness.errors import BadFile, BadInput, HarnessError
-from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file
-from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import noise_preset
+from harness.measure import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file
+from harness.simulate import TrackerConfig, noise_preset
 
 FITTED_PRESET = "default"
 """The preset whose components a unit file replaces, every one of them."""

@@ -7,8 +7,7 @@ from pathlib import Path
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_checks import check_scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import MotionSource, open_motion_source
+from harness.mocap import LibraryFolders, MotionSource, open_motion_source
 
 
 def open_scenario_motion(motion: ScenarioMotion, folder: LibraryFolders | None, seed: int) -> MotionSource:

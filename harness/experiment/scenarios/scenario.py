@@ -8,19 +8,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from harness.body.mounts import Mount
-from harness.compare.run_summary.expected_orders import ExpectedOrder
+from harness.body import Mount
+from harness.compare.run_summary import ExpectedOrder
 from harness.core.fields import replace_fields
 from harness.core.ranges import FileName, MethodName, Name, Range, Text, check_fields
 from harness.core.split import StatisticalUnit
 from harness.errors import BadInput
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.simulate.disturbance import Disturbance
-from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import Noise, noise_preset
-from harness.simulate.physics.constellation import ConstellationSettings
-from harness.simulate.physics.settings import Physics
-from harness.stream.is900.emulator.faults import Fault
+from harness.simulate import Disturbance, Noise, TrackerConfig, noise_preset
+from harness.simulate.physics import ConstellationSettings, Physics
+from harness.stream.is900 import Fault
 
 SCHEMA = 1
 MOST_VARIANTS = 1_000_000

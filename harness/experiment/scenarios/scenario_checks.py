@@ -6,7 +6,7 @@ from pathlib import Path
 from harness.core.split import ClipPart
 from harness.errors import BadFile, UnknownName
 from harness.experiment.scenarios.scenario import SCHEMA, Scenario
-from harness.results.cell import varied_text
+from harness.results import varied_text
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:

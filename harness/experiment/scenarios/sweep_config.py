@@ -14,7 +14,7 @@ from harness.experiment.scenarios.motion_source import expand_clips
 from harness.experiment.scenarios.scenario import SCHEMA, Scenario, dotted_keys
 from harness.experiment.scenarios.scenario_checks import check_scenario
 from harness.experiment.scenarios.scenario_reader import find_config, find_scenario, load_scenario
-from harness.mocap.library import LibraryFolders
+from harness.mocap import LibraryFolders
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 

@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass
 
-from harness.body.mounts import Mount, locate_mounts
+from harness.body import Mount, locate_mounts
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import UnknownName
-from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import Noise
-from harness.simulate.physics.constellation import load_constellation
-from harness.simulate.physics.room import check_emitters
-from harness.stream.inputs import make_inputs
-from harness.stream.is900.codec.reader import WireFormat
+from harness.simulate import Noise, TrackerConfig
+from harness.simulate.physics import check_emitters, load_constellation
+from harness.stream import make_inputs
+from harness.stream.is900.codec import WireFormat
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from threading import Event, Lock, Thread
 from harness.core.files import TEMPORARY
 from harness.core.interrupts import answer_first_interrupt, raise_interrupt
 from harness.errors import HarnessError
-from harness.results.cell import cell_folder, read_row
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, cell_folder, read_row
 
 _POLL_INTERVAL_S = 0.5
 _MOST_SHARE = 0.05

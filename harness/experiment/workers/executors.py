@@ -25,7 +25,7 @@ from harness.core.workers import Pool, schedule_tasks
 from harness.core.working_folder import THREAD_VARIABLES, serve_folder
 from harness.errors import BadInput, MissingExtra
 from harness.experiment.tasks import ClipTask
-from harness.results.manifest import source_hash
+from harness.results import source_hash
 
 R = TypeVar("R")
 

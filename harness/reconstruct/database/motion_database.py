@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Singles
 from harness.core.motion import BodyMotion
 from harness.core.workers import run_in_workers

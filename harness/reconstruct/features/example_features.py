@@ -11,17 +11,17 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.ranges import Range
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
-from harness.reconstruct.index import Lookup, make_index
 from harness.reconstruct.index.exact import nearest_exact, nearest_partial
-from harness.reconstruct.index.selection import AUTO_INDEX, KD_TREE_MAX_NEIGHBOURS
+from harness.reconstruct.index.protocol import Lookup
+from harness.reconstruct.index.selection import AUTO_INDEX, KD_TREE_MAX_NEIGHBOURS, make_index
 from harness.reconstruct.solver.ground_frame import AnchorFrame, anchor_of, relative_ground, twist_rad
 
 Codes = NDArray[np.int16]

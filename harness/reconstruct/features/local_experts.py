@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, Singles
-from harness.reconstruct.database import Windows
+from harness.reconstruct.database.frames import Windows
 from harness.reconstruct.features.moment_table import MomentTable, tabulate_moments
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
+from harness.body import Body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.solver.floor_contact import toe_tree
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits

@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.database import Windows
+from harness.reconstruct.database.frames import Windows
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression, ReducedRankSearch
-from harness.reconstruct.index import Index, Neighbours
+from harness.reconstruct.index.protocol import Index, Neighbours
 from harness.reconstruct.solver.ground_frame import AnchorFrame, twist_rad
 from harness.reconstruct.solver.residuals import Residuals
 

@@ -17,7 +17,7 @@ from harness.reconstruct.solver.ground_frame import AnchorFrame
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 LONGEST_GAP_S = 0.2
 """Longest time between two readings or examples from which a velocity is computed [s]."""

@@ -18,15 +18,16 @@ from typing import Annotated
 import numpy as np
 from scipy.linalg import solve
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.ranges import Range
-from harness.reconstruct.database import Windows
+from harness.reconstruct.database.frames import Windows
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
-from harness.reconstruct.index import Index, Neighbours, make_index
+from harness.reconstruct.index.protocol import Index, Neighbours
+from harness.reconstruct.index.selection import make_index
 from harness.reconstruct.solver.ground_frame import (
     MIN_HEADING_EXPLAINED,
     POSTURE_SIZE,

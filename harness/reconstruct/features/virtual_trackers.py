@@ -6,12 +6,12 @@ Columns: for each of S stations the position (3) [m], then two axes of its bone 
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Singles
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
-from harness.reconstruct.database import Windows
+from harness.reconstruct.database.frames import Windows
 from harness.reconstruct.solver.ground_frame import features_from_readings
 from harness.reconstruct.solver.kinematic_tree import build_tree, forward_kinematics_batch, new_state
 

@@ -1,23 +1,28 @@
 """Nearest-neighbour search among many vectors: one protocol, several implementations."""
 
-from harness.reconstruct.index.exact import FlatIndex, KDTree, nearest_exact, nearest_partial
-from harness.reconstruct.index.inverted_file import InvertedFile
-from harness.reconstruct.index.neighbour_graph import NeighbourGraph
-from harness.reconstruct.index.protocol import ArrayVectors, Index, Lookup, Neighbours, Vectors
-from harness.reconstruct.index.selection import INDEXES, make_index
+from typing import TYPE_CHECKING
+
+from harness.core.door import lazy_names
+
+if TYPE_CHECKING:
+    from harness.reconstruct.index.exact import FlatIndex
+    from harness.reconstruct.index.inverted_file import cells_for, probes_for
+    from harness.reconstruct.index.protocol import ArrayVectors, Lookup, Vectors
+    from harness.reconstruct.index.selection import AUTO_INDEX, FLAT_MAX_VECTORS, INDEXES, best_index, make_index
+
+else:
+    __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
+    "AUTO_INDEX",
+    "FLAT_MAX_VECTORS",
     "INDEXES",
     "ArrayVectors",
     "FlatIndex",
-    "Index",
-    "InvertedFile",
-    "KDTree",
     "Lookup",
-    "NeighbourGraph",
-    "Neighbours",
     "Vectors",
+    "best_index",
+    "cells_for",
     "make_index",
-    "nearest_exact",
-    "nearest_partial",
+    "probes_for",
 ]

@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
@@ -33,7 +33,7 @@ from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 Complexes = NDArray[np.complex128]
 """Horizontal vectors as complex numbers, x + i y."""

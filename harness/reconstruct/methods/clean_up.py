@@ -22,7 +22,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
@@ -36,7 +36,7 @@ from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 SUFFIX = "+ik"
 """Suffix of the other method's name."""

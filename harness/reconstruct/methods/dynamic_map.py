@@ -27,17 +27,18 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE, Origin
 from harness.core.ranges import Range
 from harness.reconstruct.contract import CalibrationCache
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.predictor_query import FeatureSearch, NeighbourSearch, PoseHistorySearch
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
-from harness.reconstruct.index import Index, make_index
+from harness.reconstruct.index.protocol import Index
+from harness.reconstruct.index.selection import make_index
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
 from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
 from harness.reconstruct.solver.ground_frame import (
@@ -57,7 +58,7 @@ from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.subspace import SubspaceSolver, gaussian_space
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _MIN_WEIGHT_VARIANCE = 1e-6
 """Smallest variance of the neighbours' weights, for a performer who repeats an example exactly."""

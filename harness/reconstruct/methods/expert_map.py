@@ -19,14 +19,14 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
 from harness.core.ranges import Range
 from harness.reconstruct.contract import CalibrationCache, Session
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad, toe_height_m
@@ -50,7 +50,7 @@ from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 POSES = 3
 """Number of past estimates among the predictors."""

@@ -25,13 +25,13 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.motion import BodyMotion
 from harness.core.ranges import Range
 from harness.core.split import EXAMPLES, NONE
 from harness.reconstruct.contract import Fitted
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.residuals import Loss

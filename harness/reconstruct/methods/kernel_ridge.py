@@ -20,7 +20,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.calibration import Calibration
@@ -36,7 +36,7 @@ from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _JUMP_M = 0.3
 """Outlier gate [m]: wider than for `ik`, since a regressed pose is farther from the readings than a fitted one."""

@@ -23,16 +23,19 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_ADVICE
 from harness.core.ranges import Range
 from harness.reconstruct.contract import CalibrationCache
-from harness.reconstruct.database import MotionDatabase, Windows
+from harness.reconstruct.database.frames import Windows
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import StationFeatures
-from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
+from harness.reconstruct.index.exact import nearest_partial
+from harness.reconstruct.index.protocol import Index, Vectors
+from harness.reconstruct.index.selection import make_index
 from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, ground_after_step
 from harness.reconstruct.solver.history_session import HistorySession

@@ -27,14 +27,14 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin
 from harness.core.ranges import Range
 from harness.reconstruct.contract import CalibrationCache
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
@@ -49,7 +49,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
 """Smallest spread of a hinge over the examples that scales its prior."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin
@@ -20,7 +20,7 @@ from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import StatusMonitor
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 @dataclass(frozen=True)

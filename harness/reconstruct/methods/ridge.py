@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
@@ -30,7 +30,7 @@ from harness.reconstruct.solver.ground_frame import ground_from_qpos
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.reconstruct.solver.status_monitor import StatusMonitor
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 _MOST_FRAMES = 5000
 """Largest number of example frames; of more, every n-th is kept."""

@@ -7,11 +7,12 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.contract import Reconstructor
-from harness.reconstruct.database import MotionDatabase, Windows
+from harness.reconstruct.database.frames import Windows
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior

@@ -19,7 +19,7 @@ from harness.core.compiled import compiled
 from harness.core.compiled_rotations import as_tuple, quaternion_product, rotation_vector
 from harness.core.estimate import Estimate
 from harness.reconstruct.contract import Session
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 DEFAULT_WEIGHTS = (0.15, 0.7, 0.15)
 """Weights of three frames: a lag of one frame, with less damping of fast motion than (0.25, 0.5, 0.25)."""

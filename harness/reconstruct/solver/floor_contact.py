@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled, specialise
 from harness.core.compiled_rotations import Vector, as_tuple, quaternion_product, rotate

@@ -7,7 +7,7 @@ rotate by a full turn have no limits here. Angles are in the order of `qpos[7:]`
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.humanoid24 import QPOS_OF_DOF

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
@@ -16,7 +16,7 @@ from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, Solve
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 class HistorySession(IKSession, ABC):

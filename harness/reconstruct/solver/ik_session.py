@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
@@ -25,7 +25,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
 from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
 """Standard deviation of hinges about the examples' mean posture, for methods without a history yet [rad]."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import as_tuple, quaternion_product, rotate

@@ -19,7 +19,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled, specialise
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.status_monitor import DeviceTime
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25
 """More than the body departs from a prediction within a period; longer than a burst of echoes (8 records at 40 Hz)."""

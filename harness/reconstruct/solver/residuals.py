@@ -12,8 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics
+from harness.body import Body, Kinematics
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
@@ -28,7 +27,7 @@ from harness.reconstruct.solver.normal_equations import (
     evaluate,
     update_targets,
 )
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 @dataclass(frozen=True)

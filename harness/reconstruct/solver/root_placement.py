@@ -5,7 +5,7 @@ It gives the start of every solve that has no frame before it. The null methods 
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
+from harness.body import Body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled

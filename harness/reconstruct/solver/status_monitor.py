@@ -13,7 +13,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
 from harness.core.estimate import LOST_AFTER_S, Status
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 
 class DeviceTime:

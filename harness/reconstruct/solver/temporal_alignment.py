@@ -25,7 +25,7 @@ from harness.core.compiled import compiled, specialise
 from harness.core.compiled_rotations import as_tuple, quaternion_product, rotation_vector
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Residuals
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 MAX_STEP_S = 0.04
 """Longest time between two readings of a station that still describe one motion [s]."""

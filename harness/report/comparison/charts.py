@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.comparison import Comparison, Difference, Verdict
+from harness.compare import Comparison, Difference, Verdict
 from harness.core.arrays import Floats
 from harness.core.number_format import format_change_percent
 from harness.report.comparison.wording import (

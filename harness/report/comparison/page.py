@@ -5,9 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from harness.compare.comparison import Comparison, Difference
-from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.units import count_units
+from harness.compare import MIN_UNITS, Comparison, Difference, count_units
 from harness.core.number_format import format_change_percent, format_p_value
 from harness.report.comparison.charts import interval_charts, slope_chart
 from harness.report.comparison.wording import (

@@ -5,9 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import get_args
 
-from harness.compare.comparison import Comparison, Difference, Verdict
-from harness.compare.margins import MARGINS
-from harness.compare.units import count_units
+from harness.compare import MARGINS, Comparison, Difference, Verdict, count_units
 from harness.core.number_format import Interval, count_noun, decimals_for, format_change_percent, format_fixed
 from harness.errors import Outcome
 from harness.report.kit.text import list_first

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from harness.compare.margins import MARGINS
-from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
-from harness.compare.units import Sampling
+from harness.compare import MARGINS, ClipValues, MethodRanking, Sampling, rank_methods
 from harness.errors import BadInput, NothingMeasured, UnknownName
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.error_lines import CONTROL, Highlights, choose_highlights, find_series
@@ -15,12 +13,9 @@ from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
 from harness.report.run.data import Row, RunData, Trace, last_varied, read_traces, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
-from harness.results.cell import lag_of, varied_text
-from harness.results.files.integrity import check_cells, check_folder
-from harness.results.manifest import Manifest
-from harness.results.reported_metrics import PRIMARY_METRIC
-from harness.results.storage import read_summary
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC, Manifest, lag_of, read_summary, varied_text
+from harness.results.files import check_cells, check_folder
+from harness.score import DEFINITIONS
 
 _MOST_NAMED = 6
 RANKING_METRICS = tuple(

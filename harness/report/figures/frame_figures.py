@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from harness.compare.ranking import shared_clips
+from harness.compare import shared_clips
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.report.figures.conditions import (

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from harness.compare.paired_statistics import mean_interval
-from harness.compare.units import count_clips
+from harness.compare import count_clips, mean_interval
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
@@ -26,8 +25,8 @@ from harness.report.kit.ranking import RankingPanel, draw_ranking, explain_marks
 from harness.report.kit.style import COLOURS, INK, PAPER, Axes, Figure, mark_scale
 from harness.report.kit.text import metric_name
 from harness.report.run.joint_errors import BONE_ROWS, means_by_unit
-from harness.results.reported_metrics import PRIMARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC
+from harness.score import DEFINITIONS
 
 _HEIGHT_MM = 60.0
 """Height before the rows are counted."""

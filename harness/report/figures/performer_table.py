@@ -12,17 +12,14 @@ from textwrap import wrap
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
-from harness.compare.ranking import shared_clips
-from harness.compare.units import average_units
+from harness.compare import MIN_UNITS, average_units, compare_paired, mean_interval, shared_clips
 from harness.core.number_format import format_number
 from harness.report.figures.conditions import RunCondition, read_conditions
 from harness.report.figures.table_formats import markdown_code
 from harness.report.kit.marked_block import describe_code, replace_block
 from harness.report.kit.text import metric_label
-from harness.results.manifest import Manifest
-from harness.results.reported_metrics import PRIMARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC, Manifest
+from harness.score import DEFINITIONS
 
 _WIDTH = 118
 """Most characters of a line of text."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from harness.core.working_folder import plain_import
 from harness.errors import BadInput, UnknownName
 from harness.report.kit.style import PRINT_SETTINGS, Figure, to_pdf, to_png, to_svg
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC
 
 FORMATS = ("pdf", "svg", "png")
 WIDTHS_MM = (85, 170)

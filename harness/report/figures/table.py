@@ -7,17 +7,23 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, mean_interval
-from harness.compare.ranking import ClipValues, MethodRanking, rank_methods
-from harness.compare.units import Sampling, average_units, count_clips
+from harness.compare import (
+    MIN_UNITS,
+    ClipValues,
+    MethodRanking,
+    Sampling,
+    average_units,
+    count_clips,
+    mean_interval,
+    rank_methods,
+)
 from harness.core.number_format import format_number
 from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
 from harness.report.kit.ranking import LAG_COLUMN
-from harness.results.cell import varied_text
-from harness.results.files.folder_kind import require_kind
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC, SECONDARY_METRIC, varied_text
+from harness.results.files import require_kind
+from harness.score import DEFINITIONS
 
 Standing = Literal["lowest", "tied", "worse", ""]
 """What the ranking says of a value; "" for a metric that ranks no methods, and without a ranking."""

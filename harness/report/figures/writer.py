@@ -14,7 +14,7 @@ from harness.report.figures.print_figure import FigureSelection, PrintFigure, dr
 from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_table
 from harness.report.figures.table_formats import format_table
 from harness.report.placement.pareto import placement_figure
-from harness.results.files.folder_kind import require_kind
+from harness.results.files import require_kind
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.body.anatomy import body_geoms
+from harness.body import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton

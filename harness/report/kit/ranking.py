@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, mean_interval
-from harness.compare.ranking import MethodRanking
-from harness.compare.units import count_units
+from harness.compare import MIN_UNITS, MethodRanking, count_units, mean_interval
 from harness.core.number_format import count_noun, format_number, format_share
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale
 from harness.report.kit.text import list_first

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body.rendering import BodyMesh, RenderScene
+from harness.body import BodyMesh, RenderScene
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import atomic_path
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.skeleton import Skeleton
-from harness.score.pair import PoseSequence, compute_poses
+from harness.score import PoseSequence, compute_poses
 
 TRUTH, ESTIMATE = "#5b87ad", "#e8850c"
 """Colours that differ in lightness and in hue for every common kind of colour blindness."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from harness.core.number_format import Interval, format_number, format_p_value
 from harness.report.kit.page import Badge, DataTable, Stack
 from harness.report.kit.page_text import table_lines
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
+from harness.results.findings import BenchmarkStatement, Verdict
 
 WIDTH = 160
 """Most characters of a line."""

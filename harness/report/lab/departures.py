@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.core.number_format import count_noun, format_fixed, format_p_value
-from harness.measure.reports.departures import Departure
+from harness.measure.reports import Departure
 from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page import DataTable

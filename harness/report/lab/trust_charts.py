@@ -9,7 +9,7 @@ from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import add_legend, draw_chart
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart, Figure, series_colour
 from harness.report.kit.text import metric_label, metric_name
-from harness.results.findings.trust_findings import (
+from harness.results.findings import (
     Equivalence,
     EquivalenceVerdict,
     ErrorDistance,
@@ -17,7 +17,7 @@ from harness.results.findings.trust_findings import (
     SideDifference,
     TrustFindings,
 )
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 _ROW_IN, _PAIR_IN, _FRAME_IN, _RANK_IN = 0.3, 0.46, 0.85, 4.2
 _DEVICE: Mapping[str, Any] = {"color": COLOURS[1], "marker": "o"}

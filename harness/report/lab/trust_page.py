@@ -30,7 +30,7 @@ from harness.report.lab.trust_charts import (
     sort_equivalences,
     sort_pairs,
 )
-from harness.results.findings.trust_findings import (
+from harness.results.findings import (
     EquivalenceVerdict,
     ErrorDistance,
     PairAgreement,

@@ -5,15 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.measure.profile import QualityClass
-from harness.measure.reports.unit_report import (
-    EPISODE_KINDS,
-    CaptureSummary,
-    DeviationCurve,
-    EpisodeMark,
-    UnitReport,
-)
-from harness.measure.rigid_pair import RigidPair
+from harness.measure import QualityClass, RigidPair
+from harness.measure.reports import EPISODE_KINDS, CaptureSummary, DeviationCurve, EpisodeMark, UnitReport
 from harness.report.kit.axes import label_rows, set_log_scale
 from harness.report.kit.chart import add_legend, decimate, draw_chart
 from harness.report.kit.style import COLOURS, INK, Axes, Chart, Figure, series_style

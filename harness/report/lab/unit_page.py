@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
-from harness.measure.profile import QualityClass, StretchLength
-from harness.measure.reports.unit_report import (
+from harness.measure import QualityClass, RigidPair, StretchLength
+from harness.measure.reports import (
     STATION_FIGURES,
     CaptureSummary,
     DensityCurve,
@@ -18,7 +18,6 @@ from harness.measure.reports.unit_report import (
     StationFigures,
     UnitReport,
 )
-from harness.measure.rigid_pair import RigidPair
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section
 from harness.report.lab.departures import check_chart, departure_texts, departures_sentence, departures_table
 from harness.report.lab.quantities import find_quantity, format_range

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed, format_number, format_share
-from harness.measure.reports.validation_report import ResidualSeries, ValidationReport
+from harness.measure.reports import ResidualSeries, ValidationReport
 from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart, insert_gaps
 from harness.report.kit.page import BrowserOnly, Bullets, DataTable, Drawing, Page, Prose, Section
@@ -17,7 +17,7 @@ from harness.report.kit.text import metric_label
 from harness.report.lab.departures import departure_texts, departures_sentence, departures_table
 from harness.report.lab.quantities import find_quantity, format_range
 from harness.report.lab.unit_page import capture_text, stretches_table
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 _OFFSETS = ("time_offset_orientation_s", "time_offset_position_s")
 _ROW_IN, _FRAME_IN, _SERIES_IN = 0.34, 0.75, 0.95

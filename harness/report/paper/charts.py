@@ -13,7 +13,7 @@ from harness.report.kit.page import DataTable
 from harness.report.kit.style import Chart, Figure
 from harness.report.kit.text import to_file_name
 from harness.report.paper.figures import draw_bars, draw_lines, explain_signs, height_in, value_at
-from harness.results.findings.paper_findings import BarChart, LineChart, PaperExperiment, PaperFindings
+from harness.results.findings import BarChart, LineChart, PaperExperiment, PaperFindings
 
 _MOST_IN_ALT_TEXT = 12
 """Most numbers in an alternative text; with more of them it refers to the table."""

@@ -10,7 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.number_format import format_number
 from harness.report.kit.chart import add_legend, decimate, label_line_ends
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, series_colour, series_style
-from harness.results.findings.paper_findings import BarChart, LineChart
+from harness.results.findings import BarChart, LineChart
 
 _HATCHES = ("", "////", "....", "xxxx")
 """Fill patterns of grey bars."""

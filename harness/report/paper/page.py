@@ -32,9 +32,16 @@ from harness.report.kit.page_text import render_text, table_lines
 from harness.report.kit.statement_lines import MARKS, WIDTH, statement_head, statement_row
 from harness.report.kit.text import describe_motion_source, to_file_name
 from harness.report.paper.charts import figure_charts, figure_table, is_measured
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading, Verdict
-from harness.results.findings.paper_findings import FindingsTable, PaperExperiment, PaperFindings, read_findings
+from harness.results.files import FINDINGS
+from harness.results.findings import (
+    BenchmarkStatement,
+    FindingsTable,
+    PaperExperiment,
+    PaperFindings,
+    Reading,
+    Verdict,
+    read_findings,
+)
 
 READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
 """Reading -> start of its sentence."""

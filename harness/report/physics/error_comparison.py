@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 ERROR_QUANTILES = (0.5, 0.95, 0.99)
 """Quantiles of the position error that `TrackerErrorStatistics` holds."""

@@ -16,7 +16,7 @@ from harness.report.kit.statement_lines import MARKS
 from harness.report.kit.text import list_first
 from harness.report.physics.charts import excursions_chart, gaps_chart, quality_chart, spectrum_chart
 from harness.report.physics.error_comparison import ErrorModelComparison, TrackerErrorStatistics
-from harness.results.findings.benchmark_statement import BenchmarkStatement
+from harness.results.findings import BenchmarkStatement
 
 _HEAD = ("condition", "held to", "measured", "verdict", "published")
 _CAPTION = (

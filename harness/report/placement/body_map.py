@@ -20,7 +20,7 @@ from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import finish_renderer, start_renderer
 from harness.report.kit.style import FAINT, INK, Axes, Chart, Figure
 from harness.report.placement.wording import plain_name
-from harness.results.findings.placement_findings import CandidatePlace, MarginalContribution, StationNames
+from harness.results.findings import CandidatePlace, MarginalContribution, StationNames
 
 _COLOURS = "viridis"
 _SOFTENING_M = 0.02

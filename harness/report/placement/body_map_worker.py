@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.anatomy import body_geoms
-from harness.body.humanoid import tpose
-from harness.body.mounts import Mount, locate_mount
+from harness.body import Mount, body_geoms, locate_mount, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.files import write_npz

@@ -20,12 +20,7 @@ from harness.report.placement.wording import (
     set_error,
     set_name,
 )
-from harness.results.findings.placement_findings import (
-    MarginalContribution,
-    PlacementFindings,
-    PlacementSearch,
-    Ranking,
-)
+from harness.results.findings import MarginalContribution, PlacementFindings, PlacementSearch, Ranking
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
 _ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20

@@ -50,8 +50,8 @@ from harness.report.placement.wording import (
     set_error,
     set_name,
 )
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.placement_findings import (
+from harness.results.files import FINDINGS
+from harness.results.findings import (
     MODES,
     MarginalContribution,
     PlacementCondition,

@@ -5,7 +5,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from harness.compare.paired_statistics import MIN_UNITS
+from harness.compare import MIN_UNITS
 from harness.core.number_format import count_noun
 from harness.core.seeds import generator
 from harness.errors import NothingMeasured
@@ -13,8 +13,8 @@ from harness.report.figures.print_figure import PrintFigure
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Axes, Figure, mark_scale, note_size
 from harness.report.kit.text import metric_name
 from harness.report.placement.wording import measured_errors, set_name
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.placement_findings import BestSet, PlacementFindings, StationSetResult, read_placement
+from harness.results.files import FINDINGS
+from harness.results.findings import BestSet, PlacementFindings, StationSetResult, read_placement
 
 _BEST, _TIED = COLOURS[1], COLOURS[0]
 _LETTERS_PER_IN, _FEWEST_LETTERS, _AXES_SHARE = 11.2, 8, 0.75

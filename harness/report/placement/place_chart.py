@@ -6,14 +6,14 @@ docs/studies.md shows it. It needs matplotlib, pyvista and OpenGL.
 import sys
 from pathlib import Path
 
-from harness.body.places import NAMED_PLACES
+from harness.body import NAMED_PLACES
 from harness.core.files import write_bytes
 from harness.errors import SystemFault
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import FAINT, Chart, Figure
 from harness.report.placement.body_map import label_places, render_body
 from harness.report.placement.wording import plain_name
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.results.findings import CandidatePlace
 
 _HEIGHT_IN = 4.6
 

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 
-from harness.compare.paired_statistics import MIN_UNITS, compare_paired
-from harness.compare.units import count_clips, count_units
+from harness.compare import MIN_UNITS, compare_paired, count_clips, count_units
 from harness.core.number_format import NOT_MEASURED, Interval, count_noun
 from harness.report.kit.text import list_first
-from harness.results.findings.placement_findings import (
+from harness.results.findings import (
     BestSet,
     CandidatePlace,
     MarginalContribution,

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.paired_statistics import PairedDifference, compare_paired
-from harness.compare.units import Sampling, average_units
+from harness.compare import PairedDifference, Sampling, average_units, compare_paired
 from harness.core.number_format import NOT_MEASURED, Interval, format_fixed
 from harness.report.kit.page import DataTable
-from harness.results.cell import setting_text, varied_text
+from harness.results import setting_text, varied_text
 
 _ERRORS = (
     ("mounts [mm]", "mount_mm", 1),

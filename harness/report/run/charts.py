@@ -12,8 +12,7 @@ from harness.report.kit.style import GRID, PAPER, Axes, Chart, Figure, hide_fram
 from harness.report.kit.text import metric_label, to_file_name
 from harness.report.run.data import RunData, Trace
 from harness.report.run.tables import rows_by_setting
-from harness.results.cell import varied_text
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.results import PRIMARY_METRIC, SECONDARY_METRIC, varied_text
 
 AXIS_LABELS = {metric: metric_label(metric) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)}
 """Metric -> label of its axis."""

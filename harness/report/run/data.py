@@ -8,20 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.run_summary.run_statistics import GROUP_KEYS
+from harness.compare.run_summary import GROUP_KEYS
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.estimate import name_with_lag
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import training_note
 from harness.report.kit.style import STYLES
-from harness.results.cell import Cell, as_row, cell_folder, lag_of, setting_text
-from harness.results.files.integrity import SUMMARY, check_cells, check_folder, check_row
-from harness.results.manifest import Manifest
-from harness.results.storage import read_cell, read_summary
-from harness.score.angles import hinge_errors_deg, local_errors_deg
-from harness.score.pair import Pair, PoseSequence, compute_poses
-from harness.score.positions import joint_errors_mm
-from harness.score.uncertainty import in_skeleton_order
+from harness.results import Cell, Manifest, as_row, cell_folder, lag_of, read_cell, read_summary, setting_text
+from harness.results.files import SUMMARY, check_cells, check_folder, check_row
+from harness.score import (
+    Pair,
+    PoseSequence,
+    compute_poses,
+    hinge_errors_deg,
+    in_skeleton_order,
+    joint_errors_mm,
+    local_errors_deg,
+)
 
 Row = Mapping[str, Any]
 _GROUPS = ("methods", "behaviours")

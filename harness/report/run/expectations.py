@@ -4,12 +4,10 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
-from harness.compare.run_summary.expected_orders import DECIMALS
-from harness.compare.run_summary.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
+from harness.compare.run_summary import DECIMALS, MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
 from harness.core.number_format import NOT_MEASURED, format_fixed, format_share
 from harness.report.kit.page import Block, Bullets, DataTable, Prose, TerminalOnly
-from harness.results.cell import setting_text
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, setting_text
 
 _MEANS = "means over the clips on which all were measured"
 _VERDICT = {True: "holds", False: "does not hold", None: "not judged"}

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from harness.compare.units import Sampling, count_clips
+from harness.compare import Sampling, count_clips
 from harness.core.number_format import count_noun, format_share
 from harness.core.stream_health import describe_line_loss
 from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
 from harness.report.run.ranking import describe_rankings
-from harness.results.cell import setting_text
-from harness.results.reported_metrics import SECONDARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import SECONDARY_METRIC, setting_text
+from harness.score import DEFINITIONS
 
 SequenceKey = tuple[str, str, int]
 """Behaviour, clip and seed."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from harness.compare.units import Sampling
+from harness.compare import Sampling
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
@@ -15,7 +15,7 @@ from harness.report.kit.error_lines import Highlights
 from harness.report.kit.page import DataTable, Drawing
 from harness.report.kit.style import COLOURS, FAINT, INK, Axes, Chart, Figure
 from harness.report.run.data import RunData, Trace
-from harness.score.pair import hinged_bones, joint_names
+from harness.score import hinged_bones, joint_names
 
 BONE_ROWS = {
     **{"head": "head", "upperneck": "upper neck", "lowerneck": "lower neck", "thorax": "thorax"},

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.results import PRIMARY_METRIC, SECONDARY_METRIC
 
 TABLE_COLUMNS = (
     ("joint angle [deg]", PRIMARY_METRIC, 2),

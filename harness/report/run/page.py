@@ -50,8 +50,8 @@ from harness.report.run.tables import (
     sigma_table,
 )
 from harness.report.run.worst_window import WorstWindow, group_overlapping, worst_windows
-from harness.results.cell import Cell
-from harness.score.metrics import DEFINITIONS
+from harness.results import Cell
+from harness.score import DEFINITIONS
 
 _PLAYER = (
     "Every clip with up to three methods. Drag to turn, wheel or pinch to zoom, drag with the right button or two "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
+from harness.body import DEFAULT_MOUNTS, Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
@@ -20,8 +20,8 @@ from harness.report.kit.motion_player import (
 )
 from harness.report.run.data import Row, RunData, pose_pair
 from harness.report.run.worst_window import WorstWindow, group_overlapping
-from harness.results.cell import Cell
-from harness.score.pair import PoseSequence
+from harness.results import Cell
+from harness.score import PoseSequence
 
 _MOST_FRAMES = 40_000
 """Estimated frames on a page; 20,000 take about 1 MB."""

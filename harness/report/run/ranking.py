@@ -6,18 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.compare.margins import MARGINS
-from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods
-from harness.compare.units import Sampling, count_clips
+from harness.compare import MARGINS, ClipValues, MethodRanking, Sampling, count_clips, find_best, rank_methods
 from harness.core.number_format import format_number
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.ranking import LAG_NOTE, RankingPanel, describe_ranking, draw_ranking, explain_marks, name_lag
 from harness.report.kit.style import Chart
 from harness.report.kit.text import metric_name
 from harness.report.run.data import Row, RunData, last_varied, series_name
-from harness.results.cell import lag_of, setting_text
-from harness.results.reported_metrics import PRIMARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC, lag_of, setting_text
+from harness.score import DEFINITIONS
 
 
 class RankingGroup(NamedTuple):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.units import Sampling
+from harness.compare import Sampling
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import NOT_MEASURED, count_noun, format_number, format_share
 from harness.report.kit.page import Block, BrowserOnly, Code, DataTable, Prose, Stack, Strong
@@ -14,14 +14,8 @@ from harness.report.kit.text import format_statistic, last_line
 from harness.report.run.data import Row, RunData, Trace
 from harness.report.run.metric_columns import SIGMA_COLUMNS, format_sigma_scores
 from harness.report.run.ranking import GroupedValues, best_series, group_values
-from harness.results.cell import setting_text
-from harness.results.reported_metrics import (
-    MAX_FALLBACK_SHARE,
-    PRIMARY_METRIC,
-    SECONDARY_METRIC,
-)
-from harness.score.metrics import DEFINITIONS
-from harness.score.uncertainty import sum_sigma
+from harness.results import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, setting_text
+from harness.score import DEFINITIONS, sum_sigma
 
 OPEN_METRICS = (PRIMARY_METRIC, SECONDARY_METRIC)
 """Metrics whose table by behaviour is shown."""

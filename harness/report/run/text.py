@@ -14,12 +14,7 @@ from harness.report.run.data import note_of
 from harness.report.run.expectations import expected_orders, recovery_table
 from harness.report.run.metric_columns import TABLE_COLUMNS, sigma_lines
 from harness.report.run.ranking import describe_rankings
-from harness.results.cell import lag_of, varied_text
-from harness.results.reported_metrics import (
-    MAX_FALLBACK_SHARE,
-    PRIMARY_METRIC,
-    SECONDARY_METRIC,
-)
+from harness.results import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC, lag_of, varied_text
 
 MOST_ROWS = 12
 """Rows of the short table of a run: about what a terminal shows without scrolling."""

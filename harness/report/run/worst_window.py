@@ -8,7 +8,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.number_format import format_number
 from harness.report.run.data import WORST_METRICS, RunData
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 WINDOW_S = 2.0
 

@@ -11,7 +11,7 @@ from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
 from harness.report.kit.style import GRID, Axes, Chart, Figure, series_style
 from harness.report.kit.text import to_file_name, truncate
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC
 
 MAX_SERIES, MAX_SCENARIOS, MAX_INTERVALS = 10, 12, 600
 """Most series in a chart, scenarios with a chart for a key, and intervals on a page (each needs a bootstrap)."""

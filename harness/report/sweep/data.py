@@ -9,19 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.margins import GATED_METRICS
-from harness.compare.paired_statistics import MIN_UNITS, mean_interval
-from harness.compare.ranking import ClipValues
-from harness.compare.units import BY_NAME, Sampling, average_units
+from harness.compare import BY_NAME, GATED_METRICS, MIN_UNITS, ClipValues, Sampling, average_units, mean_interval
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import name_with_lag
 from harness.core.split import training_note
-from harness.results.cell import lag_of, varied_text
-from harness.results.files.integrity import check_folder
-from harness.results.index import CellIndex
-from harness.results.manifest import Manifest
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import PRIMARY_METRIC, SECONDARY_METRIC, CellIndex, Manifest, lag_of, varied_text
+from harness.results.files import check_folder
+from harness.score import DEFINITIONS
 
 METRICS = (PRIMARY_METRIC, SECONDARY_METRIC, "mpjre_deg", "mpjpe_root_mm", "jitter_m_s3", "step_p50_ms", "coverage")
 """Metrics that the page shows; summary.csv has all metrics."""

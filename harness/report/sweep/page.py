@@ -5,10 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.compare.margins import GATED_METRICS
-from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.ranking import find_best
-from harness.compare.units import count_clips
+from harness.compare import GATED_METRICS, MIN_UNITS, count_clips, find_best
 from harness.core.arrays import Bools
 from harness.core.number_format import Interval, count_noun
 from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
@@ -27,9 +24,8 @@ from harness.report.sweep.charts import (
 )
 from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, read_sweep, unit_of
 from harness.report.sweep.wording import describe_effect, group_failures, list_values, sweep_sentence
-from harness.results.index import INDEX_FILE
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
-from harness.score.metrics import DEFINITIONS
+from harness.results import INDEX_FILE, PRIMARY_METRIC, SECONDARY_METRIC
+from harness.score import DEFINITIONS
 
 _EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario, method"
 _MOST_FAILURES, _MOST_PRINTED, _MOST_CELLS, _MOST_ROWS = 50, 8, 20, 60

@@ -4,15 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from harness.compare.margins import GATED_METRICS
-from harness.compare.ranking import ClipValues, rank_methods, split_by_lag
-from harness.compare.units import Sampling, count_clips
+from harness.compare import GATED_METRICS, ClipValues, Sampling, count_clips, rank_methods, split_by_lag
 from harness.core.arrays import Floats
 from harness.core.number_format import format_change_percent, format_number
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC
 
 
 def sweep_sentence(sweep: SweepData) -> str:

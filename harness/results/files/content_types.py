@@ -16,8 +16,7 @@ from harness.core.arrays import Floats
 from harness.core.fields import check_entries
 from harness.core.split import StatisticalUnit
 from harness.errors import BadFile, HarnessError, UnknownName
-from harness.score.metrics import DEFINITIONS, Definition
-from harness.score.uncertainty import SIGMA_DEFINITIONS
+from harness.score import DEFINITIONS, SIGMA_DEFINITIONS, Definition
 
 _Table = dict[str, Any]
 _Number = float | None

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.mounts import Mount
+from harness.body import Mount
 from harness.core import rotations
 from harness.core.ranges import CheckedFields, Range
 from harness.core.seeds import generator

@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.body.mounts import Mount
-from harness.body.soft_tissue import tissue_thickness_m
+from harness.body import Mount, tissue_thickness_m
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration

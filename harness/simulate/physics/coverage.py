@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration

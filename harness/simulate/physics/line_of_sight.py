@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from harness.body.humanoid import Body, body_spec
+from harness.body import Body, body_spec
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled

@@ -9,7 +9,7 @@ from typing import Any
 from harness.errors import BadInput
 from harness.stream.is900.codec.commands import find_danger, parse_command
 from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver import DriverConfig, DriverTiming
+from harness.stream.is900.driver.config import DriverConfig, DriverTiming
 from harness.stream.is900.driver.connection import (
     WAKE_UP,
     DeviceConnection,

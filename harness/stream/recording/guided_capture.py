@@ -18,7 +18,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.driver import DriverConfig, Tracker, open_tracker
+from harness.stream.is900.driver.config import DriverConfig
+from harness.stream.is900.driver.is900 import open_tracker
+from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.line_events import EventCounter
 from harness.stream.recording.recorder import tracked_text
 from harness.stream.recording.recording import RecordingWriter, read_marks

@@ -11,7 +11,9 @@ from typing import Any
 from harness.errors import BadInput, HarnessError
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver import DriverConfig, Tracker, open_tracker
+from harness.stream.is900.driver.config import DriverConfig
+from harness.stream.is900.driver.is900 import open_tracker
+from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.line_events import EventCounter, LineEvent
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recording import RecordingWriter

@@ -15,8 +15,7 @@ from harness.core.humanoid24 import BONES
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart, PaperExperiment
+from harness.results.findings import BarChart, BenchmarkStatement, FindingsTable, LineChart, PaperExperiment
 
 MODES = 5
 """Number of modes that Liu et al. 2011 keep."""

@@ -6,16 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.compare.margins import margin_of
-from harness.compare.paired_statistics import MIN_UNITS, compare_paired
-from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
-from harness.results.findings.benchmark_statement import (
-    BenchmarkStatement,
-    Reading,
-    StatementKind,
-    Verdict,
-)
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.compare import MIN_UNITS, SIGNIFICANCE, compare_paired, count_needed, holm, margin_of, sign_flip_p
+from harness.results import PRIMARY_METRIC
+from harness.results.findings import BenchmarkStatement, Reading, StatementKind, Verdict
 
 Errors = Mapping[str, float]
 """Unit of statistics -> error; all are of one kind (see `units`)."""

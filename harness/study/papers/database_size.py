@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading
-from harness.results.findings.paper_findings import BarChart, FindingsTable, PaperExperiment
+from harness.results.findings import BarChart, BenchmarkStatement, FindingsTable, PaperExperiment, Reading
 from harness.study.papers.claims import claim_decreasing, claim_lower_error, claim_noninferior
 from harness.study.papers.leave_one_out import (
     DYNAMIC_MAP,

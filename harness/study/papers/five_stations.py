@@ -3,10 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
-from harness.compare.paired_statistics import compare_paired
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.findings.paper_findings import FindingsTable, PaperExperiment
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.compare import compare_paired
+from harness.results import PRIMARY_METRIC
+from harness.results.findings import BenchmarkStatement, FindingsTable, PaperExperiment, Reading, StatementKind
 from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.leave_one_out import STAND_INS, behaviour_label
 from harness.study.papers.paper_study import PaperStudy

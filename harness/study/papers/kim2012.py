@@ -7,8 +7,14 @@ that it calls suitable, are tested by intervals over units.
 from collections.abc import Iterator
 from functools import partial
 
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.findings.paper_findings import FindingsTable, LineChart, PaperExperiment
+from harness.results.findings import (
+    BenchmarkStatement,
+    FindingsTable,
+    LineChart,
+    PaperExperiment,
+    Reading,
+    StatementKind,
+)
 from harness.study.papers.five_stations import (
     KERNEL_CCA,
     KERNEL_CCA_LITERAL,

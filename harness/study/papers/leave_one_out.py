@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading, StatementKind
-from harness.results.findings.paper_findings import FindingsTable, PaperExperiment
+from harness.results.findings import BenchmarkStatement, FindingsTable, PaperExperiment, Reading, StatementKind
 from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import UnitErrors, errors_by_unit, mean_bars, mean_table

@@ -6,10 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.mocap.sources import read_skeletons
+from harness.mocap import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
-from harness.results.findings.benchmark_statement import Reading, StatementKind
-from harness.results.findings.paper_findings import FindingsTable, LineChart, PaperExperiment
+from harness.results.findings import FindingsTable, LineChart, PaperExperiment, Reading, StatementKind
 from harness.study.papers.bone_lengths import evaluate_bone_modes
 from harness.study.papers.claims import claim_lower_error, claim_published_value
 from harness.study.papers.database_size import database_size, one_database, other_approaches

@@ -8,22 +8,18 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.compare.units import Sampling, count_units
+from harness.compare import Sampling, count_units
 from harness.core.object_state import describe_state
 from harness.core.package_data import data_folder
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import BadInput, Outcome, SystemFault, UnknownName, was_interrupted
-from harness.experiment.plan import check_names
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.library import LibraryFolders
-from harness.reconstruct import registry
-from harness.results import manifest
-from harness.results.cell import varied_text
-from harness.results.findings.paper_findings import FindingsTable, PaperExperiment, PaperFindings, write_findings
-from harness.results.storage import open_study
+from harness.experiment import check_names
+from harness.experiment.scenarios import Scenario, load_scenario, open_scenario_motion
+from harness.mocap import LibraryFolders
+from harness.reconstruct import make_method
+from harness.results import current_circumstances, open_study, varied_text
+from harness.results.findings import FindingsTable, PaperExperiment, PaperFindings, write_findings
 from harness.study.papers.claims import correct_claims
 from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios, shorten_scenario
 
@@ -132,7 +128,7 @@ def reproduce(
             command=command,
             seed=seed,
             experiments=correct_experiments(experiments),
-            circumstances=manifest.current_circumstances(),
+            circumstances=current_circumstances(),
             tables=provenance_tables(replace(study, runs=runs)),
         )
         write_findings(out / "findings.json", findings)
@@ -238,4 +234,4 @@ def _left_out_rows(scenario: Scenario) -> list[tuple[str, ...]]:
 
 def _method_constants(study: PaperStudy) -> tuple[tuple[str, ...], ...]:
     names: Sequence[str] = list(dict.fromkeys(chain.from_iterable(s.methods for s in study.runs.values())))
-    return tuple((name, describe_state(registry.make_method(name), name)) for name in names)
+    return tuple((name, describe_state(make_method(name), name)) for name in names)

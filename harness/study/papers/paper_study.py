@@ -12,18 +12,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.compare.units import Sampling, count_units
+from harness.compare import Sampling, count_units
 from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.errors import HarnessError, SystemFault, was_interrupted
-from harness.experiment.engine import run as run_scenario
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.tasks import cell_names
-from harness.mocap.library import LibraryFolders
-from harness.results import manifest
-from harness.results.cell import Cell, cell_folder, read_cell
-from harness.results.files.digests import check_key, read_result_json, write_result_json
-from harness.results.storage import read_summary
+from harness.experiment import cell_names
+from harness.experiment import run as run_scenario
+from harness.experiment.scenarios import Scenario
+from harness.mocap import LibraryFolders
+from harness.results import Cell, cell_folder, read_cell, read_summary, source_hash
+from harness.results.files import check_key, read_result_json, write_result_json
 
 CLIPS, LONGEST_S = 2, 3.0
 """Number of test clips of each behaviour, and their length with the first second [s]."""
@@ -90,11 +88,11 @@ class PaperStudy:
         path = self.out / "measured" / f"{name}.json"
         study = {run: scenario.content() for run, scenario in self.runs.items()}
         key = content_key({"measurement": name, "motion": self.motion, "seed": self.seed, "runs": study})
-        written = {"key": key, "measurement": name, "source_hash": manifest.source_hash()}
+        written = {"key": key, "measurement": name, "source_hash": source_hash()}
         if path.is_file():
             expected, advice = "a cached measurement of this study", "Delete it and give the command again."
             cached = read_result_json(path, expected, advice)
-            if cached.get("source_hash") == manifest.source_hash():
+            if cached.get("source_hash") == source_hash():
                 for entry in ("measurement", "key"):
                     check_key(path, cached.get(entry), written[entry], expected, advice)
                 return cached["value"]

@@ -14,14 +14,12 @@ from typing import Any
 from harness.core.files import content_key
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario import Scenario
-from harness.mocap.library import LibraryFolders, MotionLibrary
-from harness.reconstruct.database import MotionDatabase
-from harness.results import manifest
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.paper_findings import BarChart, FindingsTable, PaperExperiment
+from harness.experiment import ClipEvaluation
+from harness.experiment.scenarios import Scenario, open_scenario_motion
+from harness.mocap import LibraryFolders, MotionLibrary
+from harness.reconstruct import MotionDatabase
+from harness.results import current_circumstances, source_hash
+from harness.results.findings import BarChart, BenchmarkStatement, FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import DATABASE_SHARE, PaperStudy
 from harness.study.speed import benchmark_clips
 from harness.study.speed.benchmark_clips import BenchmarkClip
@@ -75,7 +73,7 @@ def build_database(
     folder: Path, defined_by: object, takes: Callable[[], Iterable[BodyMotion | Callable[[], BodyMotion]]]
 ) -> MotionDatabase:
     """Build or open the database below `folder` that is named by a hash of the source code and of `defined_by`."""
-    path = folder / content_key({"source": manifest.source_hash(), "defined_by": defined_by})
+    path = folder / content_key({"source": source_hash(), "defined_by": defined_by})
     return benchmark_clips.build_database(path, () if path.is_dir() else takes())
 
 
@@ -197,7 +195,7 @@ def compare_speed(study: PaperStudy, published: PublishedSpeed) -> PaperExperime
 
 def _measure(study: PaperStudy, published: PublishedSpeed, frames: Mapping[str, int], folder: Path) -> dict[str, Any]:
     """Measure the methods with one database: their speeds, or the reason why there are none."""
-    circumstances = manifest.current_circumstances()
+    circumstances = current_circumstances()
     machine = f"{circumstances['processor']}, {circumstances['cpu_count']} cores"
     if absent := missing_clips(study, frames):
         return {"absent": absent, "machine": machine}

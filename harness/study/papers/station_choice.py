@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Reading
-from harness.results.findings.paper_findings import FindingsTable, PaperExperiment
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC
+from harness.results.findings import BenchmarkStatement, FindingsTable, PaperExperiment, Reading
 from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.five_stations import KERNEL_CCA, KERNEL_CCA_LITERAL, claim_in_run, differences, label_in
 from harness.study.papers.paper_study import PaperStudy

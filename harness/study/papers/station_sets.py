@@ -6,17 +6,11 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from harness.compare.paired_statistics import (
-    CONFIDENCE_LEVEL,
-    MIN_UNITS,
-    PairedDifference,
-    mean_interval,
-)
+from harness.compare import CONFIDENCE_LEVEL, MIN_UNITS, PairedDifference, mean_interval
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.results.findings.benchmark_statement import BenchmarkStatement, StatementKind
-from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.experiment.scenarios import open_scenario_motion
+from harness.results import PRIMARY_METRIC
+from harness.results.findings import BarChart, BenchmarkStatement, FindingsTable, LineChart, StatementKind
 from harness.study.papers.claims import Errors, claim_all, claim_decreasing, claim_lower_error, claim_noninferior
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import SummaryRow, errors_by_unit, format_mean, mean_sd, number_of_units

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.run_summary.run_statistics import GROUP_KEYS
+from harness.compare.run_summary import GROUP_KEYS
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.results.cell import Cell
-from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, Cell
+from harness.results.findings import BarChart, FindingsTable, LineChart
 
 SummaryRow = Mapping[str, Any]
 RMS = "joint_angle_rms_deg"

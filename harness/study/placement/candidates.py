@@ -22,12 +22,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from harness.body.mounts import Mount, locate_mount
+from harness.body import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.ranges import Name, Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.results.findings import CandidatePlace
 
 Pair = Literal["", "each", "together"]
 CandidateGroup = tuple[CandidatePlace, ...]

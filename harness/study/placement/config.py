@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from harness.compare.margins import MARGINS
+from harness.compare import MARGINS
 from harness.core.fields import build
 from harness.core.files import read_toml
 from harness.core.input_file import names_input_file
@@ -13,10 +13,8 @@ from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import FileName, MethodName, Name, Range, Text
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenarios.scenario import SCHEMA, Scenario
-from harness.experiment.scenarios.scenario_checks import check_scenario
-from harness.experiment.scenarios.scenario_reader import find_config
-from harness.score.metrics import DEFINITIONS
+from harness.experiment.scenarios import SCHEMA, Scenario, check_scenario, find_config
+from harness.score import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGrid,

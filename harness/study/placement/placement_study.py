@@ -12,19 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
-from harness.compare.significance import count_needed
-from harness.compare.units import count_units
+from harness.compare import MIN_UNITS, compare_paired, count_needed, count_units, mean_interval
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
-from harness.experiment.cells import clear_caches
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.workers.executors import TaskExecutor, run_in_process
-from harness.mocap.library import LibraryFolders
-from harness.results import manifest
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.placement_findings import (
+from harness.experiment import clear_caches
+from harness.experiment.scenarios import Scenario
+from harness.experiment.workers import TaskExecutor, run_in_process
+from harness.mocap import LibraryFolders
+from harness.results import current_circumstances, open_study
+from harness.results.files import FINDINGS
+from harness.results.findings import (
+    BenchmarkStatement,
     BestSet,
     PlacementFindings,
     PlacementSearch,
@@ -32,8 +30,7 @@ from harness.results.findings.placement_findings import (
     StatisticalPower,
     write_placement,
 )
-from harness.results.storage import open_study
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 from harness.study.placement import search
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
@@ -176,7 +173,7 @@ class _PlacementRun:
                 for stations, c in self.costs.items()
             ),
             best=best,
-            circumstances=manifest.current_circumstances(),
+            circumstances=current_circumstances(),
             rankings=tuple(ranking for rankings, _ in modes for ranking in rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
             contributions=tuple(contribution for _, contributions in modes for contribution in contributions),

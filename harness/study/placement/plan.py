@@ -8,16 +8,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from harness.compare.margins import margin_of
+from harness.compare import margin_of
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.plan import check_names
-from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import MotionSource
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.experiment import check_names
+from harness.experiment.scenarios import Scenario, expand_clips, find_scenario, load_scenario, open_scenario_motion
+from harness.mocap import LibraryFolders, MotionSource
+from harness.results.findings import CandidatePlace
 from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (

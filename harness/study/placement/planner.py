@@ -5,8 +5,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-from harness.experiment.scenarios.scenario import Scenario
-from harness.mocap.library import LibraryFolders
+from harness.experiment.scenarios import Scenario
+from harness.mocap import LibraryFolders
 from harness.study.placement.config import PlacementStudy
 from harness.study.placement.plan import PlacementPlan, plan_placement, plan_study
 from harness.study.placement.question import PlacementQuestion, plan_within_budget, question_study

@@ -16,9 +16,9 @@ from itertools import combinations
 import numpy as np
 from scipy import special
 
-from harness.compare.significance import SIGNIFICANCE, count_needed
+from harness.compare import SIGNIFICANCE, count_needed
 from harness.core.seeds import generator
-from harness.results.findings.placement_findings import StatisticalPower
+from harness.results.findings import StatisticalPower
 from harness.study.placement.candidates import StationSet
 from harness.study.placement.ranking import Costs
 

@@ -12,17 +12,14 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from harness.body.places import select_places
-from harness.compare.significance import count_needed
+from harness.body import select_places
+from harness.compare import count_needed
 from harness.core.ranges import Name
 from harness.errors import BadInput, UnknownName
-from harness.experiment.scenarios.scenario import Scenario, Station
-from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.mocap.library import LibraryFolders
-from harness.mocap.sources import MotionSource, open_motion_source
-from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
-from harness.simulate.physics.settings import Physics
-from harness.simulate.simulation import TrackerConfig
+from harness.experiment.scenarios import Scenario, ScenarioMotion, Station
+from harness.mocap import LibraryFolders, MotionSource, open_motion_source
+from harness.simulate import TrackerConfig
+from harness.simulate.physics import ConstellationSettings, Physics, load_constellation
 from harness.study.placement.candidates import Candidate
 from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
 

@@ -7,13 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, compare_paired, mean_interval
-from harness.compare.rank_correlation import compare_orders, tau_b, tau_interval
-from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
+from harness.compare import (
+    MIN_UNITS,
+    SIGNIFICANCE,
+    compare_orders,
+    compare_paired,
+    count_needed,
+    holm,
+    mean_interval,
+    sign_flip_p,
+    tau_b,
+    tau_interval,
+)
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.placement_findings import (
+from harness.results.findings import (
+    BenchmarkStatement,
     BestSet,
     ChangedOrder,
     PlacementCondition,

@@ -10,11 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.compare.paired_statistics import compare_paired
-from harness.compare.significance import SIGNIFICANCE, count_needed, holm, sign_flip_p
+from harness.compare import SIGNIFICANCE, compare_paired, count_needed, holm, sign_flip_p
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.results.findings.placement_findings import CandidatePlace, PlacementSearch, SearchStep
+from harness.results.findings import CandidatePlace, PlacementSearch, SearchStep
 from harness.study.placement.candidates import StationSet, mirror_place, placement_fault, station_name
 from harness.study.placement.config import RefineOptions
 from harness.study.placement.ranking import complete_sets, join_names, sort_by_cost

@@ -10,15 +10,9 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import PairedDifference, compare_paired
+from harness.compare import PairedDifference, compare_paired
 from harness.errors import BadInput
-from harness.results.findings.placement_findings import (
-    MarginalContribution,
-    PlacementSearch,
-    Ranking,
-    SearchStep,
-    StationNames,
-)
+from harness.results.findings import MarginalContribution, PlacementSearch, Ranking, SearchStep, StationNames
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (
     AblateOptions,

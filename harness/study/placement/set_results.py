@@ -13,18 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.units import Sampling
+from harness.compare import Sampling
 from harness.core.files import content_key, to_json_types
 from harness.core.progress import ProgressCallback
 from harness.core.split import ClipPart
 from harness.core.stream_health import BAUD, describe_line_loss
 from harness.errors import BadInput
-from harness.experiment.engine import BatchResults, run_cells
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.tasks import cell_names
-from harness.experiment.workers.executors import TaskExecutor
-from harness.mocap.library import LibraryFolders
+from harness.experiment import BatchResults, cell_names, run_cells
+from harness.experiment.scenarios import Scenario, open_scenario_motion
+from harness.experiment.workers import TaskExecutor
+from harness.mocap import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
 
 MAX_RATE_HZ = 180.0

@@ -11,20 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.humanoid import Body
+from harness.body import Body, build_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import Scenario, load_scenario
 from harness.mocap import synthetic
-from harness.reconstruct import registry
-from harness.reconstruct.contract import DatabaseMethod, Method, Reconstructor
-from harness.reconstruct.database import MotionDatabase
-from harness.score.angles import wrap_difference
-from harness.simulate.simulation import Simulation, simulate_tracker
+from harness.reconstruct import DatabaseMethod, Method, MotionDatabase, Reconstructor, make_method
+from harness.score import wrap_difference
+from harness.simulate import Simulation, simulate_tracker
 
 RATE_HZ, TAKE_S = 40.0, 20.0
 FRAMES_PER_TAKE = round(TAKE_S * RATE_HZ) + 1
@@ -53,7 +49,7 @@ class BenchmarkClip:
 
 def build_common_body() -> Body:
     """Build the body that all benchmark takes move on."""
-    return humanoid.build_body()
+    return build_body()
 
 
 def load_clean_scenario(name: str = DEFAULT_SCENARIO) -> Scenario:
@@ -120,7 +116,7 @@ def simulate_clips(takes: Sequence[BodyMotion], seed: int, scenario: Scenario) -
 
 def fit_named_method(name: str, database: MotionDatabase, seed: int) -> Reconstructor:
     """Fit a registered method to a database."""
-    return fit_method(registry.make_method(name), build_common_body(), database, generator(seed, "method", name))
+    return fit_method(make_method(name), build_common_body(), database, generator(seed, "method", name))
 
 
 def fit_method(method: Method, body: Body, database: MotionDatabase, rng: np.random.Generator) -> Reconstructor:

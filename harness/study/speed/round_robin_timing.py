@@ -12,10 +12,9 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
-from harness.reconstruct.contract import Reconstructor
-from harness.reconstruct.database import MotionDatabase
-from harness.score.timing import step_times_ms
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import MotionDatabase, Reconstructor
+from harness.score import step_times_ms
+from harness.stream import TrackerFrame
 from harness.study.speed.benchmark_clips import (
     WARM_UP_FRAMES,
     BenchmarkClip,

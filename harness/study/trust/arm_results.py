@@ -17,23 +17,23 @@ from harness.core.arrays import Floats, Ints
 from harness.core.fault_report import named_folder_fault
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.evaluation import evaluate
-from harness.experiment.methods.isolation import DEFAULT_ISOLATION
-from harness.experiment.methods.method_run import describe_failure
-from harness.experiment.methods.remote_method import NamedMethod, resolve_method
-from harness.experiment.observed_take import ObservedTake
-from harness.experiment.recorded_takes import checked_note, find_playback, recorded_take, registered_take
-from harness.experiment.scenarios.scenario import Scenario
-from harness.mocap.library import LibraryFolders
-from harness.results.files.digests import check_key, read_result_json, write_result_json
-from harness.results.manifest import source_hash
-from harness.results.storage import cell_key
-from harness.score.loops import LoopFrames
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import sampling_times_s, simulate_tracker
-from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.station_readings import CaptureReader
+from harness.experiment import (
+    ClipEvaluation,
+    ObservedTake,
+    checked_note,
+    evaluate,
+    find_playback,
+    recorded_take,
+    registered_take,
+)
+from harness.experiment.methods import DEFAULT_ISOLATION, NamedMethod, describe_failure, resolve_method
+from harness.experiment.scenarios import Scenario
+from harness.mocap import LibraryFolders
+from harness.results import cell_key, source_hash
+from harness.results.files import check_key, read_result_json, write_result_json
+from harness.score import LoopFrames
+from harness.simulate import Noise, sampling_times_s, simulate_tracker
+from harness.stream.recording import CaptureReader, RecordingStream
 from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.reading_errors import (
     HealthCounts,

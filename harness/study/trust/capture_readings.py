@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from harness.errors import BadFile
-from harness.measure.pose_series import MeasuredPoses
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording.station_readings import CaptureReader, StationReadings
+from harness.measure import MeasuredPoses
+from harness.stream.is900.codec import WireFormat
+from harness.stream.recording import CaptureReader, StationReadings
 
 
 @dataclass(frozen=True, eq=False)

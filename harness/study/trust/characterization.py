@@ -10,19 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.significance import holm
+from harness.compare import holm
 from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure.profile import UnitProfile, measure_profile
-from harness.measure.reports.departures import Departure, compare_with_expected
-from harness.measure.reports.unit_report import UnitReport, make_unit_report
-from harness.measure.unit_file import UnitFile
-from harness.results.files.digests import file_digest
-from harness.simulate.noise import noise_preset
-from harness.stream.recording.recording import EXPECTED_FILE
-from harness.stream.recording.station_readings import CaptureReader
+from harness.measure import UnitFile, UnitProfile, measure_profile
+from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
+from harness.results.files import file_digest
+from harness.simulate import noise_preset
+from harness.stream.recording import EXPECTED_FILE, CaptureReader
 
 UNIFORM_KEYS = (
     "components.excursion.size_m",

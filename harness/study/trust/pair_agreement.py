@@ -19,19 +19,19 @@ from itertools import combinations
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_UNITS, mean_interval
-from harness.compare.rank_correlation import decide_pairs, side_difference, tau_b, tau_interval
-from harness.compare.ranking import shared_clips
-from harness.compare.significance import SIGNIFICANCE
+from harness.compare import (
+    MIN_UNITS,
+    SIGNIFICANCE,
+    decide_pairs,
+    mean_interval,
+    shared_clips,
+    side_difference,
+    tau_b,
+    tau_interval,
+)
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.findings.trust_findings import (
-    Equivalence,
-    EquivalenceVerdict,
-    PairAgreement,
-    RankCorrelation,
-    SideDifference,
-)
+from harness.results.findings import Equivalence, EquivalenceVerdict, PairAgreement, RankCorrelation, SideDifference
 
 ArmErrors = Mapping[str, Mapping[str, Sequence[float | None]]]
 """Arm -> unit (a clip or a performer) -> errors: one for each capture of the device or each seed of the simulation.

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from harness.compare.margins import MARGINS, TIME_METRICS
+from harness.compare import MARGINS, TIME_METRICS
 from harness.core.fields import build
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.ranges import MethodName, Name, Range, Text, check_fields
 from harness.errors import BadFile, BadInput, UnknownName, name_file
-from harness.experiment.scenarios.scenario import Scenario, dotted_keys
-from harness.experiment.scenarios.scenario_reader import find_scenario, load_scenario
+from harness.experiment.scenarios import Scenario, dotted_keys, find_scenario, load_scenario
 
 PLAN_SCHEMA = 1
 KIND = "trust plan"

@@ -19,10 +19,10 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, find_runs
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.experiment.observed_take import ObservedTake
-from harness.results.findings.trust_findings import StreamHealth
-from harness.simulate.trajectory import Trajectory
-from harness.stream.station_counts import StationCounts
+from harness.experiment import ObservedTake
+from harness.results.findings import StreamHealth
+from harness.simulate import Trajectory
+from harness.stream import StationCounts
 
 FEATURES = {"position error": "m", "orientation error": "rad"}
 """Error -> its unit; each is a vector in the tracker's axes."""

@@ -13,21 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.significance import holm
-from harness.compare.units import count_units
+from harness.compare import count_units, holm
 from harness.core.arrays import Floats
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, shorten
-from harness.experiment.cells import clear_caches
-from harness.experiment.scenarios.fitted_unit import FITTED_PRESET, read_fitted_unit
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.workers.executors import TaskExecutor, run_in_process
-from harness.measure.unit_file import UnitFile
-from harness.mocap.library import LibraryFolders
-from harness.results.files.digests import write_result_json
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.trust_findings import (
+from harness.experiment import clear_caches
+from harness.experiment.scenarios import FITTED_PRESET, Scenario, load_scenario, read_fitted_unit
+from harness.experiment.workers import TaskExecutor, run_in_process
+from harness.measure import UnitFile
+from harness.mocap import LibraryFolders
+from harness.results import open_study
+from harness.results.files import FINDINGS, write_result_json
+from harness.results.findings import (
     Equivalence,
     ErrorDistance,
     PairAgreement,
@@ -35,8 +32,7 @@ from harness.results.findings.trust_findings import (
     TrustCapture,
     TrustFindings,
 )
-from harness.results.storage import open_study
-from harness.stream.recording.recording import PLAN_FILE, read_recording
+from harness.stream.recording import PLAN_FILE, read_recording
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
     ArmErrors,

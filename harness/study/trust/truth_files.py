@@ -23,8 +23,8 @@ from harness.core.arrays import Floats
 from harness.core.csv_text import unescape_formula
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, Outcome, name_file
-from harness.measure.pose_series import TruthPoses
-from harness.mocap.read.c3d import MarkerClip, read_c3d
+from harness.measure import TruthPoses
+from harness.mocap import MarkerClip, read_c3d
 from harness.study.trust.truth_motion import TruthMotion, common_names
 
 TRAJECTORY_SUFFIXES = (".c3d", ".tum", ".csv")

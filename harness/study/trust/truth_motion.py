@@ -6,19 +6,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.body.kinematics import bone_poses
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import bone_poses, retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.experiment.playback import Playback
-from harness.experiment.scenarios.scenario import Scenario
-from harness.measure.pose_series import TruthPoses
-from harness.simulate.loop import loop_motion
-from harness.simulate.simulation import exact_calibration
+from harness.experiment import Playback
+from harness.experiment.scenarios import Scenario
+from harness.measure import TruthPoses
+from harness.simulate import exact_calibration, loop_motion
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 
 _MARGIN_S = 0.5

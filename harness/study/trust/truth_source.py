@@ -6,16 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from harness.errors import BadInput, NotComparable
-from harness.experiment.recorded_takes import find_playback
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.measure.angular_speed import coarse_offset, record_period_s
-from harness.measure.pose_series import TruthSpline
-from harness.measure.registration import LEAST_OVERLAP_S
-from harness.mocap.clip_file import CLIP_FORMATS, read_clip
-from harness.mocap.library import LibraryFolders
-from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.station_readings import CaptureReader
+from harness.experiment import find_playback
+from harness.experiment.scenarios import Scenario, load_scenario
+from harness.measure import LEAST_OVERLAP_S, TruthSpline, coarse_offset, record_period_s
+from harness.mocap import CLIP_FORMATS, LibraryFolders, read_clip
+from harness.stream.recording import CaptureReader, RecordingStream
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses, read_capture
 from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
 from harness.study.trust.truth_motion import TruthMotion, truth_of_capture, truth_of_clip, truth_of_playback

@@ -9,25 +9,29 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
-from harness.experiment.evaluation import Evaluation, evaluate_each
-from harness.experiment.recorded_takes import registered_take
-from harness.measure.angular_speed import identify_stations, record_period_s
-from harness.measure.pose_series import MeasuredPoses
-from harness.measure.registration import Registration, StationResiduals, register_poses, require_stamps
-from harness.measure.reports.departures import Departure, compare_with_expected
-from harness.measure.reports.unit_report import CaptureSummary
-from harness.measure.reports.validation_report import (
+from harness.experiment import Evaluation, evaluate_each, registered_take
+from harness.measure import (
+    MeasuredPoses,
+    Registration,
+    StationResiduals,
+    UnitFile,
+    identify_stations,
+    record_period_s,
+    register_poses,
+    require_stamps,
+)
+from harness.measure.reports import (
+    CaptureSummary,
+    Departure,
     StationAccuracy,
     ValidationReport,
+    compare_with_expected,
     error_quantiles,
     estimated_poses,
     residual_series,
 )
-from harness.measure.unit_file import UnitFile
-from harness.stream.is900.codec.items import BITS_PER_BYTE, record_size
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.recording.replay import RecordingStream
-from harness.stream.recording.station_readings import StationReadings
+from harness.stream.is900.codec import BITS_PER_BYTE, WireFormat, record_size
+from harness.stream.recording import RecordingStream, StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
 from harness.study.trust.truth_motion import TruthMotion

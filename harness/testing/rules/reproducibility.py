@@ -11,7 +11,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.seeds import generator
 from harness.core.workers import run_in_workers
-from harness.reconstruct.contract import Reconstructor, Session
+from harness.reconstruct import Reconstructor, Session
 from harness.testing.contract_case import (
     FRAMES,
     ContractCase,

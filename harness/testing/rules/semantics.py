@@ -7,10 +7,9 @@ from harness.core.arrays import Floats
 from harness.core.estimate import HINGE_COUNT, LOST_AFTER_S, Origin, Status, session_lag
 from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
-from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.results.reported_metrics import MAX_FALLBACK_SHARE
-from harness.score.angles import wrap_difference
-from harness.score.loops import WARM_UP_S
+from harness.reconstruct.solver import Loss, Residuals
+from harness.results import MAX_FALLBACK_SHARE
+from harness.score import WARM_UP_S, wrap_difference
 from harness.testing.contract_case import (
     DISTURBANCES,
     FRAMES,

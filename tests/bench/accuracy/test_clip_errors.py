@@ -10,8 +10,8 @@ from harness.bench.accuracy.clip_errors import ANGLE, SILENT_ANGLE, ClipErrors, 
 from harness.bench.accuracy.conditions import CONDITIONS, SEEDS
 from harness.bench.accuracy.targets import evaluate_targets
 from harness.errors import BadFile, BadInput
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.files.digests import insert_digest
+from harness.experiment.scenarios import load_scenario
+from harness.results.files import insert_digest
 from tests.bench.accuracy.planted import COMMIT, errors, stored
 
 ROOT = Path(clip_errors.__file__).parents[3]

@@ -15,8 +15,8 @@ from harness.bench.accuracy.conditions import (
 )
 from harness.bench.accuracy.measurement import condition_of
 from harness.errors import BadInput
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.tasks import cell_names, plan_tasks
+from harness.experiment import cell_names, plan_tasks
+from harness.experiment.scenarios import load_scenario
 
 PLANNED = plan_scenarios(CONDITIONS, "ours", SEEDS)
 

@@ -18,10 +18,9 @@ from harness.bench.accuracy.targets import evaluate_targets
 from harness.bench.accuracy.text import format_report, report_content
 from harness.bench.limits import outcome_of
 from harness.errors import BadInput, Outcome
-from harness.experiment.workers.executors import run_in_process
-from harness.results.cell import as_row, write_cell
-from harness.results.storage import Cell
-from harness.simulate.disturbance import Disturbance
+from harness.experiment.workers import run_in_process
+from harness.results import Cell, as_row, write_cell
+from harness.simulate import Disturbance
 from tests.bench.accuracy.planted import COMMIT, errors, stored
 from tests.bench.accuracy.test_clip_errors import ROOT
 from tests.command import Command

@@ -10,9 +10,7 @@ from harness.bench.lab import captures
 from harness.bench.lab.captures import PLANTED_FAULTS, planted_capture, planted_numbers, planted_scenario
 from harness.cli import main
 from harness.errors import UnknownName
-from harness.stream.recording.blocks import CONFIGURED, RECEIVED
-from harness.stream.recording.recording import Recording, read_recording
-from harness.stream.recording.station_readings import CaptureReader
+from harness.stream.recording import CONFIGURED, RECEIVED, CaptureReader, Recording, read_recording
 from tests.bench.lab.scenario_files import write_scenario
 
 SECONDS = 20.0

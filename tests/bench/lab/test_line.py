@@ -17,8 +17,8 @@ from harness.bench.lab.captures import EARLIER, NO_FAULTS, PLANTED_FAULTS, plant
 from harness.bench.lab.outcomes import CaptureOutcome, stored_checks
 from harness.bench.lab.truth import is_sized
 from harness.core.working_folder import python_command, python_environment
-from harness.mocap.synthetic.takes import RIG_TAKES
-from harness.stream.recording.station_readings import CaptureReader
+from harness.mocap.synthetic import RIG_TAKES
+from harness.stream.recording import CaptureReader
 from harness.study.trust.capture_readings import read_capture
 from harness.study.trust.characterization import characterize_capture
 from harness.study.trust.truth_source import TruthSource, load_truth

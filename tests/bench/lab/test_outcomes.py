@@ -13,8 +13,8 @@ from harness.bench.lab import outcomes
 from harness.bench.lab.captures import STATION
 from harness.bench.lab.outcomes import CaptureOutcome, StoredCheck, StoredNumber, collect_outcomes, outcome_path
 from harness.errors import BadFile, BadInput
-from harness.experiment.workers.executors import process_executor, run_in_process
-from harness.results.manifest import source_hash
+from harness.experiment.workers import process_executor, run_in_process
+from harness.results import source_hash
 
 R = TypeVar("R")
 TASKS = [("clock", 1), ("none", 1), ("clock", 2)]

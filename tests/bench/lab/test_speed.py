@@ -8,7 +8,7 @@ import pytest
 from harness.bench.lab import speed
 from harness.bench.lab.captures import planted_capture
 from harness.bench.lab.verb_cost import measure_verb
-from harness.stream.recording.station_readings import CaptureReader
+from harness.stream.recording import CaptureReader
 
 
 def test_a_long_capture_goes_on_from_part_to_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from harness.bench.physics import scenes, truth
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.simulate.physics.settings import Physics
+from harness.results.findings import BenchmarkStatement
+from harness.simulate.physics import Physics
 
 SEEDS = tuple(range(101, 115))
 """Not those of the table."""

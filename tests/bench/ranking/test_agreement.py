@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from harness.bench.ranking.agreement import ErrorsByUnit, RankingAgreement, compare_rankings
-from harness.compare.paired_statistics import MIN_UNITS
-from harness.compare.rank_correlation import tau_b
+from harness.compare import MIN_UNITS, tau_b
 from harness.core.arrays import Floats
 
 MEANS = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}

@@ -20,9 +20,9 @@ from harness.bench.ranking.measurement import (
 from harness.bench.ranking.text import format_rankings, rankings_content
 from harness.core.split import performer_of
 from harness.errors import Outcome
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.workers.executors import run_in_process
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.experiment.scenarios import Scenario
+from harness.experiment.workers import run_in_process
+from harness.results import PRIMARY_METRIC
 from tests.command import Command
 
 

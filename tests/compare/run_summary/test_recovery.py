@@ -10,7 +10,7 @@ from harness.compare.run_summary.recovery import RecoveryCollector, tabulate_rec
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.files import to_json_types
-from harness.results.storage import Cell
+from harness.results import Cell
 
 MakeCell = Callable[..., Cell]
 END_S = 5.0

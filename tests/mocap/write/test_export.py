@@ -22,8 +22,7 @@ from harness.mocap.write.bvh import euler_zyx_deg
 from harness.mocap.write.export import EXPORT_FORMATS, export_motion
 from harness.mocap.write.opensim import ROOT_COLUMNS, euler_zxy_rad
 from harness.mocap.write.tables import POINTS
-from harness.score.pair import Pair, compute_poses
-from harness.score.positions import root_position_mm
+from harness.score import Pair, compute_poses, root_position_mm
 from harness.testing.doctor import find_evo, run_evo_ape_m
 from tests.core.leftovers import leave_behind
 

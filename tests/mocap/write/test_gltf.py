@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.anatomy import body_geoms
+from harness.body import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import unpack

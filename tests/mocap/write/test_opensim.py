@@ -14,7 +14,7 @@ from harness.core.humanoid24 import pack, unpack
 from harness.mocap import synthetic
 from harness.mocap.write.export import export_motion
 from harness.mocap.write.opensim import ROOT_COLUMNS
-from harness.score.pair import compute_poses
+from harness.score import compute_poses
 from tests.mocap.write.test_export import BELIEVED, NAMES, SKELETON, Written, in_opensim, joints_m
 
 RATE_HZ = 40.0

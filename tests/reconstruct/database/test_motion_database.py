@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body import humanoid
+from harness.body import build_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import QPOS_OF_DOF, pack
 from harness.core.motion import BodyMotion
 from harness.core.skeleton import equivalent_euler_angles
 from harness.errors import BadInput
 from harness.mocap import synthetic
-from harness.reconstruct.database import MotionDatabase, TakeSegment
+from harness.reconstruct.database.frames import TakeSegment
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.solver.ground_frame import (
     ground_from_qpos,
     posture_from_qpos,
@@ -25,7 +26,7 @@ from harness.reconstruct.solver.ground_frame import (
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from tests.reconstruct.conftest import moved as elsewhere
 
-BODY = humanoid.build_body()
+BODY = build_body()
 
 
 def make_take(behaviour: str, number: int, seconds: float = 2.0) -> BodyMotion:

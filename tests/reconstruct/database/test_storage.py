@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile
-from harness.reconstruct.database import MotionDatabase, TakeSegment
+from harness.reconstruct.database.frames import TakeSegment
+from harness.reconstruct.database.motion_database import MotionDatabase
 from tests.core.leftovers import leave_behind
 
 

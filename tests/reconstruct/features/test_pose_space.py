@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body import humanoid
+from harness.body import build_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import QPOS_OF_DOF
@@ -18,7 +18,7 @@ from harness.reconstruct.features.pose_space import (
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 
-BODY = humanoid.build_body()
+BODY = build_body()
 LIMITS = HingeLimits(BODY)
 QUATERNIONS = JointQuaternions(BODY, LIMITS)
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.kinematics import pose_from_qpos
-from harness.reconstruct.database import MotionDatabase
+from harness.body import pose_from_qpos
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import toe_height_m
 from tests.reconstruct.conftest import Scene
 

@@ -10,7 +10,7 @@ from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression
 from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats, Ints
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations
 from tests.reconstruct.methods.test_dynamic_map import unseen
 

@@ -9,17 +9,11 @@ from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
 from harness.core.workers import run_in_workers
 from harness.errors import UnknownName
-from harness.reconstruct.index import (
-    ArrayVectors,
-    FlatIndex,
-    Index,
-    InvertedFile,
-    KDTree,
-    NeighbourGraph,
-    Vectors,
-    make_index,
-    nearest_partial,
-)
+from harness.reconstruct.index.exact import FlatIndex, KDTree, nearest_partial
+from harness.reconstruct.index.inverted_file import InvertedFile
+from harness.reconstruct.index.neighbour_graph import NeighbourGraph
+from harness.reconstruct.index.protocol import ArrayVectors, Index, Vectors
+from harness.reconstruct.index.selection import make_index
 
 EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": FlatIndex, "kd_tree": KDTree}
 ALL = EXACT | {"inverted_file": InvertedFile}

@@ -8,20 +8,19 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.split import ClipPart
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.playback import prepare_playback
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.mocap.sources import open_motion_source
+from harness.experiment import ClipEvaluation, prepare_playback
+from harness.experiment.scenarios import load_scenario
+from harness.mocap import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.methods.clean_up import CleanUp, FittedCleanUp
 from harness.reconstruct.methods.mean_pose import MeanPose
-from harness.score.angles import wrap_difference
+from harness.score import wrap_difference
 from harness.testing.frames import swaying_motion
 from tests.experiment.late_methods import SIGMA_RAD, Late
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.body.retargeting import retarget_to_common_body
+from harness.body import retarget_to_common_body
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
@@ -16,8 +16,8 @@ from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap, FittedDynamicMap, Prediction
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.methods.local_pca import LocalPca
-from harness.score.angles import wrap_difference
-from harness.stream.frame import TrackerFrame
+from harness.score import wrap_difference
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved, scene
 

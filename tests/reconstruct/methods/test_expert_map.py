@@ -16,7 +16,7 @@ from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved, scene
 

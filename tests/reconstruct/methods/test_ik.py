@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.retargeting import retarget_to_common_body, retarget_to_own_body
+from harness.body import retarget_to_common_body, retarget_to_own_body
 from harness.core.estimate import Status
 from harness.errors import BadInput
-from harness.mocap.library import MotionLibrary
+from harness.mocap import MotionLibrary
 from harness.reconstruct.methods.clean_up import CleanUp
 from harness.reconstruct.methods.ik import GAUSSIAN, MEAN, PREVIOUS, Ik
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.residuals import Loss
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_calibration, exact_frames
 from tests.reconstruct.conftest import Scene, moved
 

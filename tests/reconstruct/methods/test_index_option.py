@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.reconstruct.index import INDEXES
+from harness.reconstruct.index.selection import INDEXES
 from tests.reconstruct.methods.test_dynamic_map import hinges, mean_deg
 
 METHODS = ("local_pca", "dynamic_map", "dynamic_map:window", "dynamic_map:literal", "kernel_cca", "weighted_blend")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats, Singles
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits

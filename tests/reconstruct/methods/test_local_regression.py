@@ -8,7 +8,7 @@ import pytest
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.humanoid24 import BONES, unpack
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body import humanoid
+from harness.body import build_body
 from harness.core.estimate import Origin
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
@@ -17,7 +17,7 @@ SILENT = range(60, 90)
 
 def origins_of(name: str) -> list[Origin]:
     """Origins of the estimates of 120 frames, of which `SILENT` have no reading."""
-    body = humanoid.build_body()
+    body = build_body()
     calibration, method = exact_calibration(body), registry.make_method(name)
     examples = [BodyMotion(f"s{n}", "nobody", "s", "", RATE_HZ, swaying_motion(body, 160, n)) for n in (2, 3)]
     session = method.fit(body, examples, generator(1, "fit")).begin(calibration)

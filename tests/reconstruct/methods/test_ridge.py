@@ -8,7 +8,7 @@ import pytest
 from harness.core import rotations
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.methods.ridge import Ridge, ridge_regression
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
 

@@ -11,7 +11,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Origin, Status, session_lag
 from harness.core.humanoid24 import pack
-from harness.experiment.methods.method_run import run_method
+from harness.experiment.methods import run_method
 from harness.reconstruct.solver.fixed_lag import FixedLagFilter, FixedLagSession
 
 FIVE = (1.0, 4.0, 6.0, 4.0, 1.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.kinematics import pose_from_qpos
+from harness.body import pose_from_qpos
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.reconstruct.solver.floor_contact import FEET, FloorContact

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import StationFeatures, VirtualTrackers
 from harness.reconstruct.solver.ground_frame import (
     HeadingEstimator,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
+from harness.body import build_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.skeleton import forward_kinematics

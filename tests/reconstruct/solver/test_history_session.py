@@ -13,7 +13,7 @@ from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations
 from tests.reconstruct.conftest import Scene
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from harness.body import humanoid
-from harness.body.kinematics import Kinematics
+from harness.body import Kinematics, build_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.reconstruct.solver.kinematic_tree import (
@@ -16,13 +15,13 @@ from harness.reconstruct.solver.kinematic_tree import (
     station_jacobian,
 )
 
-BODY = humanoid.build_body()
+BODY = build_body()
 BONES = [BODY.skeleton.index(name) for name in ("head", "lhand", "rfoot", "lowerback", "lwrist")]
 
 
 def posed(rng: np.random.Generator) -> tuple[Kinematics, KinematicTree, KinematicState, Floats]:
     """MuJoCo and the tree in the same random configuration, whose quaternion is not of unit length."""
-    qpos = humanoid.tpose(BODY.skeleton) + 0.4 * rng.normal(size=55)
+    qpos = tpose(BODY.skeleton) + 0.4 * rng.normal(size=55)
     kinematics = Kinematics(BODY)
     kinematics.set(qpos)
     tree = build_tree(BODY, BONES, 0.1 * rng.normal(size=(len(BONES), 3)))

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from harness.body import humanoid
+from harness.body import build_body, tpose
 from harness.core.arrays import Floats
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.limb_solver import LimbSolver
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations, exact_calibration, exact_frames
 
-BODY = humanoid.build_body()
+BODY = build_body()
 JOINTS = [BODY.model.joint(j + 1).name for j in range(48)]
 LIMBS = np.array([any(b in name for b in ("humerus", "radius", "wrist", "hand")) for name in JOINTS])
 LIMBS |= np.array([any(b in name for b in ("femur", "tibia", "foot")) for name in JOINTS])
@@ -41,7 +41,7 @@ class Bench:
 
 def poses(rng: np.random.Generator, spread: float) -> tuple[Floats, Floats]:
     """A pose (55,), and the same with another trunk place and other limbs."""
-    truth = humanoid.tpose(BODY.skeleton)
+    truth = tpose(BODY.skeleton)
     truth[7:] = rng.uniform(np.maximum(LOW, -1.0), np.minimum(HIGH, 1.0))
     truth[7:][BENDS] = rng.uniform(0.3, 1.0, 4)  # a distance alone does not say which way a straight limb bends
     guess = truth.copy()
@@ -99,5 +99,5 @@ def test_the_pose_that_was_evaluated_before_does_not_matter(rng: np.random.Gener
     truth, guess = poses(rng, 0.1)
     bench = Bench(SETS["wrists and chest"], keep=False)
     once = bench.reached(truth, guess)
-    bench.residuals.evaluate(humanoid.tpose(BODY.skeleton))
+    bench.residuals.evaluate(tpose(BODY.skeleton))
     np.testing.assert_allclose(bench.limbs.solve(guess), once, atol=1e-9)

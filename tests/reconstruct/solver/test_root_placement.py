@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from harness.body import humanoid
-from harness.body.humanoid import tpose
+from harness.body import build_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
-from harness.stream.inputs import make_inputs
+from harness.stream import make_inputs
 from harness.testing.frames import exact_calibration, exact_frames
 
 
@@ -24,7 +23,7 @@ def moved(qpos: Floats, turn: Floats, by_m: Floats) -> Floats:
 @pytest.mark.parametrize("inputs", ["pos+ori", "pos", "ori"])
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.4, np.pi - 1e-3])
 def test_a_body_that_was_moved_is_found(inputs: str, tilt_rad: float, rng: np.random.Generator) -> None:
-    body = humanoid.build_body(standard_skeleton())
+    body = build_body(standard_skeleton())
     known = exact_calibration(body)
     residuals = Residuals(body, known, Loss())
     for posture in (tpose(body.skeleton), *starting_postures(body)):

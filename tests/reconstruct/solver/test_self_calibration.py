@@ -22,7 +22,7 @@ from harness.reconstruct.solver.self_calibration import (
 )
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 from tests.reconstruct.conftest import Scene
 
 SQUARES = Loss(robust=False)

@@ -7,7 +7,7 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.reconstruct.solver.status_monitor import DeviceTime
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 PERIOD_S, SLOT_S = 0.025, 0.0033
 

@@ -5,16 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct import registry
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.temporal_alignment import MAX_BEND_M, MAX_STEP_S, MAX_TURN_RAD, TemporalAlignment
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import TrackerConfig, simulate_tracker
-from harness.stream.frame import TrackerFrame
+from harness.simulate import Noise, TrackerConfig, simulate_tracker
+from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations
 from tests.joint_centres import joint_centres_m
 from tests.reconstruct.conftest import Scene

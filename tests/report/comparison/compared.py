@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.compare.comparison import Comparison, Difference, compare_results
+from harness.compare import Comparison, Difference, compare_results
 from harness.core.seeds import generator
 from harness.errors import Outcome
 from tests.compare.sides import manifest, side

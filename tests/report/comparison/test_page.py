@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 
-from harness.compare.comparison import Comparison
+from harness.compare import Comparison
 from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
 from harness.report.comparison.charts import BETTER_COLOUR, WORSE_COLOUR, interval_charts, slope_chart

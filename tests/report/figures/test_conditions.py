@@ -16,8 +16,7 @@ from harness.report.figures.conditions import (
 )
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.run.ranking import describe_rankings
-from harness.results.reader import ResultSet
-from harness.results.storage import read_summary
+from harness.results import ResultSet, read_summary
 from tests.compare.sides import cell, manifest, side, write_run
 from tests.planted import MeansPlan, Plan, planted_means_run, planted_run
 

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
-from harness.compare.paired_statistics import mean_interval
+from harness.compare import mean_interval
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
 from harness.report.figures.conditions import read_conditions, read_series
@@ -16,7 +16,7 @@ from harness.report.figures.mean_figures import joints_figure, ranking_figure
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.style import COLOURS, FAINT
 from harness.report.run.joint_errors import BONE_ROWS
-from harness.score.pair import hinged_bones
+from harness.score import hinged_bones
 from tests.compare.sides import cell, side, write_run
 from tests.planted import MeansPlan, planted_means_run
 from tests.report.drawing import drawn, spans, texts_apart

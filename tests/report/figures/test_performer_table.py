@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.compare.paired_statistics import mean_interval
+from harness.compare import mean_interval
 from harness.report.figures.performer_table import PerformerColumn, performer_columns, table_lines, update_readme
-from harness.results.reader import ResultSet
+from harness.results import ResultSet
 from tests.compare.sides import cell, manifest, side, write_run
 from tests.planted import Plan, planted_run
 

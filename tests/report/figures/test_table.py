@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.compare.paired_statistics import mean_interval
+from harness.compare import mean_interval
 from harness.errors import BadFile, UnknownName
 from harness.report.figures.conditions import read_conditions
 from harness.report.figures.table import MetricValue, build_table
-from harness.results.storage import read_summary
+from harness.results import read_summary
 from tests.compare.sides import side, write_run
 
 ANGLE = "joint_angle_mean_deg"

@@ -8,7 +8,7 @@ import pytest
 from harness.errors import BadFile, BadInput, HarnessError, UnknownName
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.figures.writer import KINDS, write_figure, write_results_table
-from harness.results.index import CellIndex
+from harness.results import CellIndex
 
 
 def test_a_figure_lies_below_its_run_in_pdf_unless_told_otherwise(ranked: Path, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from harness.report.kit.motion_player import (
     PlayerTrack,
     player_card,
 )
-from harness.score.pair import compute_poses
+from harness.score import compute_poses
 
 pytestmark = pytest.mark.long
 FRAMES, RATE_HZ = 80, 40.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.compare.ranking import MethodRanking
+from harness.compare import MethodRanking
 from harness.report.kit.ranking import RankingPanel, explain_marks, wrap_name
 
 

@@ -1,7 +1,7 @@
 """Names and labels of metrics on a page."""
 
 from harness.report.kit.text import metric_label, metric_name
-from harness.score.metrics import DEFINITIONS
+from harness.score import DEFINITIONS
 
 
 def test_every_label_ends_with_the_unit_and_no_two_metrics_share_one() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from harness.core.number_format import Interval
-from harness.measure.reports.departures import Departure, compare_with_expected
+from harness.measure.reports import Departure, compare_with_expected
 from harness.report.lab.departures import condense_departures, departure_texts, departures_sentence
 
 ECHOES = "components.echo.share"

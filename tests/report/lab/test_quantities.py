@@ -5,9 +5,8 @@ import math
 import pytest
 
 from harness.core.number_format import Interval
-from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.reports.unit_report import STATION_FIGURES
-from harness.measure.timing import TIMING_KEYS
+from harness.measure import NOISE_KEYS, TIMING_KEYS
+from harness.measure.reports import STATION_FIGURES
 from harness.report.lab.quantities import Quantity, find_quantity
 from harness.study.trust.characterization import preset_values
 

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.report.lab.trust_page import trust_page
-from harness.results.findings.trust_findings import TrustFindings
+from harness.results.findings import TrustFindings
 from tests.report.drawing import draw_page, drawn_figures, points, texts_apart
 
 pytestmark = pytest.mark.long

@@ -11,7 +11,7 @@ from harness.errors import Outcome
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import render_text
 from harness.report.lab.trust_page import OUTCOME_TITLES, correlations, count_pairs, trust_page, verdict_sentence
-from harness.results.findings.trust_findings import RankCorrelation, TrustFindings
+from harness.results.findings import RankCorrelation, TrustFindings
 from tests.report.reading import count_pictures, emptied, numbers_in_order, read, section_ids, text_of
 
 pytestmark = pytest.mark.long

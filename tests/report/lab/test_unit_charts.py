@@ -7,7 +7,7 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from harness.measure.reports.unit_report import EpisodeMark, UnitReport
+from harness.measure.reports import EpisodeMark, UnitReport
 from harness.report.kit.style import COLOURS
 from harness.report.lab.unit_charts import allan_chart
 from harness.report.lab.unit_page import unit_page

@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.number_format import Interval
 from harness.errors import BadInput, ShapeError
-from harness.measure.reports.unit_report import (
+from harness.measure.reports import (
     DeviationCurve,
     EpisodeMark,
     ParameterRow,

@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.number_format import Interval, format_fixed
 from harness.errors import ShapeError
-from harness.measure.reports.validation_report import ErrorQuantiles, ResidualSeries, ValidationReport
+from harness.measure.reports import ErrorQuantiles, ResidualSeries, ValidationReport
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import render_text
 from harness.report.lab.quantities import find_quantity

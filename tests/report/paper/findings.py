@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.paper_findings import (
+from harness.results.findings import (
     BarChart,
+    BenchmarkStatement,
     FindingsTable,
     LineChart,
     PaperExperiment,

@@ -17,7 +17,7 @@ from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS
 from harness.report.paper.charts import figure_charts, figure_table
 from harness.report.paper.figures import draw_bars, draw_lines, height_in, is_horizontal
-from harness.results.findings.paper_findings import BarChart, LineChart, PaperExperiment
+from harness.results.findings import BarChart, LineChart, PaperExperiment
 from tests.report.paper.findings import METHODS, curves, liu, sets
 
 EMPTY = PaperExperiment("empty", "", "", ())

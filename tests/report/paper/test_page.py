@@ -12,8 +12,14 @@ from harness.core.number_format import Interval
 from harness.errors import BadFile
 from harness.report.kit.statement_lines import MARKS
 from harness.report.paper.page import KINDS, claims_sentence, count_verdicts, run_link, write_paper_page
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.paper_findings import BarChart, FindingsTable, LineChart, PaperExperiment, PaperFindings
+from harness.results.findings import (
+    BarChart,
+    BenchmarkStatement,
+    FindingsTable,
+    LineChart,
+    PaperExperiment,
+    PaperFindings,
+)
 from tests.report.paper.findings import curves, liu, sets, write_study
 from tests.report.reading import read, text_of
 from tests.results.rewrite import read_json, write_json

@@ -20,8 +20,7 @@ from harness.report.paper.page import (
     statements_text,
     update_readme,
 )
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
-from harness.results.findings.paper_findings import PaperExperiment
+from harness.results.findings import BenchmarkStatement, PaperExperiment, Verdict
 from tests.report.paper.findings import kim, liu, write_study
 
 RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")

@@ -18,13 +18,7 @@ from harness.report.placement.body_map import draw_body_map, interpolate_colours
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.page import placement_text, write_placement_page
 from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
-from harness.results.findings.placement_findings import (
-    BestSet,
-    PlacementFindings,
-    StationNames,
-    StationSetResult,
-    write_placement,
-)
+from harness.results.findings import BestSet, PlacementFindings, StationNames, StationSetResult, write_placement
 from harness.study.placement.config import load_placement_study
 from tests.report.reading import emptied, text_of
 

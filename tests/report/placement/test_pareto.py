@@ -9,7 +9,7 @@ import pytest
 from harness.errors import BadFile, NothingMeasured, Outcome
 from harness.report.placement.pareto import placement_figure
 from harness.report.placement.wording import set_name
-from harness.results.findings.placement_findings import PlacementFindings, write_placement
+from harness.results.findings import PlacementFindings, write_placement
 from tests.report.drawing import drawn, spans, texts_apart
 
 

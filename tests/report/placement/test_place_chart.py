@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.places import NAMED_PLACES
+from harness.body import NAMED_PLACES
 from harness.errors import SystemFault
 from harness.report.placement import place_chart
 

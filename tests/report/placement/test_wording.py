@@ -13,13 +13,7 @@ from harness.report.placement.wording import (
     power_sentences,
     ranks_by_condition,
 )
-from harness.results.findings.placement_findings import (
-    BestSet,
-    ChangedOrder,
-    PlacementFindings,
-    RankAgreement,
-    StatisticalPower,
-)
+from harness.results.findings import BestSet, ChangedOrder, PlacementFindings, RankAgreement, StatisticalPower
 
 POWER = StatisticalPower(
     *(16, 165, "deg", 13, 590.0, 480.0, 0.4, 0.7, 1.02, 0.3, 190, 7000.0, 4),

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from harness.compare.units import BY_NAME, Sampling
+from harness.compare import BY_NAME, Sampling
 from harness.report.kit.page_html import page_table
 from harness.report.kit.page_text import table_lines
 from harness.report.run.calibration import calibration_cost, calibration_errors, calibration_tables

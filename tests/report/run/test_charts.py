@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 from matplotlib.figure import Figure
 
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import load_scenario
 from harness.report.kit.chart import add_legend, draw_chart
 
 LONG = load_scenario("boxing_outliers").methods

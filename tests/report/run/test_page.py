@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from harness.compare.comparison import compare_runs
+from harness.compare import compare_runs
 from harness.errors import BadFile
 from harness.report.kit import render_process
 from harness.report.kit.page import DataTable, Strong
@@ -23,7 +23,7 @@ from harness.report.run.headline import run_verdict
 from harness.report.run.page import write_run_page
 from harness.report.run.tables import results_tables
 from harness.report.run.text import run_table
-from harness.results.storage import read_summary
+from harness.results import read_summary
 from tests.planted import METHODS, Plan, planted_run
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$"

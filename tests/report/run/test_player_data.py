@@ -5,16 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build_body
-from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Kinematics, build_body
 from harness.core import rotations
 from harness.report.kit.motion_player import NO_ESTIMATE, PlayerMotion
 from harness.report.run import player_data
 from harness.report.run.data import pose_pair, read_run
 from harness.report.run.player_data import run_motion, station_poses
 from harness.report.run.worst_window import WorstWindow, find_worst_window
-from harness.score.pair import compute_poses
+from harness.score import compute_poses
 from tests.planted import METHODS, Plan, planted_run
 
 METRIC = "mpjpe_mm"

@@ -5,8 +5,7 @@ from typing import Any
 import pytest
 
 from harness.report.run.text import MOST_ROWS, run_table
-from harness.results.reported_metrics import PRIMARY_METRIC
-from harness.results.storage import read_summary
+from harness.results import PRIMARY_METRIC, read_summary
 from tests.planted import Plan, planted_run
 
 

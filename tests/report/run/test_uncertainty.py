@@ -14,7 +14,7 @@ from harness.report.run.headline import run_verdict
 from harness.report.run.joint_errors import error_against_sigma
 from harness.report.run.page import write_run_page
 from harness.report.run.tables import results_tables, sigma_table
-from harness.results.storage import read_summary
+from harness.results import read_summary
 from tests.planted import Plan, planted_run
 
 LATE = "smooth (lag 2)"

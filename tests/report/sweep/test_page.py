@@ -12,8 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.cli import main
-from harness.compare.paired_statistics import mean_interval
-from harness.compare.units import Sampling
+from harness.compare import Sampling, mean_interval
 from harness.errors import BadFile
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.page_html import page_table, render_html
@@ -29,9 +28,8 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
 from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
-from harness.results.files.integrity import compute_digests
-from harness.results.index import CellIndex
-from harness.results.reported_metrics import PRIMARY_METRIC
+from harness.results import PRIMARY_METRIC, CellIndex
+from harness.results.files import compute_digests
 from tests.planted import MeansPlan, planted_sweep
 from tests.report.drawing import texts_apart
 from tests.report.reading import read, text_of

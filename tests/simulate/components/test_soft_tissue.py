@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness.body import soft_tissue
-from harness.body.humanoid import Body
-from harness.body.mounts import Mount
+from harness.body import THICKNESS_M, Body, Mount, tissue_thickness_m
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, pack
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment.scenarios import load_scenario
 from harness.simulate.components.mount import MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact, simulate_oscillators, soft_limit
 from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
@@ -153,7 +151,7 @@ def test_lying_down_it_sags_towards_the_floor(boxer: tuple[Body, BodyMotion]) ->
     lying = BodyMotion("lying", take.subject, take.source, take.behaviour, 40.0, np.tile(pose, (40, 1)))
     still, wobbly = (worn_through(body, lying, THIGH, wobble=w) for w in (None, SoftTissueArtefact()))
     down_m = (wobbly.position_m - still.position_m)[-1, 0, 2]  # the tracker's z points down
-    assert 0.003 < down_m < soft_tissue.tissue_thickness_m("rfemur", 0.5)
+    assert 0.003 < down_m < tissue_thickness_m("rfemur", 0.5)
 
 
 def test_in_a_walk_thighs_wobble_by_centimetres_and_shins_by_millimetres(walker: tuple[Body, BodyMotion]) -> None:
@@ -189,15 +187,15 @@ def test_numbers_that_cannot_be_are_refused() -> None:
 
 @pytest.mark.parametrize("bone", BONES)
 def test_every_bone_has_flesh_on_both_sides_alike(bone: str) -> None:
-    assert 0.002 <= soft_tissue.tissue_thickness_m(bone, 0.0) <= 0.06
-    if bone[0] in "lr" and bone[1:] in soft_tissue.THICKNESS_M:
+    assert 0.002 <= tissue_thickness_m(bone, 0.0) <= 0.06
+    if bone[0] in "lr" and bone[1:] in THICKNESS_M:
         other = {"l": "r", "r": "l"}[bone[0]] + bone[1:]
-        assert soft_tissue.tissue_thickness_m(bone, 0.3) == soft_tissue.tissue_thickness_m(other, 0.3)
+        assert tissue_thickness_m(bone, 0.3) == tissue_thickness_m(other, 0.3)
 
 
 def test_flesh_of_no_bone() -> None:
     with pytest.raises(UnknownName, match="'femur'"):
-        soft_tissue.tissue_thickness_m("femur", 0.5)
+        tissue_thickness_m("femur", 0.5)
 
 
 def test_strap_slips_have_the_given_rate_and_size(still: Still) -> None:

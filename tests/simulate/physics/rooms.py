@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from harness.body.humanoid import Body
-from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body import DEFAULT_MOUNTS, Body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
@@ -17,7 +16,7 @@ from harness.simulate.physics.room import PlacedRoom, Room
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
+from harness.stream.is900 import DEFAULT_EMITTERS
 
 TICK_HZ = 400.0
 ORIGIN_M = np.array(TrackerConfig().origin_m)

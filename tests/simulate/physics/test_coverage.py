@@ -5,12 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.body.humanoid import build_body
-from harness.body.mounts import Mount
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import Mount, build_body, retarget_to_own_body
 from harness.core.motion import BodyMotion
-from harness.experiment.scenarios.scenario import Station
-from harness.experiment.scenarios.scenario_reader import read_station_sets
+from harness.experiment.scenarios import Station, read_station_sets
 from harness.mocap import synthetic
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import Constellation, ConstellationSettings, load_constellation
@@ -28,7 +25,7 @@ from harness.simulate.physics.coverage import (
 from harness.simulate.physics.room import Box, Room
 from harness.simulate.physics.sound import Sound
 from harness.simulate.simulation import exact_calibration
-from harness.stream.is900.codec.replies import Emitter
+from harness.stream.is900.codec import Emitter
 
 
 def cave(cone_deg: float = 70.0, range_m: float = 4.0) -> Constellation:

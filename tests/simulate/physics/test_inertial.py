@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, joint_offsets_m
+from harness.body import Body, joint_offsets_m
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, body_spec, build_body
+from harness.body import Body, body_spec, build_body
 from harness.core.arrays import Bools, Floats
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator

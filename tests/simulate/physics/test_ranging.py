@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body
+from harness.body import Body
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.simulate.physics.constellation import Constellation

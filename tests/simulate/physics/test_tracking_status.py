@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULT_MOUNTS
-from harness.body.retargeting import retarget_to_own_body
+from harness.body import DEFAULT_MOUNTS, retarget_to_own_body
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.mocap import synthetic

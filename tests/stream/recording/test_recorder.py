@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput
-from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment import Playback, prepare_playback
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.recorder import RecordingSwitch
 from harness.stream.recording.recording import read_recording

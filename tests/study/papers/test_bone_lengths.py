@@ -8,9 +8,8 @@ import pytest
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
 from harness.errors import BadInput
-from harness.mocap import synthetic
-from harness.mocap.sources import read_skeletons
-from harness.results.findings.paper_findings import BarChart, LineChart
+from harness.mocap import read_skeletons, synthetic
+from harness.results.findings import BarChart, LineChart
 from harness.study.papers.bone_lengths import (
     MODES,
     evaluate_bone_modes,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.results.findings.benchmark_statement import BenchmarkStatement, Verdict
+from harness.results.findings import BenchmarkStatement, Verdict
 from harness.study.papers.claims import (
     claim_all,
     claim_decreasing,

@@ -7,12 +7,10 @@ import pytest
 
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart, allowed_frames
-from harness.experiment.clip_evaluation import ClipEvaluation
-from harness.experiment.plan import check_names
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.findings.paper_findings import PaperFindings, read_findings, write_findings
-from harness.results.storage import open_study
+from harness.experiment import ClipEvaluation, check_names
+from harness.experiment.scenarios import load_scenario, open_scenario_motion
+from harness.results import open_study
+from harness.results.findings import PaperFindings, read_findings, write_findings
 from harness.study.papers.kim2012 import ARM_AND_SPINE, PAPER
 from harness.study.papers.paper_study import PaperStudy, run_scenarios
 from harness.study.papers.station_sets import format_station_set

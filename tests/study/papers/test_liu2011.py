@@ -12,12 +12,10 @@ import pytest
 from harness.core.seeds import generator
 from harness.core.split import ClipPart, allowed_frames
 from harness.errors import UnknownName
-from harness.experiment.plan import check_names
-from harness.experiment.scenarios.motion_source import open_scenario_motion
-from harness.experiment.scenarios.scenario_reader import load_scenario, shipped_scenarios
-from harness.results.cell import Cell
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.paper_findings import PaperExperiment
+from harness.experiment import check_names
+from harness.experiment.scenarios import load_scenario, open_scenario_motion, shipped_scenarios
+from harness.results import Cell
+from harness.results.findings import BenchmarkStatement, PaperExperiment
 from harness.study.papers.database_size import GRAPH, database_size, one_database, other_approaches
 from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
 from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs, frame_by_frame

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from harness.errors import Outcome
-from harness.experiment import engine
-from harness.experiment.scenarios.scenario_reader import load_scenario
+from harness.experiment import run
+from harness.experiment.scenarios import load_scenario
 from harness.mocap.synthetic import BEHAVIOURS
-from harness.results.reader import load_results
+from harness.results import load_results
 
 ORDERS = [
     ("dynamic_map", "local_pca", "ik"),  # Liu et al. 2011, Fig. 6
@@ -34,7 +34,7 @@ def test_the_order_of_both_papers_holds_on_unseen_motion(tmp_path: Path, inputs:
     )
     methods = tuple(dict.fromkeys(method for order in ORDERS for method in order))
     scenario = replace(gate, seed=23, motion=motion, methods=methods, inputs=(inputs,))
-    assert engine.run(scenario, tmp_path / "run", jobs=2) is Outcome.PASS
+    assert run(scenario, tmp_path / "run", jobs=2) is Outcome.PASS
     errors: dict[str, list[float]] = {method: [] for method in methods}
     for cell in load_results(tmp_path / "run").cells:
         errors[cell.method].append(float(cell.metrics["joint_angle_mean_deg"] or np.nan))

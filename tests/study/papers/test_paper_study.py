@@ -15,11 +15,10 @@ import pytest
 from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
-from harness.experiment.status import read_status
-from harness.results.files.digests import read_result_json, write_result_json
-from harness.results.files.folder_kind import folder_lock
-from harness.results.findings.paper_findings import BarChart, LineChart, PaperExperiment, read_findings
-from harness.results.storage import open_study
+from harness.experiment import read_status
+from harness.results import open_study
+from harness.results.files import folder_lock, read_result_json, write_result_json
+from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, run_scenarios
 from harness.study.papers.tables import errors_by_unit

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 import harness
-from harness.report.kit.statement_lines import MARKS
+from harness.report.kit import MARKS
 from harness.report.paper.page import KINDS
-from harness.results.findings.paper_findings import PaperExperiment
+from harness.results.findings import PaperExperiment
 from harness.study.papers.paper import PAPERS, load_paper
 from harness.study.papers.paper_study import PaperStudy
 

@@ -9,8 +9,8 @@ import pytest
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.package_data import data_folder
 from harness.core.skeleton import Skeleton
-from harness.results.findings.paper_findings import PaperExperiment
-from harness.stream.inputs import make_inputs
+from harness.results.findings import PaperExperiment
+from harness.stream import make_inputs
 from harness.study.papers.bone_lengths import evaluate_bone_modes
 from harness.study.papers.kim2012 import PAPER as KIM
 from harness.study.papers.liu2011 import PAPER as LIU

@@ -9,8 +9,8 @@ import pytest
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.reconstruct.database import MotionDatabase
-from harness.results.findings.paper_findings import BarChart
+from harness.reconstruct import MotionDatabase
+from harness.results.findings import BarChart
 from harness.study.papers import published_speed as module
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import (
@@ -164,7 +164,7 @@ def test_a_database_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     np.testing.assert_array_equal(first.posture, again.posture)
     assert not asked
     assert len(build_database(tmp_path, {"seed": 2}, takes)) == 60
-    monkeypatch.setattr("harness.study.speed.benchmark_clips.source_hash", lambda: "edited")
+    monkeypatch.setattr("harness.study.papers.published_speed.source_hash", lambda: "edited")
     assert len(build_database(tmp_path, {"seed": 1}, takes)) == 60
     assert asked == ["again", "again"]
 

@@ -8,7 +8,7 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadInput, Outcome
-from harness.results.findings.paper_findings import read_findings
+from harness.results.findings import read_findings
 from harness.study.papers.paper import PAPERS, load_paper, reproduce
 from harness.study.papers.paper_study import CLIPS, LONGEST_S, PaperStudy, count_cells, shorten_scenario
 from tests.study.papers.tiny import TINY, WALKS

@@ -9,7 +9,7 @@ import pytest
 
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
-from harness.results.findings.benchmark_statement import Verdict
+from harness.results.findings import Verdict
 from harness.study.papers import station_sets
 from harness.study.papers.kim2012 import PAPER
 from harness.study.papers.paper_study import PaperStudy

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.__main__ import main
-from harness.experiment.scenarios.scenario import Scenario
-from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.results.findings.paper_findings import PaperExperiment
+from harness.experiment.scenarios import Scenario, ScenarioMotion, load_scenario
+from harness.results.findings import PaperExperiment
 from harness.study.papers import paper as papers
 from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper import Paper

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
+from harness.body import Body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
-from harness.stream.frame import TrackerFrame
+from harness.stream import TrackerFrame
 
 NEEDED = "pelvis"
 

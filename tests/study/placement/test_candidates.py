@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.body.mounts import locate_mount
+from harness.body import locate_mount
 from harness.core import rotations
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.results.findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGrid,

@@ -10,19 +10,14 @@ import pytest
 
 import harness
 from harness.cli import main
-from harness.compare.units import Sampling
+from harness.compare import Sampling
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.experiment.status import read_status
-from harness.results.files.folder_kind import FINDINGS
-from harness.results.findings.placement_findings import (
-    PlacementFindings,
-    StatisticalPower,
-    read_placement,
-    write_placement,
-)
-from harness.results.storage import open_study
-from harness.simulate.link import TrackerConfig
+from harness.experiment import read_status
+from harness.experiment.scenarios import load_scenario
+from harness.results import open_study
+from harness.results.files import FINDINGS
+from harness.results.findings import PlacementFindings, StatisticalPower, read_placement, write_placement
+from harness.simulate import TrackerConfig
 from harness.study.placement import placement_study
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import run_placement

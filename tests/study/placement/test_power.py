@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from harness.compare.significance import SIGNIFICANCE, count_needed, sign_flip_p
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.compare import SIGNIFICANCE, count_needed, sign_flip_p
+from harness.results.findings import CandidatePlace
 from harness.study.placement.power import (
     POWER,
     choose_pilot,

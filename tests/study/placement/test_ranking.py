@@ -5,11 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from harness.compare.significance import count_needed
+from harness.compare import count_needed
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.findings.benchmark_statement import BenchmarkStatement
-from harness.results.findings.placement_findings import StationNames
+from harness.results.findings import BenchmarkStatement, StationNames
 from harness.study.placement.candidates import Candidate, make_candidate_groups
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.ranking import (

@@ -6,7 +6,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.findings.placement_findings import CandidatePlace
+from harness.results.findings import CandidatePlace
 from harness.study.placement.candidates import (
     Candidate,
     CandidateGroup,

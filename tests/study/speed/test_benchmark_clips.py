@@ -5,8 +5,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.reconstruct import registry
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct import MotionDatabase, make_method
 from harness.study.speed import benchmark_clips
 
 
@@ -40,7 +39,7 @@ def test_takes_of_a_database_are_its_motion(learnt: MotionDatabase) -> None:
 
 def test_a_method_takes_what_it_is_given(learnt: MotionDatabase) -> None:
     learner = benchmark_clips.fit_method(
-        registry.make_method("ik"), benchmark_clips.build_common_body(), learnt, generator(1, "test")
+        make_method("ik"), benchmark_clips.build_common_body(), learnt, generator(1, "test")
     )
     trial = benchmark_clips.generate_held_out_clips(1, 1.0)[0]
     session = learner.begin(trial.simulation.calibration)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.reconstruct.database import MotionDatabase
-from harness.stream.frame import TrackerFrame
+from harness.reconstruct import MotionDatabase
+from harness.stream import TrackerFrame
 from harness.study.speed import benchmark_clips, round_robin_timing
 from harness.study.speed.benchmark_clips import WARM_UP_FRAMES, BenchmarkClip
 from harness.study.speed.round_robin_timing import (

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.experiment.playback import prepare_playback
-from harness.stream.recording.recording import record_capture
+from harness.experiment import prepare_playback
+from harness.stream.recording import record_capture
 from harness.study.trust.plan import plan_digest
 
 CLIPS = ("walking_p1_01", "walking_p2_01", "boxing_p1_01", "boxing_p2_01", "jumping_p1_01", "golf_p1_01")

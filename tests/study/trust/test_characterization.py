@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from harness.bench.lab.captures import planted_capture
-from harness.measure.unit_file import UnitFile
-from harness.stream.recording.station_readings import CaptureReader
+from harness.measure import UnitFile
+from harness.stream.recording import CaptureReader
 from harness.study.trust.characterization import (
     DEFAULT_KEPT,
     Characterization,

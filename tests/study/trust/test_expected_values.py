@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from harness.compare.significance import holm
+from harness.compare import holm
 from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.errors import BadInput
-from harness.measure.unit_file import UnitFile
-from harness.simulate.noise import Noise, noise_preset
+from harness.measure import UnitFile
+from harness.simulate import Noise, noise_preset
 from harness.study.trust.characterization import (
     check_departures,
     flatten_components,

@@ -10,10 +10,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.experiment.observed_take import ObservedTake, simulated_take
-from harness.experiment.playback import prepare_playback
-from harness.score.loops import LoopFrames
-from harness.stream.frame import TrackerFrame
+from harness.experiment import ObservedTake, prepare_playback, simulated_take
+from harness.score import LoopFrames
+from harness.stream import TrackerFrame
 from harness.study.trust.reading_errors import (
     CORRELATION_TIMES,
     MOST_ROWS,

@@ -14,14 +14,12 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.methods.remote_method import run_over_frames
-from harness.experiment.playback import prepare_playback
-from harness.measure.unit_file import UnitFile, write_unit_file
-from harness.results.files.digests import read_result_json, write_result_json
-from harness.results.files.folder_kind import FINDINGS, folder_lock
-from harness.results.findings.trust_findings import Equivalence, PairAgreement, SideDifference
-from harness.stream.recording.blocks import NOTE, RecordingBlock, encode_block
-from harness.stream.recording.recording import record_capture
+from harness.experiment import prepare_playback
+from harness.experiment.methods import run_over_frames
+from harness.measure import UnitFile, write_unit_file
+from harness.results.files import FINDINGS, folder_lock, read_result_json, write_result_json
+from harness.results.findings import Equivalence, PairAgreement, SideDifference
+from harness.stream.recording import NOTE, RecordingBlock, encode_block, record_capture
 from harness.study.trust.arm_results import Arm, TrustTask, read_cell_errors, run_capture
 from harness.study.trust.characterization import preset_components
 from harness.study.trust.plan import plan_digest

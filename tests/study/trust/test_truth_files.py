@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadFile, BadInput
-from harness.measure.pose_series import TruthPoses
-from harness.mocap.read.c3d import MarkerClip
-from harness.mocap.write.export import export_motion
-from harness.score.pair import compute_poses
-from harness.stream.frame import TrackerFrame
-from harness.stream.station_counts import FRAME_COLUMNS, format_csv_row, frame_rows
+from harness.measure import TruthPoses
+from harness.mocap import MarkerClip
+from harness.mocap.write import export_motion
+from harness.score import compute_poses
+from harness.stream import FRAME_COLUMNS, TrackerFrame, format_csv_row, frame_rows
 from harness.study.trust.truth_files import read_csv, read_truth_file, read_tum, truth_of_markers
 from tests.mocap.write.test_export import NAMES, SKELETON, Written, arbitrary_motion, joints_m
 

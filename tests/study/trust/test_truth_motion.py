@@ -5,20 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.kinematics import bone_poses
+from harness.body import bone_poses
 from harness.core import rotations
 from harness.core.humanoid24 import BONES
 from harness.errors import BadFile, BadInput
-from harness.experiment.playback import Playback, prepare_playback
-from harness.experiment.scenarios.scenario_reader import load_scenario
-from harness.measure.pose_series import MeasuredPoses, TruthSpline
-from harness.measure.registration import register_poses
+from harness.experiment import Playback, prepare_playback
+from harness.experiment.scenarios import load_scenario
+from harness.measure import MeasuredPoses, TruthSpline, register_poses
 from harness.mocap import synthetic
-from harness.simulate.loop import loop_motion, simulate_loop
-from harness.simulate.noise import Noise
-from harness.simulate.simulation import exact_calibration
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.station_readings import CaptureReader
+from harness.simulate import Noise, exact_calibration, loop_motion, simulate_loop
+from harness.stream.recording import CaptureReader, record_capture
 from harness.study.trust.capture_readings import measured_poses, read_capture
 from harness.study.trust.truth_motion import common_names, truth_of_capture, truth_of_clip, truth_of_playback
 

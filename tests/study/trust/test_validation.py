@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, NotComparable, Outcome, UnknownName
-from harness.experiment.playback import Playback, prepare_playback
-from harness.measure.gauss_markov import ErrorProcess
-from harness.measure.registration import StationResiduals
-from harness.measure.unit_file import UnitFile
-from harness.simulate.simulation import TrackerConfig
-from harness.stream.recording.recording import record_capture
-from harness.stream.recording.station_readings import CaptureReader
+from harness.experiment import Playback, prepare_playback
+from harness.measure import ErrorProcess, StationResiduals, UnitFile
+from harness.simulate import TrackerConfig
+from harness.stream.recording import CaptureReader, record_capture
 from harness.study.trust.capture_readings import CaptureReadings, read_capture
 from harness.study.trust.characterization import preset_components
 from harness.study.trust.truth_motion import TruthMotion

@@ -18,7 +18,7 @@ from harness.stream.is900.codec.commands import (
     parse_command,
     station_command,
 )
-from harness.stream.is900.driver import DriverConfig
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.emulator.config import EmulatorConfig
 from tests.stream.is900.driver.bench import NAMES, Bench, EmulatedDevice, frames_for, make_samples
 from tests.stream.is900.emulator.played import DeviceSession

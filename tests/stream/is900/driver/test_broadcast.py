@@ -16,14 +16,17 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadInput
-from harness.experiment.playback import prepare_playback
+from harness.experiment import prepare_playback
 from harness.stream.is900.codec.datagram import Datagram, parse_datagram
 from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver import DriverConfig, DriverTiming, Is900Broadcast, LineEvent, open_tracker
+from harness.stream.is900.driver.broadcast import Is900Broadcast
+from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.is900 import open_tracker
 from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
-from harness.stream.is900.emulator.server import EmulatorServer
+from harness.stream.is900.emulator.config import EmulatorConfig
+from harness.stream.is900.emulator.server import EmulatorServer, serve_emulator
 from harness.stream.is900.emulator.udp_broadcast import parse_udp_address
+from harness.stream.line_events import LineEvent
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream

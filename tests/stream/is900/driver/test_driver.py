@@ -15,10 +15,12 @@ import pytest
 
 from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.driver import DriverConfig, DriverTiming, Is900, LineEvent
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.is900 import Is900
+from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.faults import Fault
-from harness.stream.is900.emulator.server import EmulatorServer
+from harness.stream.is900.emulator.server import EmulatorServer, serve_emulator
+from harness.stream.line_events import LineEvent
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts
 from tests.stream.is900.driver.bench import make_samples

@@ -14,7 +14,7 @@ from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 from harness.stream.is900.codec.replies import parse_reply
-from harness.stream.is900.driver import DriverConfig
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.session_settings import STATION_SETTINGS
 from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.faults import Fault

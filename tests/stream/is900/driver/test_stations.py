@@ -11,8 +11,8 @@ from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.reader import FrameReader, WireFormat
 from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver import DriverConfig, Is900
-from harness.stream.is900.driver.config import DriverTiming
+from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.is900 import Is900
 from harness.stream.is900.driver.stations import StationWatch
 from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.recording.recording import RecordingWriter, read_recording

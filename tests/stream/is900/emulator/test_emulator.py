@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.simulate.link import TrackerConfig, transmit
+from harness.simulate import TrackerConfig, transmit
 from harness.stream.is900.emulator.device_state import Message
 from harness.stream.is900.emulator.emulator import MAX_QUEUED_REPLIES, SerialLine
 

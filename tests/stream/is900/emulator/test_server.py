@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput
-from harness.experiment.playback import Playback, prepare_playback
+from harness.experiment import Playback, prepare_playback
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec import commands
 from harness.stream.is900.codec.items import record_type
 from harness.stream.is900.codec.reader import FrameReader, WireFormat
 from harness.stream.is900.driver.transport import Transport, open_transport
-from harness.stream.is900.emulator import EmulatorConfig, serve_emulator
+from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.device_state import Message, SentMessage
-from harness.stream.is900.emulator.server import ServerCounts
+from harness.stream.is900.emulator.server import ServerCounts, serve_emulator
 from tests.stream.is900.emulator.played import DeviceSession
 
 TIMEOUT_S = 120.0
