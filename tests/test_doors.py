@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +28,7 @@ LOOKS_INSIDE = {
     "scored_run.py": "makes the identity of a cell as the results do",
     "compare/sides.py": "makes the columns of a table as the results do",
     "fuzz/mending.py": "mends digests, so that a damaged file is read further",
+    "experiment/evil_methods.py": "methods that try to replace functions of the score",
     "core/test_cache_folder.py": "the cache of a method's files is one of the folders that are found",
 }
 """Tests that look inside other folders, and why."""
@@ -98,10 +100,12 @@ def test_a_door_is_narrow_and_its_names_can_be_used(door: str) -> None:
 @pytest.mark.parametrize("door", DOORS)
 def test_every_name_of_a_door_is_used_by_others(door: str) -> None:
     own = door.split(".")[1]
-    sources = {*PACKAGE.rglob("*.py"), *TESTS.rglob("*.py"), *(TESTS.parent / "examples").rglob("*.py")}
-    used = set[str]()
+    root = TESTS.parent
+    sources = {*PACKAGE.rglob("*.py"), *TESTS.rglob("*.py"), *(root / "examples").rglob("*.py")}
+    pages = "".join(page.read_text(encoding="utf-8") for page in (root / "docs").glob("*.md"))
+    used = set(re.findall(rf"from {re.escape(door)} import (\w+)$", pages, re.MULTILINE))
     for file in sources:
-        folder = file.relative_to(TESTS.parent).parts[1]
+        folder = file.relative_to(root).parts[1]
         if folder == own:
             continue
         used |= {name for module, name in imports(file) if module == door and name}

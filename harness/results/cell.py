@@ -182,6 +182,7 @@ class Cell:
 
 
 def cell_folder(out: Path, key: str) -> Path:
+    """The folder of a cell, finished or not."""
     return out / "cells" / key
 
 

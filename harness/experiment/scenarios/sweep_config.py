@@ -62,6 +62,7 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
 
 
 def shipped_sweeps() -> list[Path]:
+    """The files of the shipped sweeps."""
     return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
