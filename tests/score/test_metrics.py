@@ -362,6 +362,10 @@ def test_input_that_makes_no_sense_is_refused(truth_qpos: Floats) -> None:
         score_estimate(SKELETON, RATE_HZ, truth_qpos, truth_qpos, rows, rows * 0, zeros[1:])
     with pytest.raises(ShapeError, match="estimate_qpos"):
         score_estimate(SKELETON, RATE_HZ, truth_qpos, truth_qpos[:, :54], rows, rows * 0, zeros)
+    with pytest.raises(ShapeError, match=r"angle_sigma_rad.*\(400, 47\).*\(400, 48\)"):
+        score_estimate(
+            SKELETON, RATE_HZ, truth_qpos, truth_qpos, rows, rows * 0, zeros, angle_sigma_rad=np.ones((FRAMES, 47))
+        )
     with pytest.raises(BadInput, match="truth"):
         score_estimate(SKELETON, RATE_HZ, truth_qpos * np.nan, truth_qpos, rows, rows * 0, zeros)
 

@@ -14,6 +14,7 @@ from scipy import stats
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
+from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.faults import LostStation, OrientationOffset, PositionOffset
 from harness.simulate.components.mount import MountOffset, MountSlip
@@ -424,3 +425,12 @@ def test_a_session_offset_turns_with_its_station(still: Still) -> None:
     shift_m = shifted(true, seen)
     np.testing.assert_allclose(shift_m[10:], np.roll(shift_m[:10], 1, axis=2), atol=1e-12)
     assert np.abs(shift_m[10:] - shift_m[:10]).max() > 1e-4
+
+
+def test_draws_are_named_by_take_or_session_component_and_station(still: Still) -> None:
+    """Other names would be other errors at the same seed."""
+    alone = still(1.0, seed=4)
+    shared = dataclasses.replace(alone, session="day")
+    for readings, take, session in ((alone, "still", "still"), (shared, "still", "day")):
+        draws = readings.take_rng("bias", "s1").random(), readings.session_rng("bias", "s1").random()
+        assert draws == tuple(generator(4, "noise", name, "bias", "s1").random() for name in (take, session))

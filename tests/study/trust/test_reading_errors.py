@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from harness.score import LoopFrames
 from harness.stream import TrackerFrame
 from harness.study.trust.reading_errors import (
     CORRELATION_TIMES,
+    FEATURES,
     MOST_ROWS,
     HealthCounts,
     compare_errors,
@@ -23,6 +26,7 @@ from harness.study.trust.reading_errors import (
     label_blocks,
     reading_errors,
 )
+from harness.study.trust.trust_study import _compare_readings
 
 
 @pytest.fixture(scope="module")
@@ -235,3 +239,25 @@ def test_permuting_blocks_keeps_the_level_on_correlated_noise_and_permuting_samp
     assert blocks <= 12  # 5 % of 100, and three standard deviations
     assert samples >= 40
     assert louder >= 90
+
+
+def test_a_station_with_other_errors_is_told_from_one_with_the_same() -> None:
+    """Of two stations the second errs twice as much on the simulated side; Holm's correction is over all four rows."""
+    rng = generator(1, "errors of readings")
+
+    def arm() -> Any:
+        sides = [
+            {name: [rng.normal(size=(300, 2, 3)) * [[1.0], [more]] for _ in "ab"] for name in FEATURES}
+            for more in (1.0, 2.0)
+        ]
+        return SimpleNamespace(stations=("head", "chest"), rate_hz=40.0, readings=sides)
+
+    rows = _compare_readings([arm()])
+    assert [(row.station, row.feature, row.unit) for row in rows] == [
+        (station, name, unit) for station in ("head", "chest") for name, unit in FEATURES.items()
+    ]
+    assert [row.p_holm is not None and row.p_holm < 0.05 for row in rows] == [False, False, True, True]
+    few: Any = SimpleNamespace(
+        stations=("head",), rate_hz=40.0, readings=[{name: [np.zeros((4, 1, 3))] for name in FEATURES}] * 2
+    )
+    assert all(row.p is None and row.p_holm is None for row in _compare_readings([few]))
