@@ -127,6 +127,31 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     assert not left, f"circles among {sorted(left)}"
 
 
+FLOORS = {
+    **{"view": 3, "commands": 3, "body": 4, "testing": 4, "bench": 5, "core": 5, "live": 5, "compare": 6, "score": 6},
+    **{"calibrate": 7, "measure": 7, "mocap": 7, "results": 7, "study": 8, "report": 9, "simulate": 9},
+    **{"experiment": 10, "reconstruct": 11, "stream": 13},
+}
+"""Most floors of a folder: a file stands one floor above the highest file of its folder that it imports."""
+
+
+@pytest.mark.parametrize("folder", sorted(FOLDERS))
+def test_a_folder_has_no_more_floors(folder: str) -> None:
+    files = {
+        name: file
+        for name, file in modules().items()
+        if name.startswith(f"harness.{folder}.") and file.name != "__init__.py"
+    }
+
+    @cache
+    def floor(name: str) -> int:
+        return 1 + max(
+            (floor(other) for other in imports_of(files[name]) if other in files and other != name), default=0
+        )
+
+    assert max(map(floor, files)) <= FLOORS[folder]
+
+
 def class_names() -> Iterator[tuple[str, str]]:
     for name, file in modules().items():
         yield from ((node.name, name) for node in ast.walk(tree_of(file)) if isinstance(node, ast.ClassDef))

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         retarget_with_same_angles,
     )
     from harness.body.soft_tissue import THICKNESS_M, tissue_thickness_m
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from harness.calibrate.poses import POSES, CalibrationPose, pose_configuration
     from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
     from harness.calibrate.tpose_calibration import calibrate_tpose
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, shared_clips, split_by_lag
     from harness.compare.significance import SIGNIFICANCE, Verdict, count_needed, decide_verdicts, holm, sign_flip_p
     from harness.compare.units import BY_NAME, Sampling, average_units, count_clips, count_units
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from harness.experiment.simulated_calibration import TrackerSession
     from harness.experiment.status import RunStatus, read_status
     from harness.experiment.tasks import ClipTask, PlannedCell, cell_names, plan_tasks
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

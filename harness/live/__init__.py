@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

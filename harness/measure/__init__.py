@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from harness.measure.rigid_pair import RigidPair
     from harness.measure.timing import TIMING_KEYS
     from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

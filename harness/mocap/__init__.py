@@ -22,7 +22,6 @@ if TYPE_CHECKING:
         open_motion_source,
         read_skeletons,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
         library_folders,
         source_hash,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

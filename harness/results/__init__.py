@@ -42,7 +42,6 @@ if TYPE_CHECKING:
         write_summary,
     )
     from harness.results.table import TIME_COLUMNS, compute_group_statistics, write_table
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from harness.score.score import Scores, score_estimate
     from harness.score.timing import step_relative, step_times_ms
     from harness.score.uncertainty import SIGMA_DEFINITIONS, SigmaSums, in_skeleton_order, score_sigma, sum_sigma
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
         transmit_readings,
     )
     from harness.simulate.trajectory import Trajectory
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

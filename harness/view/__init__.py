@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from harness.view.movie import MOST_METHODS, MOVIE_SUFFIXES, MoviePart, check_movie, write_movie
     from harness.view.page import ViewedMotion, ViewerContent, write_page
     from harness.view.server import COMMAND_HEADER, EVENTS_PATH, Resource, ViewServer
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

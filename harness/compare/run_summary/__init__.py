@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from harness.compare.run_summary.expected_orders import DECIMALS, ExpectedOrder
     from harness.compare.run_summary.recovery import MAX_RECOVERED_RATIO, SETTLING_S, WINDOW_S, tabulate_recovery
     from harness.compare.run_summary.run_statistics import GROUP_KEYS, compute_run_statistics
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

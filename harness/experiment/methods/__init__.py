@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         run_over_frames,
     )
     from harness.experiment.methods.worker_process import close_fork_server
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

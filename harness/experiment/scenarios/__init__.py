@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         shipped_scenarios,
     )
     from harness.experiment.scenarios.sweep_config import Sweep, expand_sweep, load_sweep, shipped_sweeps
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -6,7 +6,6 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.experiment.workers.executors import TaskExecutor, dask_executor, process_executor, run_in_process
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

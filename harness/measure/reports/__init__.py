@@ -28,7 +28,6 @@ if TYPE_CHECKING:
         estimated_poses,
         residual_series,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

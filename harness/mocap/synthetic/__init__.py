@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         stretch_marks,
         take_names,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

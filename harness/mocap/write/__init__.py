@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from harness.mocap.write.bvh import bvh_files, channel_values, format_row, hierarchy_lines
     from harness.mocap.write.export import EXPORT_FORMATS, export_motion
     from harness.mocap.write.posed_motion import PosedMotion, pose_truth_and_estimate
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from harness.reconstruct.index.inverted_file import cells_for, probes_for
     from harness.reconstruct.index.protocol import ArrayVectors, Lookup, Vectors
     from harness.reconstruct.index.selection import AUTO_INDEX, FLAT_MAX_VECTORS, INDEXES, best_index, make_index
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

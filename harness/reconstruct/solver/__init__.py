@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from harness.reconstruct.solver.outlier_gate import OutlierGate
     from harness.reconstruct.solver.residuals import Loss, Residuals
     from harness.reconstruct.solver.status_monitor import StatusMonitor
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

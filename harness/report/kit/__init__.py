@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from harness.report.kit.render_process import RenderJob, RenderProcess, finish_renderer, start_renderer
     from harness.report.kit.statement_lines import MARKS, format_statements
     from harness.report.kit.text import last_line, to_file_name
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

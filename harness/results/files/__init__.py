@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         compute_digests,
         read_summary_json,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -48,7 +48,6 @@ if TYPE_CHECKING:
         TrustCapture,
         TrustFindings,
     )
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from harness.simulate.physics.schedule import Schedule
     from harness.simulate.physics.settings import Physics
     from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
     from harness.stream.is900.emulator.tcp_port import TcpPort
     from harness.stream.is900.emulator.udp_broadcast import LOOPBACK, UdpPort, parse_udp_address
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

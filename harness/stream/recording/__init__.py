@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     )
     from harness.stream.recording.replay import RecordingStream, parse_speed
     from harness.stream.recording.station_readings import CaptureBlock, CaptureReader, StationReadings
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     )
     from harness.stream.is900.codec.replies import Emitter, parse_reply
     from harness.stream.is900.codec.samples import DeviceSamples, FilterSamples
-
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
