@@ -230,7 +230,7 @@ def test_motion_that_is_over_counts_no_more() -> None:
 GUIDED = """
 import sys
 from pathlib import Path
-from harness.stream.is900.driver import DriverConfig
+from harness.stream.is900 import DriverConfig
 from harness.stream.recording.guided_capture import Stretch, capture_stretches
 stretches = [Stretch("static", 1.5, "rest", True), Stretch("covered", 1.0, "cover", True)]
 capture_stretches(sys.argv[1], DriverConfig(), Path(sys.argv[2]), stretches, {}, ready=lambda: True)

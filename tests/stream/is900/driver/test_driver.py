@@ -154,7 +154,7 @@ def test_the_driver_can_be_closed_while_it_reconnects(serve: Serve) -> None:
 
 CLIENT = """
 import sys
-from harness.stream.is900.driver import Is900
+from harness.stream.is900 import Is900
 try:
     with Is900(sys.argv[1]) as stream:
         for frame in stream:
