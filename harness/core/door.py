@@ -1,11 +1,8 @@
 """The door of a folder: its public names, each imported when it is first used (PEP 562)."""
 
-import ast
 import sys
 from collections.abc import Callable
 from functools import cache
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 
@@ -14,9 +11,14 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
 
     Type checkers read the block as it stands, and the program reads its source. A name is looked up at each
     use, so that it is always what its module has.
+
+    The import of `harness` itself comes before the working folder is off the import path. Hence this module imports
+    nothing else before a name is used.
     """
 
     def load_name(name: str) -> Any:
+        from importlib import import_module
+
         place = None if name.startswith("__") and name != "__version__" else door_names(package).get(name)
         if place is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
@@ -29,7 +31,10 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
 @cache
 def door_names(package: str) -> dict[str, tuple[str, str]]:
     """Each name of a door -> the module that defines it, and its name there."""
-    source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
+    import ast
+
+    with open(str(sys.modules[package].__file__), encoding="utf-8") as file:
+        source = file.read()
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If)]
     return {
         alias.asname or alias.name: (str(node.module), alias.name)
