@@ -23,7 +23,7 @@ from harness.reconstruct import make_method
 from harness.testing.frames import exact_calibration, swaying_motion
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_more_than_one_true_reading_in_a_thousand_is_rejected_on_synthetic_motion() -> None:
     rows = bench_rejected_readings(seed=3, frames=2000, clip_s=8.0)
     assert len(rows) == len(GATED_METHODS)

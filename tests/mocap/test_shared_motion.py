@@ -192,7 +192,7 @@ FIFTHS = [(start / 5, (start + 1) / 5) for start in range(5)]
 
 
 @pytest.mark.parametrize(
-    "behaviour", [b if b == "golf" else pytest.param(b, marks=pytest.mark.long) for b in synthetic.BEHAVIOURS]
+    "behaviour", [b if b == "golf" else pytest.param(b, marks=pytest.mark.slow) for b in synthetic.BEHAVIOURS]
 )
 def test_takes_of_the_motion_generator_are_apart(behaviour: str) -> None:
     """Takes and seeds of four people: copies differ by less than half the threshold, takes by more than twice."""

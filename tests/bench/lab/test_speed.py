@@ -26,7 +26,7 @@ def test_a_long_capture_goes_on_from_part_to_part(tmp_path: Path, monkeypatch: p
         assert np.allclose(np.diff(measured_s), 1.0 / 120.0, atol=1e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_cost_of_a_verb_is_that_of_its_own_process(tmp_path: Path) -> None:
     capture = planted_capture("clock", 1001, tmp_path, seconds=30.0)
     cpu_s, peak_bytes = measure_verb("characterize", capture)

@@ -179,8 +179,8 @@ def walker_coverage(seed: int) -> dict[str, StationCoverage]:
     return out
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
 def test_stations_of_walkers_hear_three_emitters_of_hall(seed: int) -> None:
     coverage = walker_coverage(seed)
     assert set(coverage) == set(synthetic.REFERENCE_PERFORMERS)

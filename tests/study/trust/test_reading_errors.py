@@ -223,7 +223,7 @@ def test_many_rows_are_thinned_evenly() -> None:
     assert 0.2 < found.distance < 0.8
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_permuting_blocks_keeps_the_level_on_correlated_noise_and_permuting_samples_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -392,7 +392,7 @@ def test_no_rate_is_told_before_it_is_known() -> None:
     assert np.abs(np.array(rates_hz) - 50.0).max() < 10.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_times_strictly_increase_in_three_minutes_of_faults() -> None:
     """All faults of the emulator, at random, behind an adapter that holds bytes back."""
     scenario = load_scenario("emulator_faults")
