@@ -239,7 +239,7 @@ def test_the_api_reference_has_every_door() -> None:
     pages = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.md")}
     text, config = "".join(pages.values()), (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     for door in DOORS:
-        assert f"::: {door}\n    options:\n      show_submodules: false\n      summary: true\n" in text, door
+        assert f"::: {door}\n    options:\n      show_submodules: false\n" in text, door
     for package in ("core", "testing"):
         assert f"::: harness.{package}\n" in pages[package]
     assert "show_submodules: true" in config
