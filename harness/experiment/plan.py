@@ -5,7 +5,7 @@ Names that do not exist are refused here, before anything is written and hours o
 
 import difflib
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -13,11 +13,11 @@ from typing import Any, Literal
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
-from harness.experiment.methods.method_table import MethodTable
+from harness.experiment.methods.method_table import MethodTable, find_methods
 from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
 from harness.experiment.scenarios.scenario import Scenario
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
-from harness.experiment.scenarios.tracker_setup import TrackerSetup
+from harness.experiment.scenarios.tracker_checks import check_trackers
 from harness.experiment.tasks import ClipTask, cell_names, plan_tasks, split_task
 from harness.mocap import LibraryFolders, MotionSource
 from harness.results import Manifest, describe_run
@@ -92,8 +92,8 @@ def plan_sweep(name: str, scenarios: Sequence[Scenario], options: RunOptions) ->
         scenario.label: {key: value for key, value in scenario.content().items() if key not in _CIRCUMSTANCE_KEYS}
         for scenario in scenarios
     }
-    methods = list(dict.fromkeys(method for scenario in scenarios for method in scenario.methods))
-    return _plan("sweep", name, {"sweep": name, "scenarios": inputs, "methods": methods}, tuple(scenarios), options)
+    content = {"sweep": name, "scenarios": inputs, "methods": _method_names(scenarios)}
+    return _plan("sweep", name, content, tuple(scenarios), options)
 
 
 def plan_cells(
@@ -103,7 +103,7 @@ def plan_cells(
 
     Without `labelled`, names of cells leave out the scenario.
     """
-    methods = methods or _find_methods(scenarios, options.isolation)
+    methods = methods or find_methods(_method_names(scenarios), options.isolation)
     names = [name for scenario in scenarios for name in cell_names(scenario, labelled=labelled)]
     if len(set(names)) < len(names):
         twice = next(name for place, name in enumerate(names) if name in names[:place])
@@ -159,9 +159,9 @@ def check_names(
     variants = [variant for scenario in scenarios for _, variant in scenario.variants()]
     for variant in variants:
         _check_clips(variant.motion, open_scenario_motion(variant.motion, folder, variant.seed))
-    methods = _find_methods(scenarios, isolation)
-    for v in variants:
-        TrackerSetup(tuple(v.stations), v.nominal_mounts, v.inputs, v.device, v.disturbed_noise)
+    methods = find_methods(_method_names(scenarios), isolation)
+    for variant in variants:
+        check_trackers(variant)
     return methods
 
 
@@ -171,5 +171,5 @@ def _check_clips(motion: ScenarioMotion, source: MotionSource) -> None:
         source.check(name)
 
 
-def _find_methods(scenarios: Collection[Scenario], isolation: Isolation) -> MethodTable:
-    return MethodTable(tuple(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)), isolation)
+def _method_names(scenarios: Iterable[Scenario]) -> list[str]:
+    return list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods))

@@ -31,6 +31,10 @@ class CellStore:
     """Cell -> its outcome, without the row, which is in the index."""
     _made: int = 0
 
+    def __post_init__(self) -> None:
+        (self.out / "cells").mkdir(exist_ok=True)
+        self._count = ProgressCount(self.out, lambda last, ended: self.progress(last, ended, len(self.plan.names)))
+
     @property
     def stop(self) -> Path:
         """The file that asks workers to stop."""
@@ -42,7 +46,6 @@ class CellStore:
 
         The first Ctrl-C makes the file `stop`, see `graceful_stop`.
         """
-        (self.out / "cells").mkdir(exist_ok=True)
         remove_leftovers(self.out)
         index, names, sources = self.index, self.plan.names, self.plan.sources
         index.expect(names)
@@ -50,7 +53,6 @@ class CellStore:
         same, failed = index.facts().get("sources") == sources, index.failures()
         index.reset([name for name in names if name in failed] if same else names)
         index.note(sources=sources, started_s=time.time(), made=0)
-        self._count = ProgressCount(self.out, lambda last, ended: self.progress(last, ended, len(names)))
         self.progress("", 0, len(names))  # a bar is there while the first cells compile
         try:
             with graceful_stop(self.stop):

@@ -60,8 +60,8 @@ class FileAudit:
         self._folders: tuple[Path, ...] | None = None
         self._states: dict[str, tuple[int, ...]] = {}
         self._declared: set[str] = set()
-        audit_environment(self._hear_variable)
-        sys.addaudithook(self._hear)
+        audit_environment(self._note_variable)
+        sys.addaudithook(self._note_event)
 
     def cover(self, source: SourceFiles, variables: set[str]) -> None:
         """Watch the folders of a method from now on, and look at what was read before."""
@@ -73,10 +73,10 @@ class FileAudit:
                 if not _is_machine_code(path):  # of another installed package, as far as was known
                     self._check(path, state)
             for name, file in self._variables.items():
-                self._hear_variable(name, file)
+                self._note_variable(name, file)
         self._opened.clear()
 
-    def _hear(self, event: str, arguments: tuple[object, ...]) -> None:
+    def _note_event(self, event: str, arguments: tuple[object, ...]) -> None:
         if event not in _EVENTS:
             return
         for path in _paths_read(event, arguments):
@@ -89,7 +89,7 @@ class FileAudit:
             else:
                 self._check(path, _file_state(path))
 
-    def _hear_variable(self, name: str, file: str) -> None:
+    def _note_variable(self, name: str, file: str) -> None:
         if self._folders is None:
             self._variables.setdefault(name, file)
         elif name not in self._declared and os.path.isabs(file) and self._is_own(file):

@@ -119,7 +119,7 @@ class _LineServer:
                 if pty.master in ready:
                     self._take_commands(pty.read())
             except LineLost as lost:
-                self._lose_line(lost)
+                self._end_line(lost)
             if self._line is None:
                 self._reopen()
             waiting = pty.flush()
@@ -204,7 +204,7 @@ class _LineServer:
             transport.set_baud(baud)
             self._log(f"the program has set {baud} baud")
 
-    def _lose_line(self, lost: LineLost) -> None:
+    def _end_line(self, lost: LineLost) -> None:
         if self._line is not None:
             self._line.transport.close()
         self._line = self._transport = None
