@@ -20,9 +20,14 @@ pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
 OWN = build_body().skeleton
 
 
+def finished_pictures(folder: Path) -> list[Path]:
+    """The pictures of a folder. One that the viewer was writing when it was killed has a temporary name."""
+    return sorted(folder.glob("[0-9]*.png"))
+
+
 def wait_for(pictures: int, folder: Path) -> list[Path]:
     until_s = time.monotonic() + 60.0
-    while len(found := sorted(folder.glob("*.png"))) < pictures and time.monotonic() < until_s:
+    while len(found := finished_pictures(folder)) < pictures and time.monotonic() < until_s:
         time.sleep(0.02)
     return found
 
@@ -47,7 +52,7 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
             shown.send(live_pose(qpos))
     finally:
         shown.close()
-    found = sorted((tmp_path / "frames").glob("*.png"))
+    found = finished_pictures(tmp_path / "frames")
     assert found[0].name == "00000000.png"
     assert len(found) < 500  # most poses were never drawn, and none was waited for
     first, last = imread(found[0]), imread(found[-1])
