@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from harness.results.findings import PlacementFindings, StatisticalPower
     from harness.study.placement.question import PlacementQuestion
 
-_QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "physics", "minutes", "clips", "seed")
+_QUESTION_FLAGS = (
+    *("stations", "behaviour", "places", "with", "cost", "symmetric", "method", "second_method", "split", "noise"),
+    *("physics", "baud", "effort", "minutes", "clips", "seed"),
+)
 _EXAMPLE = "harness placement --stations 3 --behaviour table_tennis"
 
 
@@ -35,16 +38,30 @@ def add_placement(verbs: Verbs) -> None:
     question.add_argument("--behaviour", metavar="A,B", help=text)
     text = "places to choose from (default: one on each of eleven segments; `harness list places` names all)"
     question.add_argument("--places", metavar="A,B", help=text)
+    text = "stations that are worn in any case, such as head,left_hand; --stations counts them too"
+    question.add_argument("--with", metavar="A,B", help=text)
+    text = "costs of places, such as head=2,wrist=1 (default 1 each; wrist is either wrist): shows error against cost"
+    question.add_argument("--cost", type=parse_costs, metavar="A=N,B=N", help=text)
+    text = "left and right are one place: both sides are worn or neither, which counts as two stations"
+    question.add_argument("--symmetric", action="store_true", default=None, help=text)
     question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
+    text = "a method that the answer is repeated with, or none (default ik; ridge for ik itself)"
+    question.add_argument("--second-method", metavar="NAME", help=text)
+    text = "subject: methods learn from other performers than those tested (default sequence: from other takes)"
+    question.add_argument("--split", choices=["sequence", "subject"], help=text)
     text = "noise preset of the tracker (default: default)"
     question.add_argument("--noise", choices=["clean", "noise", "default"], help=text)
     text = (
         "simulate ultrasound, line of sight and inertia under this constellation, such as hall (default: noise alone)"
     )
     question.add_argument("--physics", metavar="NAME", help=text)
-    text = "budget of time, which limits sets and clips (default 10)"
+    text = "rate of the serial line, which limits the frames of many stations (default 115200)"
+    question.add_argument("--baud", type=positive_int, metavar="N", help=text)
+    text = "how thoroughly sets are searched, as a number of cells (default normal); the answer does not depend on time"
+    question.add_argument("--effort", choices=["quick", "normal", "thorough"], help=text)
+    text = "chooses the effort that takes about so long on two quiet cores; a slower computer takes longer"
     question.add_argument("--minutes", type=positive_float, metavar="N", help=text)
-    text = "number of clips to choose on, without regard to --minutes (default: what the budget allows, at most 16)"
+    text = "number of clips of each behaviour to choose on, every set on all of them, instead of an effort"
     question.add_argument("--clips", type=positive_int, metavar="N", help=text)
     question.add_argument("--seed", type=int, help="seed of motion and noise (default 1)")
 
@@ -55,6 +72,17 @@ def parse_sizes(text: str) -> tuple[int, int]:
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of stations, such as 3, and no range, such as 2-4")
     return int(match[1]), int(match[2] or match[1])
+
+
+def parse_costs(text: str) -> dict[str, float]:
+    """Costs by place from head=2,wrist=1.5, for argparse."""
+    costs: dict[str, float] = {}
+    for entry in text.split(","):
+        name, _, number = (part.strip() for part in entry.partition("="))
+        if not name or name in costs:
+            raise argparse.ArgumentTypeError(f"{text!r} is no list of costs, such as head=2,wrist=1")
+        costs[name] = positive_float(number)
+    return costs
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
@@ -110,6 +138,13 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
         minutes=args.minutes or DEFAULT_MINUTES,
         clips=args.clips or 0,
         seed=1 if args.seed is None else args.seed,
+        effort=args.effort or "",
+        split=args.split or "sequence",
+        base=_split_names(getattr(args, "with"), "--with") if getattr(args, "with") is not None else (),
+        costs=args.cost or {},
+        symmetric=bool(args.symmetric),
+        baud=args.baud or 0,
+        second_method=args.second_method or "",
     )
 
 

@@ -8,8 +8,8 @@ sets are searched and on how many clips: see `plan_within_budget`.
 """
 
 import math
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from harness.body import select_places
@@ -18,6 +18,7 @@ from harness.core.ranges import Name
 from harness.errors import BadInput, UnknownName
 from harness.experiment.scenarios import Scenario, ScenarioMotion, Station
 from harness.mocap import LibraryFolders, MotionSource, open_motion_source
+from harness.results.findings.advice import Effort
 from harness.simulate import TrackerConfig
 from harness.simulate.physics import ConstellationSettings, Physics, load_constellation
 from harness.study.placement.candidates import Candidate
@@ -55,6 +56,18 @@ class PlacementQuestion:
     clips: int = 0
     """Number of clips to choose on, whatever the budget; 0 chooses it within the budget."""
     seed: int = 1
+    effort: Effort = ""
+    split: Literal["sequence", "subject"] = "sequence"
+    base: tuple[str, ...] = ()
+    """Names of places that every set contains."""
+    costs: Mapping[str, float] = field(default_factory=dict)
+    """Place -> cost; 1 for the others."""
+    symmetric: bool = False
+    """Whether left and right are one place, which both sides are worn at."""
+    baud: int = 0
+    """Rate of the serial line; 0 is the scenario's default."""
+    second_method: str = ""
+    """A method that the answer is repeated with; "" chooses one, "none" is none."""
 
     @property
     def name(self) -> str:
