@@ -5,6 +5,7 @@ body, where nothing covers them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def draw_views(figure: Figure, places: Sequence[CandidatePlace], texts: Mapping[
         axes = figure.add_axes((0.5 * side, 0.08, 0.5, 0.92))
         draw_outline(axes, behind=bool(side), half_width_m=_HALF_WIDTH_M)
         axes.text(0.0, LOW_M, title, ha="center", va="top", color=FAINT)
-        shown = np.flatnonzero(behind == bool(side))
+        shown = np.flatnonzero(behind == bool(side)).tolist()
         points = {places[n].name: ((-1.0 if side else 1.0) * float(at_m[n, 1]), float(at_m[n, 2])) for n in shown}
         for name, at in points.items():
             draw_disc(axes, name, at)
@@ -103,7 +104,7 @@ def _label_places(axes: Axes, points: Mapping[str, tuple[float, float]], texts: 
         across = points[name][0]
         right = len(columns[0]) > len(columns[1]) if abs(across) < 0.02 else across > 0.0
         columns[right].append(name)
-    for right, column in enumerate(columns):
+    for right, column in zip((False, True), columns, strict=True):
         column.sort(key=lambda name: -points[name][1])
         lines = max((1 + texts[name].count("\n") for name in column), default=1)
         gap = lines * _LINE_M / (HIGH_M - LOW_M)
@@ -132,7 +133,7 @@ def _draw_map(
     from matplotlib.lines import Line2D
 
     draw_views(figure, places, texts, draw_disc)
-    looks = {
+    looks: dict[str, dict[str, Any]] = {
         "ring": {"markerfacecolor": "none", "markersize": 13.0, "markeredgewidth": 2.0},
         "disc": {"markersize": 10.0},
         "pale": {"markerfacecolor": "none", "markersize": 8.0, "markeredgewidth": 1.6},

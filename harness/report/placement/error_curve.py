@@ -55,9 +55,9 @@ def curve_points(findings: PlacementFindings) -> list[CurvePoint]:
     sign, lowest, points = 1.0 if findings.better == "lower" else -1.0, math.inf, []
     places = {names: sum(costs.get(name, 1.0) for name in names) for names in of_set}
     for stations in sorted(of_set, key=lambda names: (places[names], sign * of_set[names].value)):
-        error = sign * of_set[stations].value
-        points.append(CurvePoint(places[stations], stations, of_set[stations], error < lowest))
-        lowest = min(lowest, error)
+        value = sign * of_set[stations].value
+        points.append(CurvePoint(places[stations], stations, of_set[stations], value < lowest))
+        lowest = min(lowest, value)
     return points
 
 

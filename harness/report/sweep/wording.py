@@ -23,7 +23,7 @@ def sweep_sentence(sweep: SweepData) -> str:
         of_kind = [*map(effect_sentence, effects)]
         of_kind += [f"{_dependence(each)}." for each in key_interactions(sweep, performers) if _is_told(each)]
         if of_kind:
-            counted = count_units(max((effect.units for effect in effects), key=len))
+            counted = count_units({unit for effect in effects for unit in effect.units})
             sentences.append(f"{' '.join(of_kind)} Compared on {counted}{f' ({performers})' * bool(performers)}.")
     return " ".join(sentences) or best_sentence(sweep) or progress_sentence(sweep)
 

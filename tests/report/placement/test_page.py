@@ -33,7 +33,7 @@ from harness.results.findings import (
 )
 from harness.results.findings.advice import PlacementAdvice, SecondChoice, SecondMethod, SetError, SizeStep
 from harness.study.placement.config import load_placement_study
-from tests.report.drawing import drawn_figures, texts_apart
+from tests.report.drawing import drawn_figures, points, texts_apart
 from tests.report.reading import emptied, text_of
 
 PLACES = [place for group in load_placement_study("walking").groups() for place in group]
@@ -228,8 +228,7 @@ def test_the_curve_has_held_out_errors_and_shows_which_steps_can_be_told(placeme
     )
     steps = (SizeStep(one, two, 2.0, 1.5, 2.5, 0.01, 16, "better"), SizeStep(two, three, -0.5, -1.0, 0.1, 0.2, 16))
     findings = replace(placement, best=held, size_steps=steps)
-    points = curve_points(findings)
-    assert [(point.at, point.error.value, point.on_front) for point in points] == [
+    assert [(point.at, point.error.value, point.on_front) for point in curve_points(findings)] == [
         (1.0, 6.0, True),
         (2.0, 4.0, True),
         (3.0, 4.5, False),
@@ -237,7 +236,7 @@ def test_the_curve_has_held_out_errors_and_shows_which_steps_can_be_told(placeme
     figure = drawn_figures(lambda: error_curve(findings))["error_curve"]
     texts_apart(figure)
     lines = {str(line.get_label()): line for line in figure.axes[0].lines if not str(line.get_label()).startswith("_")}
-    assert {name: list(line.get_xdata()) for name, line in lines.items()} == {
+    assert {name: points(line)[0].tolist() for name, line in lines.items()} == {
         "the larger set is better": [1.0, 2.0],
         "cannot be told apart": [2.0, 3.0],
     }
