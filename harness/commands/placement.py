@@ -88,7 +88,7 @@ def parse_costs(text: str) -> dict[str, float]:
 def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.experiment.workers import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import placement_sentence
+    from harness.report.placement.wording import placement_sentence, size_sentences
     from harness.results.files import FINDINGS
     from harness.study.placement import placement_study
 
@@ -109,16 +109,17 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_placement_page(out)
-    answer = placement_sentence(findings)
-    content = {"answer": answer, **record_content(findings, out=out, report=page)}
-    lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
+    answer, beside = placement_sentence(findings), size_sentences(findings)
+    content = {"answer": answer, "other_sizes": beside, **record_content(findings, out=out, report=page)}
+    lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer, *beside)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
 def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     """The question on the command line; None for a study. BadInput for both and for neither."""
-    from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_MINUTES, PlacementQuestion
+    from harness.study.placement.effort import effort_within
+    from harness.study.placement.question import DEFAULT_METHOD, PlacementQuestion
 
     if args.study is not None:
         advice = "A study has its own: name a study or ask a question."
@@ -126,21 +127,24 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
         return None
     if all(getattr(args, name) is None for name in _QUESTION_FLAGS):
         raise BadInput("Neither a study nor a question.", f"Type: {_EXAMPLE}; or: harness placement walking")
+    limits = [name for name in ("effort", "minutes", "clips") if getattr(args, name) is not None]
+    if len(limits) > 1:
+        raise BadInput(f"--{limits[0]} with --{limits[1]}.", "Each of them limits the search: name one.")
+    base = _split_names(getattr(args, "with"), "--with")
     fewest, most = args.stations or (3, 3)
     return PlacementQuestion(
         fewest,
         most,
-        _split_names(args.behaviour, "--behaviour") if args.behaviour is not None else ("walking",),
-        places=_split_names(args.places, "--places") if args.places is not None else (),
+        _split_names(args.behaviour, "--behaviour") or ("walking",),
+        places=_split_names(args.places, "--places"),
         method=args.method or DEFAULT_METHOD,
         noise=args.noise or "default",
         constellation=args.physics or "",
-        minutes=args.minutes or DEFAULT_MINUTES,
+        effort=effort_within(args.minutes) if args.minutes is not None else args.effort or "",
         clips=args.clips or 0,
         seed=1 if args.seed is None else args.seed,
-        effort=args.effort or "",
         split=args.split or "sequence",
-        base=_split_names(getattr(args, "with"), "--with") if getattr(args, "with") is not None else (),
+        base=base,
         costs=args.cost or {},
         symmetric=bool(args.symmetric),
         baud=args.baud or 0,
@@ -148,17 +152,19 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     )
 
 
-def _split_names(text: str, flag: str) -> tuple[str, ...]:
-    """Names separated by commas; BadInput for an empty one."""
+def _split_names(text: str | None, flag: str) -> tuple[str, ...]:
+    """Names separated by commas, () without a text; BadInput for an empty one."""
+    if text is None:
+        return ()
     names = tuple(name.strip() for name in text.split(","))
     if not all(names):
         raise BadInput(f"{flag} {text!r} has an empty name.", "Separate names by commas.")
     return names
 
 
-def _announce(power: "StatisticalPower", notes: tuple[str, ...]) -> None:
-    """Tell on stderr, before the cells run, what they can show and how long they take."""
+def _announce(news: "StatisticalPower | str") -> None:
+    """Tell on stderr what the cells can show and how long they take, or how a search goes on."""
     from harness.report.placement.wording import power_sentences
 
-    for line in (*notes, *power_sentences(power)):
+    for line in [news] if isinstance(news, str) else power_sentences(news):
         print_status(line)
