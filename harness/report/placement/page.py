@@ -52,6 +52,7 @@ from harness.report.placement.wording import (
     search_gain_sentence,
     set_error,
     set_name,
+    size_sentences,
     smallest_sufficient_set,
 )
 from harness.results.files import FINDINGS
@@ -66,8 +67,15 @@ from harness.results.findings import (
     StationNames,
     read_placement,
 )
+from harness.results.findings.advice import HalvingRound
 
 _MOST_PRINTED, _MOST_FAILED, _MOST_RANKED = 12, 50, 40
+_LEARNT_FROM = {
+    "": "",
+    "known": "other takes of the performers on whom sets are tested",
+    "new": "other performers than those on whom sets are tested",
+}
+"""Split -> what methods learnt from."""
 
 
 def write_placement_page(folder: Path) -> Path:
@@ -106,13 +114,20 @@ def placement_page(findings: PlacementFindings, overview: Markup | None = None) 
     measured = [rows for rows in ways.values() if any(row.difference is not None for row in rows)]
     drawings = [Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
     several = len(findings.conditions) > 1
-    disputed = findings.second is not None and not findings.second.agrees
-    second = second_method_blocks(findings)
+    recommended, second = recommended_set(findings), second_method_blocks(findings)
+    disputed = findings.second is not None and any(
+        choice.worse and choice.chosen == recommended for choice in findings.second.choices
+    )
     return Page(
         verb="placement",
         name=findings.name,
         headline=placement_sentence(findings),
-        lead=[*(second if disputed else []), BrowserOnly([overview or Markup()]), _best_table(findings)],
+        lead=[
+            *(second if disputed else []),
+            BrowserOnly([overview or Markup()]),
+            Bullets(size_sentences(findings)),
+            _best_table(findings),
+        ],
         facts={
             "Question": findings.title,
             "Metric": f"{findings.metric} [{findings.unit}], {findings.better} is better",
@@ -120,13 +135,17 @@ def placement_page(findings: PlacementFindings, overview: Markup | None = None) 
             "Motion": f"{', '.join(findings.behaviours)}; {describe_motion_source(findings.motion)}",
             "Noise": findings.noise,
             "Link": findings.link or "the same rate for any number of stations",
+            "Worn in any case": set_name(findings.base) if findings.base else "",
+            "Costs": ", ".join(f"{plain_name(name)} {cost:g}" for name, cost in findings.station_costs.items()),
+            "Learnt from": _LEARNT_FROM[findings.split],
+            "Search": search_text(findings),
             "Clips": " ".join(power_sentences(findings.power)) if findings.power else "",
             "Tried": f"{counts}; {findings.planned:,} cells, {len(findings.failures)} failed",
             "Ties": TIE_NOTE,
             "Made by": f"{findings.command} (seed {findings.seed})",
         },
         sections=[
-            Section("Tied sets", "ties", tied_sets_blocks(findings, recommended_set(findings))),
+            Section("Tied sets", "ties", tied_sets_blocks(findings, recommended)),
             Section("Second method", "second", [] if disputed else second),
             Section("Sizes compared", "sizes", [_steps_table(findings)]),
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
@@ -145,6 +164,19 @@ def placement_page(findings: PlacementFindings, overview: Markup | None = None) 
             Section("Circumstances", "circumstances", _circumstances(findings), terminal=False),
         ],
     )
+
+
+def search_text(findings: PlacementFindings) -> str:
+    """The rounds of a search by halves: "a quick search; 2 stations: 28 sets on 4 units, 14 on 8"; "" without one."""
+    by_size: dict[int, list[HalvingRound]] = {}
+    for each in findings.rounds:
+        by_size.setdefault(each.size, []).append(each)
+    rounds = [
+        f"{count_noun(size, 'station')}: {of[0].sets:,} sets on {count_noun(of[0].units, 'unit')}"
+        + "".join(f", {each.sets:,} on {each.units}" for each in of[1:])
+        for size, of in by_size.items()
+    ]
+    return "; ".join([*([f"a {findings.effort} search"] if findings.effort else []), *rounds])
 
 
 def _best_table(findings: PlacementFindings) -> DataTable:
