@@ -186,7 +186,12 @@ def test_the_browser_gets_the_token_from_a_file_of_this_user(
 ) -> None:
     """All users of a computer can read the command line of a browser."""
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", lambda url: not opened.append(url))
+
+    def open_browser(url: str) -> bool:
+        opened.append(url)
+        return True
+
+    monkeypatch.setattr("webbrowser.open", open_browser)
     assert shown.open_browser()
     path = Path(url2pathname(urlsplit(opened[0]).path))
     assert urlsplit(shown.url).fragment not in opened[0]
