@@ -16,8 +16,8 @@ from harness.view.server import Resource
 
 STATUS_COLOURS = {"OK": "#00795c", "HELD": "#f2c200", "LOST": "#c8321e"}
 STATION_COLOURS = ("#248bf2", "#8c4d82", "#6262b2", "#b28695", "#8b24f2", "#978fbf")
-"""Colours of the stations, in turn. No two of them or of a status are alike, also for colour-blind readers, and all have
-a contrast of about 3 or more to a light and to a dark page."""
+"""Colours of the stations, in turn. No two of them or of a status are alike, also for colour-blind readers. Their
+contrast is about 3 or more to a light and to a dark page."""
 _CALIBRATIONS = {"tpose": "Calibrate: T-pose", "poses": "Calibrate: eight poses"}
 
 
