@@ -39,14 +39,6 @@ class DroppingQueue(Generic[T]):
             self._items.put(None)  # for the next call
         return item
 
-    def drop_all(self) -> None:
-        """Drop and count all items in the queue; called by the consumer."""
-        for _ in range(len(self)):
-            if self._items.get() is None:
-                self.end()
-            else:
-                self.dropped += 1
-
     def end(self) -> None:
         """Mark the end; items in the queue can still be taken."""
         self._items.put(None)
