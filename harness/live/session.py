@@ -20,7 +20,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
+from harness.live.capture import CaptureThread, DroppingQueue
 from harness.live.heading import UNTURNED, WorldTurn
 from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
@@ -49,9 +49,6 @@ class LiveOptions:
     """Duration after which the session ends [s]; unlimited by default."""
     queue_frames: int = QUEUE_FRAMES
     """Length of the queue between the two threads."""
-    host_timestamps: bool = True
-    """Whether `received_s` of the frames is on the host's monotonic clock. For a recording it is not, and latencies are
-    measured from the time at which the stream delivers a frame."""
 
 
 @dataclass(eq=False)
@@ -114,8 +111,8 @@ def run_session(
     reported through `say`; the others continue. `control` takes commands of other threads. `progress` receives the
     status line about once a second, and `say` which stations are lost or back.
     """
-    queue: DroppingQueue[CapturedFrame] = DroppingQueue(options.queue_frames)
-    capture = CaptureThread(stream, queue, clock)
+    queue: DroppingQueue[TrackerFrame] = DroppingQueue(options.queue_frames)
+    capture = CaptureThread(stream, queue)
     statistics = LiveStatistics(stream.stations, clock)
     control = control or SessionControl()
     control.reconstructor = reconstructor
@@ -158,7 +155,7 @@ class _SolverThread:
 
     def __init__(
         self,
-        queue: DroppingQueue[CapturedFrame],
+        queue: DroppingQueue[TrackerFrame],
         body: Body,
         reconstructor: Reconstructor,
         calibration: Calibration,
@@ -233,13 +230,12 @@ class _SolverThread:
 
     def _solve(self, session: Session) -> None:
         number, lag, collected_s, done = 0, 0, self._clock(), self.result
-        while (captured := self._queue.take()) is not None:
+        while (frame := self._queue.take()) is not None:
             taken_s = self._clock()
             if (request := self._control.next_request()) is not None:
                 if request.session is not None:
                     session, lag = request.session, 0
                 self._carry_out(request)
-            frame, captured_s = captured
             estimate = session.step(frame)
             if self._world_turn is not UNTURNED:
                 estimate = replace(estimate, qpos=self._world_turn.qpos(estimate.qpos))
@@ -255,9 +251,8 @@ class _SolverThread:
             pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics, self._room)
             self._send(pose)
             sent_s = self._clock()
-            received_s = frame.received_s if self._options.host_timestamps else captured_s
-            done.stages.add(received_s, taken_s, ready_s, sent_s)
-            self._statistics.add(frame, estimate.status, ready_s - received_s)
+            done.stages.add(frame.received_s, taken_s, ready_s, sent_s)
+            self._statistics.add(frame, estimate.status, ready_s - frame.received_s)
             done.status[estimate.status.name.lower()] += 1
             done.origin[estimate.origin.name.lower()] += 1
             self._first_s = self._first_s or ready_s
