@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.core.options import expand_alternatives, split_outside_brackets
+from harness.core.output_place import place_fault
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
     if "seed" in flags:
         verb.add_argument("--seed", type=int, help="seed instead of the scenario's")
     if "out" in flags:
-        verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
+        verb.add_argument("--out", type=output_folder, metavar="DIR", help="folder to write")
     if "jobs" in flags:
         text = "clips computed at the same time (default 1, of the demo 2)"
         verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
@@ -147,6 +148,13 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
     if characters := parse_characters(args.stations):
         options["characters"] = characters
     return options
+
+
+def output_folder(text: str) -> Path:
+    """A folder that can be written, or made, for argparse: a verb that works for long refuses another at once."""
+    if fault := place_fault(Path(text)):
+        raise argparse.ArgumentTypeError(fault)
+    return Path(text)
 
 
 def is_whole_number(text: str) -> bool:

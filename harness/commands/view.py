@@ -41,13 +41,13 @@ def add_view(verbs: Verbs) -> None:
 
 
 def run_view(args: argparse.Namespace) -> Outcome:
+    from harness.core.files import require_writable
     from harness.view import check_movie
 
     if args.save is not None:
         check_movie(args.save)
-    for path in (args.save, args.out):
-        if path is not None and path.exists() and not args.force:
-            raise BadInput(f"{path} exists.", "Name another file, or use --force.")
+    for path in filter(None, (args.save, args.out)):
+        require_writable(path, "a movie or a page", force=args.force)
     motion = _open(args)
     if args.save is None and args.out is None:
         return _serve(args, motion)

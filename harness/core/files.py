@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from harness.core import parsing
 from harness.core.fault_report import is_system_fault
 from harness.core.input_file import MEGABYTE, read_input_file
+from harness.core.output_place import place_fault
 from harness.errors import BadFile
 
 TEMPORARY = ".unfinished-"
@@ -245,6 +246,8 @@ def require_writable(path: Path, what: str, *, force: bool) -> None:
         raise BadFile(path, "it exists", "a new file", "Choose another name, or overwrite it with --force.")
     if not path.absolute().parent.is_dir():
         raise BadFile(path, "the folder does not exist", f"a file name for {what}", "Create it, or choose another.")
+    if fault := place_fault(path.absolute().parent):
+        raise BadFile(path, fault, f"a file name for {what}", "Choose another.")
 
 
 def write_output(path: Path, text: str, what: str, *, force: bool) -> None:

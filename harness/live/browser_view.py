@@ -28,11 +28,13 @@ class BrowserOutput:
     def __init__(self, setup: SessionSetup, recorder: RecordingSwitch, folder: Path) -> None:
         """Start the process and wait until it serves the page.
 
-        `recorder` records into new files of `folder`. BadFile when that is no folder, BadInput when the page cannot be
+        `recorder` records into new files of `folder`. BadFile when it cannot be made, BadInput when the page cannot be
         served.
         """
-        if not folder.is_dir():
-            raise BadFile(folder, "no folder", "a folder for recordings", "Name another with --out.")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BadFile(folder, f"it cannot be created ({error.strerror})", "a folder", "Name another.") from error
         self._recorder, self._folder = recorder, folder
         with shield_children():  # a signal ends the session, and the session ends the viewer
             self._ring = PoseRing(SPAWN, len(setup.stations))

@@ -129,9 +129,12 @@ def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: R
         connect(shown).connect()
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
-    with pytest.raises(BadFile, match="no folder"):
-        BrowserOutput(SETUP, switch, tmp_path / "none")
+def test_the_folder_of_recordings_is_made_or_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
+    BrowserOutput(SETUP, switch, tmp_path / "new" / "folder").close()
+    assert (tmp_path / "new" / "folder").is_dir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadFile, match="cannot be created"):
+        BrowserOutput(SETUP, switch, tmp_path / "file")
 
 
 @pytest.mark.parametrize("unread", [False, True])

@@ -46,7 +46,7 @@ class ScenarioFile:
             try:
                 scenario = self._build(content)
             except (TypeError, ValueError) as error:
-                raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
+                raise BadFile(path, str(error), "", "See the shipped ones in scenarios/.") from error
             check_scenario(path, scenario)
             check_expected_orders(path, scenario)
         return scenario

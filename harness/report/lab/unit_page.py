@@ -37,8 +37,8 @@ _INTERVALS = (
     "independent samples."
 )
 _STATIONS = (
-    "Spread: standard deviation at rest, of the position in space and of the orientation. White noise and drift are "
-    "its parts on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
+    "Within: distance at rest from the median position and the mean orientation. White noise and drift are "
+    "standard deviations on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
 )
 _EPISODES = "Excursion: a displacement of seconds. Echo: a burst of outliers. Gap: a loss."
 
@@ -123,17 +123,20 @@ def description(report: UnitReport) -> list[str]:
 
 
 def _spread_sentence(report: UnitReport) -> str:
-    spreads = {
-        name: [found for row in report.stations if (found := row.figures.get(name)) and found.is_measured]
-        for name in ("spread_m", "spread_rad")
-    }
+    """Half and 95 % of the readings at rest, over all stations; the next sentences name the outliers."""
+    texts = {}
+    for name in ("half_within_m", "most_within_m", "half_within_rad", "most_within_rad"):
+        shown = find_quantity(f"station.{name}")
+        found = [number for row in report.stations if (number := row.figures.get(name)) and number.is_measured]
+        if found:
+            texts[name] = f"{format_range(shown.factor * number.value for number in found)} {shown.unit}"
     parts = [
-        f"{noun} scatters by {format_range(shown.factor * one.value for one in numbers)} {shown.unit}"
-        for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
-        for shown in [find_quantity(f"station.{name}")]
-        if numbers
+        f"half of a station's {noun} are within {texts[f'half_within_{unit}']} of their middle, 95 % within "
+        + texts[f"most_within_{unit}"]
+        for unit, noun in (("m", "positions"), ("rad", "orientations"))
+        if f"half_within_{unit}" in texts
     ]
-    return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
+    return f"At rest, {'; '.join(parts)}." if parts else ""
 
 
 def _noise_sentence(values: Mapping[str, Interval]) -> str:
