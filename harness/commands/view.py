@@ -53,6 +53,7 @@ def run_view(args: argparse.Namespace) -> Outcome:
         return _serve(args, motion)
     lines, content = [], {}
     if args.save is not None:
+        args.save.parent.mkdir(parents=True, exist_ok=True)
         frames = _save_movie(args, motion)
         lines.append(f"{args.save}: {frames} frames, {args.save.stat().st_size / 1e6:.1f} MB")
         content["movie"] = str(args.save)
@@ -88,11 +89,11 @@ def _save_movie(args: argparse.Namespace, motion: "ViewedMotion") -> int:
 
 
 def _save_page(path: Path, motion: "ViewedMotion") -> None:
-    from harness.core.files import write_text
+    from harness.core.files import write_output
     from harness.view import write_page
 
     with ProgressBar("clips") as bar:
-        write_text(path, write_page(motion, bar))
+        write_output(path, write_page(motion, bar), "a page", force=True)
 
 
 def _serve(args: argparse.Namespace, motion: "ViewedMotion") -> Outcome:

@@ -12,7 +12,7 @@ from typing import Any
 
 from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
-from harness.errors import BadFile, BadInput, HarnessError
+from harness.errors import BadInput, HarnessError
 from harness.live.pose import LivePose, SessionSetup
 from harness.live.shared_memory import PoseRing, first_message
 from harness.stream.recording import RecordingSwitch
@@ -28,13 +28,9 @@ class BrowserOutput:
     def __init__(self, setup: SessionSetup, recorder: RecordingSwitch, folder: Path) -> None:
         """Start the process and wait until it serves the page.
 
-        `recorder` records into new files of `folder`. BadFile when it cannot be made, BadInput when the page cannot be
-        served.
+        `recorder` records into new files of `folder`, which is made. BadInput when the page cannot be served.
         """
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise BadFile(folder, f"it cannot be created ({error.strerror})", "a folder", "Name another.") from error
+        folder.mkdir(parents=True, exist_ok=True)
         self._recorder, self._folder = recorder, folder
         with shield_children():  # a signal ends the session, and the session ends the viewer
             self._ring = PoseRing(SPAWN, len(setup.stations))

@@ -110,13 +110,10 @@ class Recording:
     @property
     def events(self) -> list[dict[str, Any]]:
         """Events on the line: kind, text, time on the host's clock [s] and time since the first block [s]."""
-        found, first_s = [], None
-        for block in self.blocks():
-            first_s = block.monotonic_s if first_s is None else first_s
-            if block.kind == EVENT:
-                times = {"monotonic_s": block.monotonic_s, "elapsed_s": block.monotonic_s - first_s}
-                found.append({**times, **self._event(block)})
-        return found
+        event_blocks = [block for block in self.blocks() if block.kind == EVENT]
+        first_s = next(iter(self.blocks())).monotonic_s if event_blocks else 0.0
+        times = [{"monotonic_s": block.monotonic_s, "elapsed_s": block.monotonic_s - first_s} for block in event_blocks]
+        return [{**at, **self._event(block)} for at, block in zip(times, event_blocks, strict=True)]
 
     @property
     def marks(self) -> list[dict[str, Any]]:
