@@ -38,8 +38,8 @@ def run_compare(args: argparse.Namespace) -> Outcome:
         args.a,
         args.b,
         methods=(methods[0], methods[-1]) if methods else None,
-        metrics=args.metrics.split(",") if args.metrics else None,
-        allow=args.allow.split(",") if args.allow else None,
+        metrics=split_list(args.metrics) or None,
+        allow=split_list(args.allow) if args.allow else None,
     )
     with show_steps("parts of the report"):
         page = write_comparison_page(comparison, args.html) if args.html else None

@@ -189,8 +189,11 @@ def positive_float(text: str) -> float:
 
 
 def split_list(text: str | None) -> list[str]:
-    """The entries of a list that is separated by commas outside brackets; [] without one."""
-    return split_outside_brackets(text, ",") if text else []
+    """The entries of a list that is separated by commas outside brackets; [] without one; BadInput for an empty one."""
+    entries = [entry.strip() for entry in split_outside_brackets(text, ",")] if text else []
+    if not all(entries):
+        raise BadInput(f"The list {text!r} has an empty name.", "Separate names by commas, such as ik,ridge.")
+    return entries
 
 
 def parse_methods(text: str) -> tuple[str, ...]:
@@ -248,12 +251,9 @@ def parse_station_map(text: str) -> dict[str, str]:
 
 def parse_names(text: str) -> list[str]:
     """Station names separated by commas; BadInput for an empty name."""
-    names = [name.strip() for name in text.split(",")]
     if "=" in text:
         raise BadInput(f"--stations {text!r} names stations of a device.", "No device is read here: give names alone.")
-    if not all(names):
-        raise BadInput(f"--stations {text!r} names no station.", "Separate names by commas: head,torso.")
-    return names
+    return split_list(text)
 
 
 class _Refuse(argparse.Action):

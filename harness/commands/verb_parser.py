@@ -1,7 +1,6 @@
 """The parser of a command line: each complaint is an error of one line, with the nearest verb, flag or choice."""
 
 import argparse
-import re
 import sys
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
@@ -41,9 +40,10 @@ class VerbParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """BadInput with argparse's complaint."""
-        text = re.sub(r"^argument ([^ :]+): ", r"\1: ", message)
-        text = text.replace("the following arguments are required: ", "it needs ")
-        text = re.sub(r"^(\S+): invalid (?:int|float) value: (.*)", r"\1: \2 is not a number", text)
+        text = message.removeprefix("argument ").replace("the following arguments are required: ", "it needs ")
+        text = text.replace("invalid int value: ", "not a whole number: ").replace(
+            "invalid float value: ", "not a number: "
+        )
         advice = self._advice()
         if "expected" in message:
             advice = f"A value that begins with '-' follows '=', as in --flag=-1. {advice}"

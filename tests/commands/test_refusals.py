@@ -118,7 +118,7 @@ CASES = [
     ("record sim:demo text.rec", "no recording"),
     ("record sim:demo new.rec", "a recording of version 2"),
     ("record sim:demo b.rec --stations 13", "13 stations of 6"),
-    ("record sim:demo b.rec --stations a,,b", "names no station"),
+    ("record sim:demo b.rec --stations a,,b", "The list 'a,,b' has an empty name."),
     ("record sim:demo b.rec --stations ²", "no station called '²'"),
     ("record sim:demo b.rec --stations head=3", "'head=3' names stations of a device"),
     ("record sim:demo b.rec --seconds -1", "--seconds -1."),

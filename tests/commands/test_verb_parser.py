@@ -18,7 +18,10 @@ CASES = [
     ("baseline sav a b", "no action called 'sav'. Did you mean 'save'?"),
     ("paper kim", "no paper called 'kim'. Did you mean 'kim2012'?"),
     ("export a --format trk", "no choice of --format called 'trk'. Did you mean 'trc'?"),
-    ("demo --seed x", "`harness demo`: --seed: 'x' is not a number."),
+    ("demo --seed x", "`harness demo`: --seed: not a whole number: 'x'."),
+    ("view a --from x", "`harness view`: --from: not a number: 'x'."),
+    ("run demo --methods ik,,ridge", "The list 'ik,,ridge' has an empty name."),
+    ("table a --metrics ,", "The list ',' has an empty name."),
     ("record a b --alignment -1,0", "A value that begins with '-' follows '=', as in --flag=-1."),
 ]
 

@@ -125,7 +125,7 @@ def find_config(path: Path | str, kind: str, folder: Path, shipped: Sequence[Pat
     by_name = {file.stem: file for file in shipped}
     if given.suffix in ("", ".toml") and given.stem in by_name and given.parent in (Path(), folder):
         return by_name[given.stem]
-    if given.parent == Path() and not given.suffix:
+    if given.parent == Path() and not given.suffix and not given.is_dir():
         raise UnknownName(kind, str(path), by_name)
     check_input_file(given, f"a {kind} in TOML", MAX_TOML_BYTES, advice)
     return given

@@ -124,19 +124,19 @@ def description(report: UnitReport) -> list[str]:
 
 def _spread_sentence(report: UnitReport) -> str:
     """Half and 95 % of the readings at rest, over all stations; the next sentences name the outliers."""
-    texts = {}
-    for name in ("half_within_m", "most_within_m", "half_within_rad", "most_within_rad"):
-        shown = find_quantity(f"station.{name}")
-        found = [number for row in report.stations if (number := row.figures.get(name)) and number.is_measured]
-        if found:
-            texts[name] = f"{format_range(shown.factor * number.value for number in found)} {shown.unit}"
     parts = [
-        f"half of a station's {noun} are within {texts[f'half_within_{unit}']} of their middle, 95 % within "
-        + texts[f"most_within_{unit}"]
-        for unit, noun in (("m", "positions"), ("rad", "orientations"))
-        if f"half_within_{unit}" in texts
+        f"half of a station's {noun} are within {half} of their middle, 95 % within {_over_stations(report, f'most_{end}')}"
+        for noun, end in (("positions", "within_m"), ("orientations", "within_rad"))
+        if (half := _over_stations(report, f"half_{end}"))
     ]
     return f"At rest, {'; '.join(parts)}." if parts else ""
+
+
+def _over_stations(report: UnitReport, name: str) -> str:
+    """The smallest and the largest value of a figure; "" where it was not measured."""
+    found = [number.value for row in report.stations if (number := row.figures.get(name)) and number.is_measured]
+    shown = find_quantity(f"station.{name}")
+    return f"{format_range(shown.factor * value for value in found)} {shown.unit}" if found else ""
 
 
 def _noise_sentence(values: Mapping[str, Interval]) -> str:
