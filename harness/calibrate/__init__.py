@@ -5,7 +5,13 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.calibrate.calibration_file import EXPECTED, CalibrationFile, read_calibration, write_calibration
+    from harness.calibrate.calibration_file import (
+        EXPECTED,
+        CalibrationFile,
+        CalibrationOutcome,
+        read_calibration,
+        write_calibration,
+    )
     from harness.calibrate.calibration_report import report_pose_calibration, report_tpose_calibration
     from harness.calibrate.guided_calibration import (
         Calibrator,
@@ -33,6 +39,7 @@ __all__ = [
     "HOLD_S",
     "POSES",
     "CalibrationFile",
+    "CalibrationOutcome",
     "CalibrationPose",
     "Calibrator",
     "GuidedPose",

@@ -25,8 +25,7 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate import PoseDisplay
-    from harness.experiment import CalibrationOutcome
+    from harness.calibrate import CalibrationOutcome, PoseDisplay
 
 _SOURCES = ("recording", "port", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")

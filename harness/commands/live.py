@@ -61,7 +61,7 @@ def add_live(verbs: Verbs) -> None:
     text = "show the motion in a window or in the browser, or write PNG files into the folder --out"
     verb.add_argument("--view", choices=["window", "browser", "frames"], help=text)
     verb.add_argument("--no-browser", action="store_true", help="print the address of --view browser alone")
-    text = "folder of --view frames, and of recordings that --view browser starts (default: this one)"
+    text = "folder of --view frames, and of recordings and calibrations that --view browser starts (default: this one)"
     verb.add_argument("--out", type=output_folder, metavar="DIR", help=text)
     text = "send the VMC protocol over UDP; without HOST, to this computer"
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
@@ -88,8 +88,19 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate import TPoseCalibrator
     from harness.commands import live_summary
     from harness.core.files import require_writable
+    from harness.core.package_data import VERSION
+    from harness.experiment import CalibrationSession
     from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
-    from harness.live import JitterProbe, LiveOptions, OutputOptions, SessionSetup, open_outputs, run_session, warm_up
+    from harness.live import (
+        JitterProbe,
+        LiveOptions,
+        OutputOptions,
+        SessionControl,
+        SessionSetup,
+        open_outputs,
+        run_session,
+        warm_up,
+    )
     from harness.stream import EventCounter
     from harness.stream.recording import RecordingSwitch
 
@@ -120,17 +131,17 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         playback = playback.with_calibration(stored, named=isinstance(stations, list), say=print_status)
     body, calibration = playback.performer_calibration.body, playback.calibration
     tpose = args.calibration == "tpose"  # the first seconds of the session calibrate
-    setup = SessionSetup(
-        body.skeleton,
-        tuple(playback.scenario.stations),
-        playback.tracker.rate_hz,
-        None if tpose else (calibration.world_from_tracker, calibration.tracker_origin_m),
-        f"{args.method} on {args.port}",
-    )
+    names = tuple(playback.scenario.stations)
+    calibrations = {
+        "tpose": CalibrationSession(args.scenario, names, "tpose", folder=args.mocap, skeleton=body.skeleton),
+        "poses": CalibrationSession(args.scenario, names, folder=args.mocap),
+    }
+    setup = SessionSetup(body.skeleton, names, playback.tracker.rate_hz, f"{args.method} on {args.port}", calibrations)
     with ExitStack() as opened:
-        recorder = RecordingSwitch()
-        outputs = open_outputs(output_options, setup, recorder, opened, print_status)
-        device = opened.enter_context(_open_device(args.port, config, playback, events, recorder))
+        note = {"source": "live", "port": args.port, "harness": VERSION}
+        control = SessionControl(RecordingSwitch(note))
+        outputs = open_outputs(output_options, setup, control, opened, print_status)
+        device = opened.enter_context(_open_device(args.port, config, playback, events, control.recorder))
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
@@ -147,6 +158,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 TPoseCalibrator(playback.body, playback.mounts) if tpose else calibration,
                 outputs,
                 options,
+                control=control,
                 say=print_status,
                 progress=show_progress,
             )
@@ -165,8 +177,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if result.stopped and not result.poses and not result.failed:
         outcome = Outcome.INTERRUPTED
     lines = (*live_summary.lines(result, jitter), f"line: {', '.join(line)}")
-    names = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
-    following = ["record", args.port, "take.rec", "--stations", names, *repeat_flags(args, "rate", *LINE_FLAGS)]
+    worn = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
+    following = ["record", args.port, "take.rec", "--stations", worn, *repeat_flags(args, "rate", *LINE_FLAGS)]
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 

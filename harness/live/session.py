@@ -1,24 +1,32 @@
 """A live session: reads frames from a tracker, reconstructs poses and sends them to outputs, in real time.
 
 It has two threads. One reads the tracker and never waits for anything else. The other takes frames from a queue that
-drops its oldest frames, solves and sends. The caller's thread waits, and Ctrl-C ends the session.
+drops its oldest frames, solves and sends. Between two frames it carries out commands (`session_control`). The caller's
+thread waits, and Ctrl-C ends the session.
 """
 
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Event, Thread
+
+import numpy as np
 
 from harness.body import Body, Kinematics
 from harness.calibrate import Calibrator, Notifier
+from harness.core import rotations
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Origin, Status
+from harness.core.estimate import Estimate, Origin, Status
 from harness.core.number_format import count_noun
+from harness.errors import BadInput
 from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
+from harness.live.heading import UNTURNED, WorldTurn
 from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
 from harness.live.pose import LivePose, Output
+from harness.live.session_control import SessionControl, SessionRequest
 from harness.reconstruct import Reconstructor, Session
 from harness.stream import HostClockEstimator, TrackerFrame, TrackerStream
 
@@ -98,6 +106,7 @@ def run_session(
     outputs: Sequence[Output],
     options: LiveOptions,
     *,
+    control: SessionControl | None = None,
     say: Notifier = lambda text: None,
     progress: Notifier = lambda text: None,
     clock: Callable[[], float] = time.monotonic,
@@ -105,13 +114,16 @@ def run_session(
     """Run until the stream ends, the time of `options` is over or Ctrl-C; then close stream and outputs.
 
     A `Calibrator` calibrates from the first frames. An error of the stream or the method is raised after everything is
-    closed. An output that fails is closed and reported through `say`; the others continue. `progress` receives the
-    status line about once a second, and `say` which stations are lost or back.
+    closed. An output that fails is closed and reported through `say`; the others continue. `control` takes commands
+    of other threads. `progress` receives the status line about once a second, and `say` which stations are lost or
+    back.
     """
     queue: DroppingQueue[CapturedFrame] = DroppingQueue(options.queue_frames)
     capture = CaptureThread(stream, queue, clock)
     statistics = LiveStatistics(stream.stations, clock)
-    solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, say, clock, statistics)
+    control = control or SessionControl()
+    control.reconstructor = reconstructor
+    solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, control, say, clock, statistics)
     thread = Thread(target=solver.run, name="reconstruct")
     stopped = False
     try:
@@ -156,6 +168,7 @@ class _SolverThread:
         calibration: Calibration | Calibrator,
         outputs: Sequence[Output],
         options: LiveOptions,
+        control: SessionControl,
         say: Notifier,
         clock: Callable[[], float],
         statistics: LiveStatistics,
@@ -163,6 +176,10 @@ class _SolverThread:
         self._statistics = statistics
         self._queue, self._reconstructor, self._calibration = queue, reconstructor, calibration
         self._outputs, self._options, self._say, self._clock = list(outputs), options, say, clock
+        self._control, self._world_turn = control, UNTURNED
+        self._room: tuple[Floats, Floats] | None = None
+        """Position and orientation of the tracker's frame in the world of the outputs."""
+        self._newest: Estimate | None = None
         self._kinematics = Kinematics(body)
         self._host_clock = HostClockEstimator()
         deadline_s = 1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s
@@ -182,6 +199,7 @@ class _SolverThread:
         """Begin the method's session now if the calibration is known."""
         if isinstance(self._calibration, Calibration):
             self._session = self._reconstructor.begin(self._calibration)
+            self._place(self._calibration, UNTURNED)
 
     def run(self) -> None:
         try:
@@ -223,26 +241,55 @@ class _SolverThread:
             self.result.frames_before += 1
             calibration = calibrator.add(captured[0], self._say)
         session = self._reconstructor.begin(calibration)  # a method may need some time for it
+        self._place(calibration, UNTURNED)
         self._queue.drop_all()
         self._frames_discarded = self._queue.dropped
         self.result.frames_before += self._frames_discarded
         return session
 
+    def _place(self, calibration: Calibration, turn: WorldTurn) -> None:
+        """Set the calibration and the turn of the world by which outputs see bodies and stations."""
+        self._calibration, self._world_turn = calibration, turn
+        self._room = turn.pose(calibration.tracker_origin_m, calibration.world_from_tracker)
+
+    def _carry_out(self, request: SessionRequest) -> None:
+        """Carry out a command between two frames."""
+        if request.calibration is not None:
+            self._waiting.clear()
+            self._place(request.calibration, UNTURNED)
+            request.answer.set_result(0.0)
+            return
+        pose, before = self._newest, self._world_turn
+        turned = None if pose is None or pose.status is Status.LOST else before.forward(pose.qpos)
+        if turned is None or not isinstance(self._calibration, Calibration):
+            advice = "Stand upright and in sight of the tracker, then try again."
+            request.answer.set_exception(BadInput("The performer is lost, or lies: no heading is known.", advice))
+            return
+        self._place(self._calibration, turned)
+        request.answer.set_result(float(rotations.wrap_angle(np.array(turned.yaw_rad - before.yaw_rad))))
+
     def _solve(self, session: Session) -> None:
-        number, collected_s, done = 0, self._clock(), self.result
+        number, lag, collected_s, done = 0, 0, self._clock(), self.result
         while (captured := self._queue.take()) is not None:
             taken_s = self._clock()
+            if (request := self._control.next_request()) is not None:
+                if request.session is not None:
+                    session, lag = request.session, 0
+                self._carry_out(request)
             frame, captured_s = captured
             estimate = session.step(frame)
-            ready_s = self._clock()
+            if self._world_turn is not UNTURNED:
+                estimate = replace(estimate, qpos=self._world_turn.qpos(estimate.qpos))
+            self._newest, ready_s = estimate, self._clock()
             self._waiting.append((frame, self._host_clock.measured_s(frame)))
-            if estimate.lag > done.lag_frames:  # the first frames: the first one is answered again
-                done.lag_frames, done.lag_s = estimate.lag, estimate.lag / self._options.rate_hz
+            if estimate.lag > lag:  # the first frames: the first one is answered again
+                lag = done.lag_frames = estimate.lag
+                done.lag_s = lag / self._options.rate_hz
                 continue
             while len(self._waiting) > estimate.lag + 1:
                 self._waiting.popleft()
             answered, measured_s = self._waiting[0]
-            pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics)
+            pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics, self._room)
             self._send(pose)
             sent_s = self._clock()
             received_s = frame.received_s if self._options.host_timestamps else captured_s

@@ -10,7 +10,7 @@ from harness.report.figures.conditions import ConditionSet, read_conditions
 from harness.report.figures.frame_figures import distribution_figure, over_time_figure
 from harness.report.figures.mean_figures import joints_figure, ranking_figure
 from harness.report.figures.print_figure import FigureSelection, PrintFigure, draw_figure
-from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_table
+from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_side_by_side_table, build_table
 from harness.report.figures.table_formats import format_table
 from harness.report.placement.pareto import placement_figure
 from harness.results.files import require_kind
@@ -123,7 +123,7 @@ class FormattedTable:
 
 
 def write_results_table(
-    folder: Path,
+    results: Path | Sequence[tuple[str, Path | str]],
     fmt: str,
     *,
     metrics: Sequence[str] = DEFAULT_METRICS,
@@ -133,13 +133,17 @@ def write_results_table(
     out: Path | None = None,
     force: bool = False,
 ) -> FormattedTable:
-    """The table of the run in `folder` (see `build_table`) in one of TABLE_FORMATS; it is written to `out`, if given.
+    """The table of results in one of TABLE_FORMATS; it is written to `out`, if given.
+
+    `results` are the folder of a run or baseline (see `build_table`), or the names and folders of several (see
+    `build_side_by_side_table`).
 
     UnknownName for another format; BadInput for a file that exists (unless `force`) or cannot be written.
     """
     if out is not None:
         require_writable(out, _WHAT, force=force)
-    table = build_table(folder, metrics, methods=methods, condition=condition, by_behaviour=by_behaviour)
+    build: Callable[..., ResultsTable] = build_table if isinstance(results, Path) else build_side_by_side_table
+    table = build(results, metrics, methods=methods, condition=condition, by_behaviour=by_behaviour)
     text = format_table(table, fmt)
     if out is not None:
         write_output(out, text, _WHAT, force=force)

@@ -125,7 +125,7 @@ def description(report: UnitReport) -> list[str]:
 def _spread_sentence(report: UnitReport) -> str:
     """Half and 95 % of the readings at rest, over all stations; the next sentences name the outliers."""
     parts = [
-        f"half of a station's {noun} are within {half} of their middle, 95 % within {_over_stations(report, f'most_{end}')}"
+        f"half of a station's {noun} lie within {half} of the middle, 95 % in {_over_stations(report, f'most_{end}')}"
         for noun, end in (("positions", "within_m"), ("orientations", "within_rad"))
         if (half := _over_stations(report, f"half_{end}"))
     ]
