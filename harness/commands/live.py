@@ -14,6 +14,7 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     line_options,
+    output_folder,
     positive_float,
     repeat_flags,
 )
@@ -63,7 +64,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--view", choices=["window", "browser", "frames"], help=text)
     verb.add_argument("--no-browser", action="store_true", help="print the address of --view browser alone")
     text = "folder of --view frames, and of recordings and calibrations that --view browser starts (default: this one)"
-    verb.add_argument("--out", type=Path, metavar="DIR", help=text)
+    verb.add_argument("--out", type=output_folder, metavar="DIR", help=text)
     text = "send the VMC protocol over UDP; without HOST, to this computer"
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
@@ -87,6 +88,7 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.commands import live_summary
+    from harness.core.files import require_writable
     from harness.core.package_data import VERSION
     from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
     from harness.live import (
@@ -113,6 +115,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         out=args.out,
         force=args.force,
     )
+    for path in filter(None, (args.bvh, args.poses)):  # before the performer holds poses
+        require_writable(path, "motion", force=args.force)
     stations = parse_device_stations(args.stations)
     playback_options = PlaybackOptions(args.scenario, stations, args.clip, args.rate, args.seed, args.mocap)
     playback = open_playback(playback_options)

@@ -17,7 +17,7 @@ import numpy as np
 
 from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
-from harness.errors import BadFile, BadInput, HarnessError
+from harness.errors import BadInput, HarnessError
 from harness.live.pose import LivePose, SessionSetup
 from harness.live.session_control import SessionControl
 from harness.live.shared_memory import PoseRing, first_message
@@ -35,11 +35,10 @@ class BrowserOutput:
     def __init__(self, setup: SessionSetup, control: SessionControl, folder: Path) -> None:
         """Start the process and wait until it serves the page.
 
-        Recordings and calibrations that the page starts become new files of `folder`. BadFile when that is no folder,
+        Recordings and calibrations that the page starts become new files of `folder`, which is made.
         BadInput when the page cannot be served.
         """
-        if not folder.is_dir():
-            raise BadFile(folder, "no folder", "a folder for recordings", "Name another with --out.")
+        folder.mkdir(parents=True, exist_ok=True)
         self._control, self._folder = control, folder
         self._start_page: Path | None = None
         with shield_children():  # a signal ends the session, and the session ends the viewer

@@ -25,7 +25,6 @@ from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
-from harness.errors import BadFile
 from harness.experiment import CalibrationSession, prepare_playback
 from harness.live.browser_view import BrowserOutput, _run_process
 from harness.live.pose import SessionSetup
@@ -287,9 +286,9 @@ def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: R
         connect(shown).connect()
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
-    with pytest.raises(BadFile, match="no folder"):
-        BrowserOutput(SETUP, SessionControl(switch), tmp_path / "none")
+def test_the_folder_of_recordings_is_made(tmp_path: Path, switch: RecordingSwitch) -> None:
+    BrowserOutput(SETUP, SessionControl(switch), tmp_path / "new" / "folder").close()
+    assert (tmp_path / "new" / "folder").is_dir()
 
 
 @pytest.mark.parametrize("unread", [False, True])
