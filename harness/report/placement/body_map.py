@@ -190,7 +190,7 @@ def label_places(axes: Axes, at: Floats, texts: Mapping[int, str], size: tuple[i
                 },
                 ha="right" if right is begins else "left",
                 va="center",
-                fontsize=8.5,
+                fontsize=9.5,
                 color=INK,
                 annotation_clip=False,
             )

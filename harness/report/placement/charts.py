@@ -69,11 +69,11 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
                 (1.01, y),
                 xycoords=("axes fraction", "data"),
                 va="center",
-                fontsize=8.5,
+                fontsize=9.5,
                 color=INK if row.tied else FAINT,
                 annotation_clip=False,
             )
-        axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", fontsize=8.5, color=FAINT)
+        axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", fontsize=9.5, color=FAINT)
         label_rows(axes, [set_name(row.stations) for row in rows])
         axes.margins(x=0.06)
         axes.set_xlabel(f"difference to the first [{findings.unit}], paired over units")
@@ -180,7 +180,7 @@ def stability_chart(findings: PlacementFindings) -> Chart:
             shade = colours(0.08 + 0.77 * float(np.clip(tau, 0.0, 1.0)))
             axes.add_patch(Rectangle((column - 0.48, row - 0.46), 0.96, 0.92, facecolor=shade, linewidth=0.0))
             ink = "#ffffff" if tau > 0.55 else "#1a1a1a"
-            axes.text(column, row, Interval(tau).number, ha="center", va="center", color=ink, fontsize=9)
+            axes.text(column, row, Interval(tau).number, ha="center", va="center", color=ink, fontsize=9.5)
         axes.set_xlim(-0.5, max(len(names) - 0.5, 5.5))
         axes.set_ylim(len(names) - 0.5, -0.5)
         hide_frame(axes)

@@ -12,7 +12,7 @@ import numpy as np
 from harness.core.arrays import Ints
 from harness.core.number_format import NOT_MEASURED, format_number
 from harness.report.kit.chart import clear_plots
-from harness.report.kit.document import chart_figure, data_uri, facts_list
+from harness.report.kit.document import chart_figure, facts_list, picture_uri
 from harness.report.kit.error_lines import choose_highlights
 from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.motion_player import player_card
@@ -221,7 +221,7 @@ def _film_strip(run: RunData, strip: Windows, picture: Path) -> Markup:
 
 
 def _image(picture: Path, alt: str) -> Markup:
-    return tag("img", src=data_uri(picture.read_bytes(), "image/png"), alt=alt)
+    return tag("img", src=picture_uri(picture), alt=alt)
 
 
 def _colour_key() -> Markup:
