@@ -80,10 +80,11 @@ def look_at_pages(browser: Any, site: Path, width_px: int, scheme: str) -> list[
         view.on("request", lambda r: None if r.url.startswith((address, "data:")) else wrong.append(r.url))
         view.on("response", lambda r: wrong.append(r.url) if r.status >= 400 else None)
         view.on("pageerror", lambda error: wrong.append(str(error)))
-        for file in sorted(site.rglob("*.html")):
-            name = file.relative_to(site).as_posix()
+        names = sorted(file.relative_to(site).as_posix() for file in site.rglob("*.html"))
+        for name in (name for name in names if not name.startswith("gallery/")):  # those are pages of studies
             view.goto(f"{address}/{name}")
-            seen.append(SitePage(name, *view.evaluate(LOOK), wrong=list(wrong)))
+            height, width, ground, formulas, latex = view.evaluate(LOOK)
+            seen.append(SitePage(name, height, width, ground, formulas, latex, list(wrong)))
             wrong.clear()
         view.close()
     return seen
