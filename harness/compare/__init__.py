@@ -7,7 +7,6 @@ from harness.core.door import lazy_names
 if TYPE_CHECKING:
     from harness.compare.baseline import write_baseline
     from harness.compare.comparison import Comparison, compare_results, compare_runs
-    from harness.compare.decomposition import Decomposition, DifferencePart, decompose_difference
     from harness.compare.differences import Difference
     from harness.compare.margins import GATED_METRICS, MARGINS, TIME_METRICS, margin_of
     from harness.compare.paired_statistics import (
@@ -37,9 +36,7 @@ __all__ = [
     "ClipValues",
     "Comparison",
     "ComparisonSet",
-    "Decomposition",
     "Difference",
-    "DifferencePart",
     "MethodRanking",
     "PairedDifference",
     "Sampling",
@@ -55,7 +52,6 @@ __all__ = [
     "count_units",
     "decide_pairs",
     "decide_verdicts",
-    "decompose_difference",
     "find_best",
     "holm",
     "margin_of",
