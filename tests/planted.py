@@ -14,7 +14,7 @@ import tomli_w
 from scipy.ndimage import gaussian_filter1d
 
 from harness.core.arrays import Floats, Ints
-from harness.core.humanoid24 import pack, unpack
+from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.core.seeds import generator
 from harness.experiment import ClipEvaluation, Evaluation, ObservedTake, PlannedCell, cells
 from harness.experiment.methods import MethodAnswers
@@ -48,8 +48,10 @@ class Plan:
     """Number of performers that methods know from other takes; by default nobody knows of examples."""
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Key of the scenario -> values; errors of the n-th one are n times as large."""
-    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    components: Mapping[str, Any] = field(default_factory=dict)
     """Changes to the noise."""
+    straight_elbow_deg: Mapping[str, float] = field(default_factory=dict)
+    """Method -> further error of its left elbow while that is bent by less than 30 degrees [deg]."""
     sigma_deg: Mapping[str, float] = field(default_factory=dict)
     """Method -> mean standard deviation that it states, half of it for the first hinge and changing over time [deg]."""
     lags: Mapping[str, int] = field(default_factory=dict)
@@ -115,6 +117,9 @@ def _answer(method: Method, name: str, take: ObservedTake, plan: Plan) -> Evalua
     error_deg = plan.methods[name] * _worse_by(take, plan)
     root_m, quaternion, angles_rad = unpack(truth)
     angles_rad = angles_rad + np.deg2rad(error_deg) * worse * smooth(angles_rad.shape[1])
+    elbow = standard_skeleton().dof_names.index("lradius.rx")
+    straight = np.abs(unpack(truth)[2][:, elbow]) < np.deg2rad(30.0)
+    angles_rad[:, elbow] += np.deg2rad(plan.straight_elbow_deg.get(name, 0.0)) * straight
     qpos = pack(root_m + 0.003 * error_deg * worse * smooth(3), quaternion, angles_rad)
     sigma_rad = None
     if name in plan.sigma_deg:

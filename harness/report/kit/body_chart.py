@@ -22,7 +22,7 @@ _COLOURS = "viridis"
 _ARM_ANGLE_RAD = np.deg2rad(62.0)
 """Angle by which the arms hang below the horizontal."""
 _ARM_BONES = ("humerus", "radius", "wrist", "hand")
-_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 41)
+_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 19)
 _ALONG, _END_ALONG = {"clavicle": 0.5}, {"hand": 2.2, "foot": 2.2}
 """Where joint and far end of a bone are drawn, as a share of the bone; 0 and 1 for the others. Clavicles and neck share
 a joint; wrist and ankle would cover the ends of hand and foot."""
@@ -86,7 +86,7 @@ def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colour
         style = {"facecolor": faces[n], "edgecolor": PAPER, "linewidth": 0.8}
         axes.add_patch(Circle(_place(bone, group.at_far_end), _DISC_M, gid=f"joint-{body}-{n}", **style))
     for across, side in ((-0.6, "right"), (0.6, "left")):
-        axes.text(across, 0.7, side, ha="left" if across < 0.0 else "right", color=FAINT, fontsize=8.5)
+        axes.text(across, 0.7, side, ha="left" if across < 0.0 else "right", color=FAINT, fontsize=9.5)
     axes.set_xlim(-0.62, 0.62)
     axes.set_ylim(-1.03, 0.84)
     axes.set_aspect("equal")
@@ -133,7 +133,7 @@ def _each_outline() -> Iterator[Floats]:
 
 
 def project_outline(geom: BodyGeom, world_from_bone: Floats) -> Floats:
-    """(41, 2) outline of a geom seen along x, about its centre [m]."""
+    """(19, 2) outline of a geom seen along x, about its centre [m]."""
     axes = world_from_bone @ rotations.to_matrix(geom.bone_from_shape)
     circle = np.stack([np.cos(_AROUND), np.sin(_AROUND)], axis=1)
     if geom.kind == "capsule":
