@@ -40,18 +40,19 @@ class CurvePoint:
 
 
 def curve_points(findings: PlacementFindings) -> list[CurvePoint]:
-    """The best set of each asked size, or with costs also the Pareto front, from the smallest or cheapest on."""
+    """The best set of each asked size, or with costs the Pareto front, from the smallest or cheapest set on."""
     costs = findings.station_costs
-    of_set: dict[StationNames, Interval] = {}
+    of_set = {
+        point.stations: Interval.of(point.error, point.low, point.high, findings.unit)
+        for point in findings.front
+        if point.error is not None
+    }
     best = [b for b, _ in measured_best(findings) if not findings.sizes or len(b.stations) in findings.sizes]
     held = any(b.held_out is not None for b in best)
-    for each in best:
+    for each in () if of_set else best:
         error = held_out_error(findings, each) if held else set_error(findings, findings.of(each.stations))
         if error.is_measured:
             of_set[each.stations] = error
-    for point in findings.front:
-        if point.error is not None:
-            of_set[point.stations] = Interval.of(point.error, point.low, point.high, findings.unit)
     sign, lowest, points = 1.0 if findings.better == "lower" else -1.0, math.inf, []
     places = {names: sum(costs.get(name, 1.0) for name in names) for names in of_set}
     for stations in sorted(of_set, key=lambda names: (places[names], sign * of_set[names].value)):
@@ -88,6 +89,7 @@ def _draw(figure: Figure, findings: PlacementFindings, points: list[CurvePoint],
     verdicts = {(step.smaller, step.larger): step.verdict for step in findings.size_steps}
     for a, b in pairwise(points):
         text, style = _STEPS[verdicts.get((a.stations, b.stations), "")]
+        text = text.replace("larger", "dearer") if findings.station_costs else text
         axes.plot([a.at, b.at], [a.error.value, b.error.value], label=text or "_", zorder=1, **style)
     for point in points:
         if point.error.has_interval:

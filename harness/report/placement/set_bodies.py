@@ -92,7 +92,7 @@ def second_method_blocks(findings: PlacementFindings) -> list[Block]:
         return []
     first = ", ".join(findings.methods)
     bodies = [
-        SetBody(stations, f"best of {count_noun(len(stations), 'station')}", method)
+        SetBody(stations, count_noun(len(stations), "station"), f"best by {method}")
         for choice in second.choices
         if choice.worse
         for stations, method in ((choice.chosen, first), (choice.best, second.method))
@@ -114,6 +114,7 @@ def second_method_blocks(findings: PlacementFindings) -> list[Block]:
         f"Gain: how much less its own best set errs under {second.method} than the set that {first} chose, paired over "
         "units. The methods disagree where the gain is significant."
     )
+    where = "The best sets of either method, where they disagree significantly."
     table = DataTable(head, rows, caption=caption, label="second method")
-    draw = partial(draw_set_bodies, findings, bodies, "second_method", "Two methods, two answers", caption)
+    draw = partial(draw_set_bodies, findings, bodies, "second_method", "Two methods, two answers", where)
     return [Drawing(draw), table] if bodies else [table]

@@ -246,12 +246,15 @@ def test_the_curve_has_held_out_errors_and_shows_which_steps_can_be_told(placeme
     assert "a smaller set" in text
     assert "−0.5 (−1.0 to +0.1)" in text
     costs = {"pelvis": 1.0, "left_hand": 2.5, "right_hand": 1.0}
-    dear = replace(findings, station_costs=costs, front=(SetError(("right_hand",), 7.0, 6.0, 8.0, 16, 1.0),))
-    assert [(p.at, p.error.value) for p in curve_points(dear)][:2] == [(1.0, 6.0), (1.0, 7.0)]
-    assert curve_points(dear)[-1].at == 4.5
-    chart = error_curve(dear)
-    assert chart is not None
-    assert "against the cost of the stations" in chart.alt
+    front = (SetError(one, 7.0, 6.0, 8.0, 16, 1.0), SetError(three, 4.5, 4.0, 5.0, 16, 4.5))
+    gain = (SizeStep(one, three, 2.5, 1.5, 3.5, 0.01, 16, "better"),)
+    dear = replace(findings, station_costs=costs, front=front, size_steps=gain)
+    assert [(p.at, p.error.value) for p in curve_points(dear)] == [(1.0, 7.0), (4.5, 4.5)]
+    charts: list[Chart | None] = []
+    (axes,) = drawn_figures(lambda: charts.append(error_curve(dear)))["error_curve"].axes
+    assert "the dearer set is better" in [line.get_label() for line in axes.lines]
+    assert charts[0] is not None
+    assert "against the cost of the stations" in charts[0].alt
 
 
 def test_tied_sets_are_bodies_the_best_first_and_the_rest_is_counted(placement: PlacementFindings) -> None:
