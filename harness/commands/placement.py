@@ -29,7 +29,7 @@ def add_placement(verbs: Verbs) -> None:
     text = "clips computed at the same time (default 2)"
     verb.add_argument("--jobs", type=process_count, default=2, metavar="N", help=text)
     question = verb.add_argument_group("question", f"instead of a study, such as `{_EXAMPLE}`")
-    text = "number of stations, such as 3 or 2-4 (default 3)"
+    text = "number of stations, such as 3 or 2-4 (default 3; one more than those of --with)"
     question.add_argument("--stations", type=parse_sizes, metavar="N", help=text)
     text = (
         "walking, boxing, jumping, golf or table_tennis of the built-in motion, or behaviours of the library with "
@@ -45,7 +45,7 @@ def add_placement(verbs: Verbs) -> None:
     text = "left and right are one place: both sides are worn or neither, which counts as two stations"
     question.add_argument("--symmetric", action="store_true", default=None, help=text)
     question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
-    text = "a method that the answer is repeated with, or none (default ik; ridge for ik itself)"
+    text = "a method that the answer is repeated with, or none (default ik; expert_map for ik itself)"
     question.add_argument("--second-method", metavar="NAME", help=text)
     text = "subject: methods learn from other performers than those tested (default sequence: from other takes)"
     question.add_argument("--split", choices=["sequence", "subject"], help=text)
@@ -118,8 +118,9 @@ def run_placement(args: argparse.Namespace) -> Outcome:
 
 def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     """The question on the command line; None for a study. BadInput for both and for neither."""
+    from harness.body import select_places
     from harness.study.placement.effort import effort_within
-    from harness.study.placement.question import DEFAULT_METHOD, PlacementQuestion
+    from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_STATIONS, PlacementQuestion
 
     if args.study is not None:
         advice = "A study has its own: name a study or ask a question."
@@ -131,7 +132,8 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     if len(limits) > 1:
         raise BadInput(f"--{limits[0]} with --{limits[1]}.", "Each of them limits the search: name one.")
     base = _split_names(getattr(args, "with"), "--with")
-    fewest, most = args.stations or (3, 3)
+    usual = len(select_places(base)) + 1 if base else DEFAULT_STATIONS
+    fewest, most = args.stations or (usual, usual)
     return PlacementQuestion(
         fewest,
         most,

@@ -244,9 +244,10 @@ def power_sentences(power: StatisticalPower) -> list[str]:
     if power.needed_clips is None or power.wanted is None or power.needed_clips <= power.clips:
         return [first]
     more = f", about {format_duration(power.needed_duration_s)}" if power.needed_duration_s is not None else ""
+    measured = "The spread is that of these" if power.cell_s is None else "Spread and time are those of the first"
     second = (
         f"A difference of {Interval(power.wanted, unit=power.unit)}, a tenth of the error, would need about "
-        f"{power.needed_clips:,} units{more}. Spread and time are those of the first {power.pilot_sets} sets."
+        f"{power.needed_clips:,} units{more}. {measured} {power.pilot_sets} sets."
     )
     return [first, second]
 

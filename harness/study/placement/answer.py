@@ -4,14 +4,14 @@ What is chosen, and on which clips, follows from the question alone. It depends 
 workers. A search that takes longer than its effort usually does goes on, and says so.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from harness.compare import compare_paired, count_units
 from harness.core.number_format import count_noun
-from harness.experiment.scenarios import Scenario
-from harness.results import current_circumstances
+from harness.experiment.scenarios import Scenario, open_scenario_motion
 from harness.results.findings import (
     BestSet,
     MarginalContribution,
@@ -24,7 +24,7 @@ from harness.results.findings.advice import SecondMethod, SetError
 from harness.score import DEFINITIONS
 from harness.study.placement.advice import advise, compare_levels, compare_second, find_front, set_error
 from harness.study.placement.candidates import StationSet
-from harness.study.placement.effort import FINALISTS, plan_rounds
+from harness.study.placement.effort import FINALISTS, count_cells, plan_rounds
 from harness.study.placement.halving import Race, SearchLimits, add_stations, race_all
 from harness.study.placement.plan import PlacementPlan
 from harness.study.placement.power import estimate_power
@@ -50,12 +50,23 @@ class QuestionRun:
     tell: Tell
     started_s: float = field(default_factory=time.monotonic)
     _scenarios: dict[tuple[str, ...], Scenario] = field(default_factory=dict)
-    _late: bool = False
+    _expected: int = 0
+    """About how many cells there are."""
+    _late_min: float = math.inf
+    """Time after which the search says that it is late [min]."""
+
+    def __post_init__(self) -> None:
+        report = self.cache.progress
+
+        def progress(last: str, done: int, planned: int) -> None:
+            report(last, done, planned)
+            self._tell_if_late(done)
+
+        self.cache.progress = progress
 
     def findings(self) -> PlacementFindings:
         """Search, test and compare."""
-        asked, study, scenario = self.asked, self.plan.study, self.plan.scenario
-        self._tell_plan()
+        asked, study = self.asked, self.plan.study
         races, stepwise = self._search()
         answered = [race for race in races if race.size in study.sizes and race.best]
         costs_count = bool(asked.station_costs)
@@ -65,27 +76,13 @@ class QuestionRun:
         held = {names_of_places(s): costs for s, costs in self.measure_held_out(tested).items()}
         errors = {names: self._error(names, costs) for names, costs in held.items()}
         steps = compare_levels(levels, held)
-        sizes = sorted({race.size for race in races})
-        return PlacementFindings(
-            name=study.name,
-            title=study.title,
-            metric=study.metric,
-            unit=DEFINITIONS[study.metric].unit,
-            motion=self.plan.motion,
-            behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
-            methods=scenario.methods,
-            noise=scenario.noise_label,
-            link=self.plan.describe_link(sizes),
-            seed=scenario.seed,
-            command=self.cache.command,
-            candidates=self.plan.places,
+        return replace(
+            self.plan.empty_findings(self.cache.command, sorted({race.size for race in races})),
             tried=tuple(self._tried(races)),
             best=tuple(_best_set(race, errors[race.best]) for race in answered),
-            circumstances=current_circumstances(),
             rankings=tuple(race.ranking(self._title(race)) for race in races if race.rounds),
             contributions=tuple(self._contributions(races, stepwise)),
-            notes=tuple(self._notes(stepwise)),
-            sizes=study.sizes,
+            notes=tuple(self._notes(races, stepwise)),
             power=self._power(answered),
             effort=asked.question.search_effort,
             split="new" if asked.question.split == "subject" else "" if asked.clips.note else "known",
@@ -109,7 +106,11 @@ class QuestionRun:
         asked, groups, sizes = self.asked, self.plan.groups, self.plan.study.sizes
         limits = SearchLimits(len(asked.clips.pool), self._clips_of_unit, asked.question.budget.cells, asked.price)
         counts = [count_sets(size, groups, asked.base) for size in sizes]
-        if plan_rounds(counts, limits.units, limits.clips, limits.cells):
+        ladder = plan_rounds(counts, limits.units, limits.clips, limits.cells)
+        chosen = min(count_cells(counts, ladder, limits.clips), limits.cells) if ladder else limits.cells
+        self._expected = chosen + len(sizes) * sum(map(len, asked.clips.held_out.values()))
+        self._tell_plan(sum(counts))
+        if ladder:
             sets = {size: list_sets(size, groups, asked.base) for size in sizes}
             return race_all(sets, self.measure, limits), False
         return add_stations(groups, asked.base, sizes[-1], self.measure, limits), True
@@ -129,20 +130,20 @@ class QuestionRun:
 
     def measure_on(self, scenario: Scenario, units: Units, sets: Sequence[StationSet]) -> dict[StationSet, Costs]:
         """Set -> unit -> error. The units of a request are computed together, so that workers share them."""
-        scenarios = [self.unit_scenario(scenario, unit, clips) for unit, clips in units.items()]
+        scenarios = [self._unit_scenario(scenario, unit, clips) for unit, clips in units.items()]
         self.cache.run_missing([(one, tuple(sets)) for one in scenarios])
         errors: dict[StationSet, Costs] = {stations: {} for stations in sets}
         for one in scenarios:
             for stations, by_unit in self.cache.errors((one, tuple(sets)), self.plan.study.metric).items():
                 errors[stations] = {**errors[stations], **by_unit}
-        self._tell_if_late()
         return errors
 
-    def unit_scenario(self, scenario: Scenario, unit: str, clips: Sequence[str]) -> Scenario:
+    def _unit_scenario(self, scenario: Scenario, unit: str, clips: Sequence[str]) -> Scenario:
         """The scenario with the clips of one unit, which learns from the common examples and its own."""
         key = (*scenario.methods, *clips)
         if key not in self._scenarios:
-            behaviours = tuple(self.asked.clips.behaviours[clip] for clip in clips)
+            source = open_scenario_motion(scenario.motion, self.cache.folder, scenario.seed)
+            behaviours = tuple(map(source.behaviour, clips))
             examples = (*self.asked.clips.examples, *self.asked.clips.own_examples.get(unit, ()))
             motion = replace(scenario.motion, test=tuple(clips), behaviours=behaviours, examples=examples)
             self._scenarios[key] = replace(scenario, motion=motion)
@@ -201,32 +202,33 @@ class QuestionRun:
             errors += [self._error(names, by_unit) for names, by_unit in costs.items()]
         return SecondMethod(method, tuple(filter(None, choices)), tuple(errors))
 
-    def _notes(self, stepwise: bool) -> Iterator[str]:
-        pool, held_out = (count_units(units) for units in (self.asked.clips.pool, self.asked.clips.held_out))
-        yield f"Sets were chosen on at most {pool}, and then tested on held-out clips of {held_out}."
+    def _notes(self, races: Sequence[Race], stepwise: bool) -> Iterator[str]:
+        used = list(self.asked.clips.pool)[: max((one.rounds[-1].units for one in races), default=0)]
+        held_out = count_units(self.asked.clips.held_out)
+        yield f"Sets were chosen on {count_units(used)} and then tested on held-out clips of {held_out}."
         if stepwise:
             yield "Stations were added one after another, because not every set could be measured."
         yield from filter(None, (self.asked.clips.note, self.cache.line_loss))
 
-    def _tell_plan(self) -> None:
+    def _tell_plan(self, sets: int) -> None:
         """Say what is searched, before it begins."""
         question, budget = self.asked.question, self.asked.question.budget
-        sets = sum(count_sets(size, self.plan.groups, self.asked.base) for size in self.plan.study.sizes)
-        what = f"A {question.search_effort} search" if question.search_effort else f"A search on {question.clips} clips"
-        usual = f", about {budget.minutes:g} min on two quiet cores" if question.search_effort else ""
+        what, usual = f"A search on {question.clips} clips", ""
+        if question.search_effort:
+            what, usual = f"A {question.search_effort} search", f", about {budget.minutes:g} min on two quiet cores"
+            self._late_min = LATE * budget.minutes
         self.tell(f"{what} of {count_noun(sets, 'set')}: at most {budget.cells:,} cells to choose on{usual}.")
 
-    def _tell_if_late(self) -> None:
-        """Say once that the search goes on, when it takes longer than usual, and how long it may still take."""
-        question, minutes = self.asked.question, (time.monotonic() - self.started_s) / 60.0
-        if not question.search_effort or self._late or minutes < LATE * question.budget.minutes:
+    def _tell_if_late(self, done: int) -> None:
+        """Say that the search goes on when it takes longer than usual, and again whenever the time has doubled."""
+        minutes = (time.monotonic() - self.started_s) / 60.0
+        if not done or minutes < self._late_min:
             return
-        self._late = True
-        share = min(self.cache.planned / question.budget.cells, 1.0)
-        more = minutes * (1.0 - share) / share if share else minutes
+        self._late_min = 2.0 * minutes
+        more = max(minutes * (self._expected - done) / done, 1.0)
         self.tell(
-            f"After {minutes:.0f} min the search goes on: this computer is slower, or busy. "
-            f"About {max(more, 1.0):.0f} min more; the answer does not depend on it."
+            f"The search goes on after {minutes:.0f} min: this computer is slower or busy. About {more:.0f} min more; "
+            "the answer does not depend on it."
         )
 
 

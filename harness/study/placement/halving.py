@@ -129,17 +129,18 @@ def _order(race: Race, sets: Sequence[StationSet]) -> list[StationSet]:
 def _keep(race: Race, sets: Sequence[StationSet], price: Price) -> list[StationSet]:
     """The better half of some sets, without those that are significantly worse than the best."""
     complete, _ = complete_sets({names_of_places(stations): race.costs[stations] for stations in sets})
-    gaps: dict[StationNames, np.ndarray] = {}
     order = sort_by_cost(complete)
-    for names in order:
-        rival = next(other for other in order if price(other) <= price(names))
-        gaps[names] = np.array([complete[names][unit] - complete[rival][unit] for unit in complete[names]])
-    tested = [names for names in order if np.any(gaps[names]) and len(gaps[names]) >= MIN_UNITS]
+    rival = {names: next(other for other in order if price(other) <= price(names)) for names in order}
+    gaps = {
+        names: np.array([complete[names][unit] - complete[rival[names]][unit] for unit in complete[names]])
+        for names in order
+    }
+    tested = [names for names in order if rival[names] != names and len(gaps[names]) >= MIN_UNITS]
     p = dict(zip(tested, holm([sign_flip_p(gaps[names]) for names in tested]), strict=True))
     possible = [names for names in order if p.get(names, 1.0) > SIGNIFICANCE]
-    by_gap = sorted(possible, key=lambda names: (float(gaps[names].mean()), order.index(names)))
-    without_gap = sum(not np.any(gaps[names]) for names in possible)
-    chosen = set(by_gap[: max(keep_count(len(sets)), without_gap)])
+    by_gap = sorted(possible, key=lambda names: (rival[names] != names, float(gaps[names].mean()), order.index(names)))
+    front = sum(rival[names] == names for names in order)
+    chosen = set(by_gap[: max(keep_count(len(sets)), front)])
     return [stations for stations in sets if names_of_places(stations) in chosen]
 
 

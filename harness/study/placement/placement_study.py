@@ -19,7 +19,7 @@ from harness.experiment import check_names, clear_caches
 from harness.experiment.scenarios import Scenario
 from harness.experiment.workers import TaskExecutor, run_in_process
 from harness.mocap import LibraryFolders
-from harness.results import current_circumstances, open_study
+from harness.results import open_study
 from harness.results.files import FINDINGS
 from harness.results.findings import (
     BenchmarkStatement,
@@ -136,7 +136,7 @@ class _PlacementRun:
         return {stations: self.costs[stations] for stations in sets}
 
     def findings(self, command: str, power: StatisticalPower) -> PlacementFindings:
-        plan, study, scenario = self.plan, self.study, self.plan.scenario
+        plan, study = self.plan, self.study
         self.measure(plan.known_sets())
         modes = list(self._modes())
         searches, ends = self._searches()
@@ -154,26 +154,15 @@ class _PlacementRun:
         best = tuple(
             _with_held_out_error(stations, held.get(stations.stations, {}), plan.cost_sign) for stations in best
         )
-        sizes = sorted({len(stations) for stations in self.costs})
-        return PlacementFindings(
-            name=study.name,
-            title=study.title,
-            metric=study.metric,
-            unit=DEFINITIONS[study.metric].unit,
-            motion=plan.motion,
-            behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
-            methods=scenario.methods,
-            noise=scenario.noise_label,
-            link=plan.describe_link(sizes),
-            seed=scenario.seed,
-            command=command,
-            candidates=tuple(dict.fromkeys((*plan.places, *(place for stations in self.costs for place in stations)))),
+        places = tuple(dict.fromkeys((*plan.places, *(place for stations in self.costs for place in stations))))
+        return replace(
+            plan.empty_findings(command, sorted({len(stations) for stations in self.costs})),
+            candidates=places,
             tried=tuple(
                 summarise_set(names_of_places(stations), plan.rate_hz(len(stations)), plan.costs(c))
                 for stations, c in self.costs.items()
             ),
             best=best,
-            circumstances=current_circumstances(),
             rankings=tuple(ranking for rankings, _ in modes for ranking in rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
             contributions=tuple(contribution for _, contributions in modes for contribution in contributions),
@@ -182,11 +171,9 @@ class _PlacementRun:
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
             claims=tuple(self._claims(alternatives, held)),
             notes=tuple(self._notes(modes, held)),
-            sizes=study.sizes,
             power=power,
             failures=dict(self.cache.failures),
             planned=self.cache.planned,
-            better="lower" if plan.cost_sign > 0.0 else "higher",
         )
 
     def _modes(self) -> Iterator[ModeResult]:

@@ -27,7 +27,7 @@ from harness.study.placement.config import MAX_STATIONS, PlacementStudy
 from harness.study.placement.effort import CLIPS_BUDGET, DEFAULT_EFFORT, EFFORTS, Budget
 from harness.study.placement.question_clips import QuestionClips, builtin_clips, library_clips
 
-DEFAULT_METHOD, DEFAULT_SECOND = "expert_map", "ik"
+DEFAULT_METHOD, DEFAULT_SECOND, DEFAULT_STATIONS = "expert_map", "ik", 3
 CLIP_S = 5.0
 """Length of each clip that is used [s]."""
 EXAMPLE_FRAMES = 2000

@@ -41,8 +41,6 @@ class QuestionClips:
     """Clips that methods may learn from, as far as the split allows."""
     own_examples: Units
     """Unit -> clips that only its own tests learn from."""
-    behaviours: Mapping[str, str]
-    """Clip -> its behaviour, for those that are tested."""
     note: str = ""
 
     @property
@@ -66,7 +64,7 @@ def builtin_clips(behaviours: Sequence[str], source: MotionSource, *, split: Spl
     givers = [behaviours[at % len(behaviours)] for at in range(len(EXAMPLE_PERFORMERS))]
     examples = [_take(behaviour, who, _LEARNT) for behaviour, who in zip(givers, EXAMPLE_PERFORMERS, strict=True)]
     known = own_examples(behaviours) if split == "sequence" else {}
-    return QuestionClips(pool, held_out, tuple(examples), known, _behaviours((pool, held_out), source))
+    return QuestionClips(pool, held_out, tuple(examples), known)
 
 
 def builtin_units(performers: Sequence[str], behaviours: Sequence[str]) -> Units:
@@ -103,7 +101,7 @@ def library_clips(behaviours: Sequence[str], source: MotionSource, *, split: Spl
         raise BadInput("--split subject: all examples are of one performer.", "Leave it out, or add other performers.")
     new = len(tested - teachers) if split == "sequence" else 0
     note = f"Methods learnt from no other take of {new} of {len(tested)} performers." if new else ""
-    return QuestionClips(pool, held_out, examples, {}, _behaviours((pool, held_out), source), note)
+    return QuestionClips(pool, held_out, examples, {}, note)
 
 
 def _deal(behaviour: str, source: MotionSource) -> tuple[dict[str, list[str]], ...]:
@@ -145,7 +143,3 @@ def _units(clips: Collection[Sequence[str]], source: MotionSource) -> Units:
         unit = sampling.unit_of(name)
         units[unit] = (*units.get(unit, ()), name)
     return units
-
-
-def _behaviours(uses: Sequence[Units], source: MotionSource) -> dict[str, str]:
-    return {clip: source.behaviour(clip) for units in uses for clips in units.values() for clip in clips}
