@@ -38,8 +38,8 @@ def run_compare(args: argparse.Namespace) -> Outcome:
         name_sides(args.sides, shorten=len(args.sides) > 2),
         reference=args.reference,
         methods=methods,
-        metrics=args.metrics.split(",") if args.metrics else None,
-        allow=args.allow.split(",") if args.allow else None,
+        metrics=split_list(args.metrics) or None,
+        allow=split_list(args.allow) if args.allow else None,
     )
     with show_steps("parts of the report"):
         if len(found.comparisons) == 1:

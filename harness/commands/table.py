@@ -37,7 +37,7 @@ def run_table_verb(args: argparse.Namespace) -> Outcome:
     written = write_results_table(
         name_sides(args.runs) if several else folder,
         args.format,
-        metrics=args.metrics.split(",") if args.metrics else DEFAULT_METRICS,
+        metrics=split_list(args.metrics) or DEFAULT_METRICS,
         methods=split_list(args.methods),
         condition=args.condition,
         by_behaviour=args.by_behaviour,
