@@ -35,6 +35,7 @@ from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
 from harness.commands.table import add_table
+from harness.commands.timeline import add_timeline
 from harness.commands.trust import add_trust
 from harness.commands.validate import add_validate
 from harness.commands.verb_parser import VerbParser
@@ -56,6 +57,7 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
         add_export,
         add_baseline,
         add_compare,
+        add_timeline,
         add_sweep,
         add_status,
         add_bench,

@@ -99,18 +99,27 @@ def _describe_too_few(line: Floats, lines: int) -> str:
     return f"too few units: {those}, and among {lines} lines a difference needs {needed}"
 
 
-def count_needed(lines: int = 1) -> int:
+def count_needed(lines: int = 1, level: float = SIGNIFICANCE) -> int:
     """The least number of units that differ, all in one direction, with which one of `lines` can be significant."""
-    return max(MIN_UNITS, math.ceil(1.0 + math.log2(max(lines, 1) / SIGNIFICANCE)))
+    return max(MIN_UNITS, math.ceil(1.0 + math.log2(max(lines, 1) / level)))
 
 
 def sign_flip_p(difference: Floats) -> float:
     """Two-sided p of the mean of (n,) differences; 1 where all are zero."""
-    if not np.any(difference):
+    return largest_mean_p(difference[:, None])
+
+
+def largest_mean_p(differences: Floats) -> float:
+    """Two-sided p of the largest mean of (n, k) differences, k of each unit, whose signs are flipped together.
+
+    1 where all are zero.
+    """
+    if not np.any(differences):
         return 1.0
-    values = round_to_grid(difference)
-    least = abs(values.sum())
-    extreme = sum(int(np.count_nonzero(np.abs(flips @ values) >= least)) for flips in _sign_flips(len(values)))
+    values = round_to_grid(differences)
+    least = np.abs(values.sum(axis=0)).max()
+    flips_of_units = _sign_flips(len(values))
+    extreme = sum(int(np.count_nonzero(np.abs(flips @ values).max(axis=1) >= least)) for flips in flips_of_units)
     if len(values) <= _EXACT_UNITS:
         return extreme / float(2 ** (len(values) - 1))
     return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from functools import cache
 from hashlib import blake2b
 from importlib import metadata
@@ -42,6 +43,10 @@ class Manifest:
     """Performer of each test clip whose performer is known; None in manifests of versions that did not store them."""
     unit: StatisticalUnit = "performer"
     """What statistics count, as the scenario declares it."""
+    date: str = ""
+    """When the command was given (ISO 8601, UTC); "" in manifests that did not store it. Neither date is compared."""
+    commit_date: str = ""
+    """When the commit of the package was made; "" outside a checkout."""
 
     @property
     def training_data(self) -> Mapping[str, str]:
@@ -64,7 +69,8 @@ class Manifest:
             performers = content.get("performers")
             known = None if performers is None else {str(clip): str(who) for clip, who in performers.items()}
             unit = convert(StatisticalUnit, content.get("unit", "performer"), "unit")
-            return cls(inputs, versions, circumstances, known, unit)
+            dates = (str(content.get(name, "")) for name in ("date", "commit_date"))
+            return cls(inputs, versions, circumstances, known, unit, *dates)
         except (KeyError, TypeError, ValueError, AttributeError, UnknownName) as error:
             advice = "Is this a folder written by `harness run`?"
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
@@ -105,6 +111,8 @@ def describe_run(
         },
         performers=performers,
         unit=unit,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        commit_date=_run_git(PACKAGE_FOLDER.parent, "show", "-s", "--format=%cI", "HEAD") or "",
     )
 
 
@@ -146,19 +154,20 @@ def source_files() -> dict[str, Path]:
 
 def _commit(root: Path) -> dict[str, Any]:
     """Commit, and whether files differ from it, if the package lies in its own checkout."""
+    status = _run_git(root, "status", "--porcelain", "--", "harness", "models", "scenarios")
+    return {"commit": _run_git(root, "rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+
+
+def _run_git(root: Path, *arguments: str) -> str | None:
+    """What git says of a checkout; None for a folder that is none, and where git fails or takes long."""
     git = shutil.which("git")
     if git is None or not (root / ".git").exists():
-        return {"commit": None, "dirty": None}
-
-    def run_git(*arguments: str) -> str | None:
-        try:
-            done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, timeout=20)
-        except (subprocess.TimeoutExpired, OSError):  # a busy machine: the commit stays unknown
-            return None
-        return done.stdout.strip() if done.returncode == 0 else None
-
-    status = run_git("status", "--porcelain", "--", "harness", "models", "scenarios")
-    return {"commit": run_git("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+        return None
+    try:
+        done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, timeout=20)
+    except (subprocess.TimeoutExpired, OSError):  # a busy machine: the commit stays unknown
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
 
 
 def _processor() -> str:
