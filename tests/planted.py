@@ -154,6 +154,8 @@ class MeansPlan:
     """Method -> its error [deg]."""
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Key -> values; the n-th makes errors larger by n tenths."""
+    interaction: float = 0.0
+    """Share by which the last values of all keys together make errors larger, beyond what each of them does."""
     seeds: Sequence[int] = (1,)
     """Of a sweep."""
     known: int = 0
@@ -225,6 +227,7 @@ def planted_means(plan: MeansPlan) -> Iterator[None]:
         if name in plan.failing:
             raise ValueError(FAILURE)
         worse = 1.0 + 0.1 * sum(list(plan.vary[varied]).index(value) for varied, value in planned.varied.items())
+        worse += plan.interaction * all(plan.vary[varied][-1] == value for varied, value in planned.varied.items())
         draw = generator(seed, "planted sweep", name, clip, str(planned.varied)).normal()
         error = plan.methods[name] * worse * float(np.exp(0.2 * draw))
         metrics = {**template.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 6.0 * error, "mpjre_deg": 1.7 * error}

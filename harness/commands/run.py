@@ -1,11 +1,10 @@
 """The verb `run`: run a scenario and write its report."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from harness.commands.flags import Verbs, add_isolation_flags, add_verb, parse_methods, read_isolation
-from harness.commands.output import long_work, print_result, this_command
+from harness.commands.output import long_work, print_result, print_status, this_command
 from harness.core.progress import show_steps
 from harness.errors import Outcome
 
@@ -65,7 +64,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     if args.report:
         from harness.report.run.page import write_run_page
 
-        print("writing the report", file=sys.stderr)
+        print_status("writing the report")
         with show_steps("parts of the report"):
             page = write_run_page(out)
     summary = read_summary(out)

@@ -7,7 +7,6 @@ from harness.core.door import lazy_names
 if TYPE_CHECKING:
     from harness.compare.baseline import write_baseline
     from harness.compare.comparison import Comparison, compare_results, compare_runs
-    from harness.compare.decomposition import Decomposition, DifferencePart, decompose_difference
     from harness.compare.differences import Difference
     from harness.compare.margins import GATED_METRICS, MARGINS, TIME_METRICS, margin_of
     from harness.compare.paired_statistics import (
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
     )
     from harness.compare.rank_correlation import compare_orders, decide_pairs, side_difference, tau_b, tau_interval
     from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, shared_clips, split_by_lag
+    from harness.compare.side_names import name_sides
+    from harness.compare.sides import ComparisonSet, compare_sides
     from harness.compare.significance import SIGNIFICANCE, Verdict, count_needed, decide_verdicts, holm, sign_flip_p
     from harness.compare.units import BY_NAME, Sampling, average_units, count_clips, count_units
 else:
@@ -34,9 +35,8 @@ __all__ = [
     "TIME_METRICS",
     "ClipValues",
     "Comparison",
-    "Decomposition",
+    "ComparisonSet",
     "Difference",
-    "DifferencePart",
     "MethodRanking",
     "PairedDifference",
     "Sampling",
@@ -46,16 +46,17 @@ __all__ = [
     "compare_paired",
     "compare_results",
     "compare_runs",
+    "compare_sides",
     "count_clips",
     "count_needed",
     "count_units",
     "decide_pairs",
     "decide_verdicts",
-    "decompose_difference",
     "find_best",
     "holm",
     "margin_of",
     "mean_interval",
+    "name_sides",
     "rank_methods",
     "shared_clips",
     "side_difference",

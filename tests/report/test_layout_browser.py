@@ -17,7 +17,7 @@ from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.page import write_physics_page
-from harness.report.placement import page as placement_page
+from harness.report.placement.page import write_placement_page
 from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from harness.results.findings import TrustFindings
@@ -79,9 +79,7 @@ def pages(
     plan = Plan(behaviours=("walking", "boxing"), methods=methods, failing=("ik",))
     (folder / "placement").mkdir()
     shutil.copy(placement_study / "findings.json", folder / "placement")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
-        placement = placement_page.write_placement_page(folder / "placement")
+    placement = write_placement_page(folder / "placement")
     shown = {
         "coverage": coverage_page(coverages[1]),
         "unit": unit_page(unit_with_faults, "harness characterize"),

@@ -80,7 +80,7 @@ def joint_titles(groups: Sequence[BodyGroup], names: Mapping[str, str]) -> dict[
 def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colours: "ScalarMappable", body: int) -> None:
     from matplotlib.patches import Circle, Polygon
 
-    for outline in _outlines():
+    for outline in body_outlines():
         axes.add_patch(Polygon(outline, facecolor=GRID, edgecolor="none"))
     faces = np.asarray(colours.to_rgba(np.array(list(values.values()))))
     for n, bone in enumerate(values):
@@ -96,7 +96,7 @@ def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colour
 
 def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
     """Where a joint is drawn, seen from the front: the body's left side is on the right [m]."""
-    skeleton, pose = standard_skeleton(), _standing()
+    skeleton, pose = standard_skeleton(), standing_pose()
     index = skeleton.index(bone)
     start, end = pose.start_m[0, index], pose.end_m[0, index]
     share = _END_ALONG.get(bone[1:], 1.0) if at_far_end else _ALONG.get(bone[1:], 0.0)
@@ -112,7 +112,7 @@ def standing_body() -> Markup:
 
 
 @lru_cache(maxsize=1)
-def _standing() -> Pose:
+def standing_pose() -> Pose:
     """The standard body with its arms hanging, its root at the origin."""
     skeleton = standard_skeleton()
     world_from_bone = np.tile(np.eye(3), (1, len(skeleton.names), 1, 1))
@@ -124,13 +124,13 @@ def _standing() -> Pose:
 
 
 @lru_cache(maxsize=1)
-def _outlines() -> tuple[Floats, ...]:
+def body_outlines() -> tuple[Floats, ...]:
     """(N, 2) outline of each part of the body, seen from the front [m]."""
     return tuple(_each_outline())
 
 
 def _each_outline() -> Iterator[Floats]:
-    skeleton, pose = standard_skeleton(), _standing()
+    skeleton, pose = standard_skeleton(), standing_pose()
     for geom in body_geoms(skeleton):
         if geom.bone == "root":
             start_m, turn = np.zeros(3), np.eye(3)

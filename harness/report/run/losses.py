@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from harness.compare import MIN_UNITS, Decomposition, DifferencePart, Sampling, count_units, decompose_difference
+from harness.compare import MIN_UNITS, Sampling, count_units
+from harness.compare.run_summary import Decomposition, DifferencePart, decompose_difference
 from harness.core.number_format import format_share
 from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.body_chart import BodyGroup, draw_bodies, joint_titles

@@ -164,7 +164,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     if study.refine and study.refine.set:
         start = station_set(select_groups(study.refine.set, plan.groups, "refine.set"), plan.groups)
         check_unit_count(start, len(plan.units(scenario)))
-    for size in {len(stations) for stations in plan.known_sets()}:
+    for size in {*(len(stations) for stations in plan.known_sets()), *study.sizes}:
         plan.rate_hz(size)
     return plan
 
