@@ -210,7 +210,8 @@ def _stations(
     for n in range(len(names)):
         placed_m[:, n] = rotations.rotate(world_from_tracker, hold_last(position_m[:, n])) + origin_m
         turned[:, n] = rotations.multiply(world_from_tracker, _unit_or_none(hold_last(orientation[:, n])))
-    return PlayerStations(tuple(names), placed_m, turned, states)
+    quality = np.nan_to_num(np.array([frame.quality for frame in frames]))
+    return PlayerStations(tuple(names), placed_m, turned, states, quality)
 
 
 def _unit_or_none(quaternions: Floats) -> Floats:

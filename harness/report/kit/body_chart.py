@@ -13,6 +13,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
 from harness.core.skeleton import BodyGeom, Pose, pose_from_rotations
+from harness.report.kit.markup import Markup, tag
 from harness.report.kit.style import FAINT, GRID, PAPER, Axes, Figure
 
 if TYPE_CHECKING:
@@ -101,6 +102,13 @@ def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
     share = _END_ALONG.get(bone[1:], 1.0) if at_far_end else _ALONG.get(bone[1:], 0.0)
     _, across, up = start + share * (end - start)
     return float(across), float(up)
+
+
+def standing_body() -> Markup:
+    """The body as a picture of class "waiting", seen from the front [cm]."""
+    lines = [" ".join(f"{100.0 * x:.1f},{-100.0 * z:.1f}" for x, z in outline) for outline in _outlines()]
+    shapes = [tag("polygon", points=points) for points in lines]
+    return tag("svg", *shapes, class_="waiting", viewBox="-62 -84 124 187", aria_hidden="true")
 
 
 @lru_cache(maxsize=1)

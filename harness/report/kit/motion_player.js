@@ -5,7 +5,7 @@ const MotionPlayer = (() => {
   const TRUTH = "#5b87ad", METHODS = ["#e8850c", "#0f9d76", "#c05f9c"], LOST = "#8d98a5";
   const STATION = ["#20a4a8", "#e0b000", "#d43c3c"];
   const STATES = ["", " · held", " · lost", " · no estimate"], NO_ESTIMATE = 3;
-  const { rgb } = MotionRenderer;
+  const { rgb } = MotionRenderer, FLAGS = ["truth", "stations", "names", "errors", "follow"], MOST_POINTS = 800;
   const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2], WORST_MM = 100, LINK = "view?";
   const RAMP = ["#2c7bb6", "#7fc7c9", "#f2e394", "#f3913c", "#c2182b"].map(rgb);
 
@@ -61,12 +61,13 @@ const MotionPlayer = (() => {
       this.canvas = make("canvas", {});
       this.labels = make("div", { className: "labels" });
       this.stage = make("div", { className: "stage", tabIndex: 0, role: "img", "aria-label": this.root.dataset.label,
-        "aria-keyshortcuts": "Space ArrowLeft ArrowRight Plus Minus" }, this.canvas, this.labels);
+        "aria-keyshortcuts": "Space ArrowLeft ArrowRight Plus Minus" }, this.canvas, this.labels, ...this.root.querySelectorAll(".waiting"));
       this.slider = make("input", { type: "range", min: 0, max: 0, value: 0, step: 1, "aria-label": "frame",
         oninput: () => { this.stop(); this.seek(Number(this.slider.value)); } });
       this.where = make("output", { textContent: "loads when scrolled to" });
       this.said = make("output", { className: "said" });
       this.key = make("div", { className: "key" });
+      this.signals = make("div", { className: "signals" });
       const methods = [0, 1, 2].map((n) => list(`method${n}`, ["Method", "and", "and"][n], () => this.#try(() => this.#choose())));
       const speed = list("speed", "Speed", () => { if (this.playing) this.play(); });
       options(this.speed, SPEEDS.map((s) => [s, `${s}×`]));
@@ -80,12 +81,13 @@ const MotionPlayer = (() => {
         make("div", { className: "controls" }, button("run", "Play", () => this.toggle(), "space"),
           button("back", "◀", () => this.step(-1), "one frame back (left arrow)"),
           button("next", "▶", () => this.step(1), "one frame on (right arrow)"), this.slider, this.where),
-        make("div", { className: "controls" }, speed, box("truth", "truth"), box("stations", "stations"), box("errors", "colour by error"),
+        this.signals,
+        make("div", { className: "controls" }, speed, box("truth", "truth"), box("stations", "stations"), box("names", "names"), box("errors", "colour by error"),
           box("follow", "follow"), button("reset", "Reset view", () => this.resetCamera(), "R"),
           button("link", "Copy link to this moment", () => this.copyLink()), this.said),
         this.key,
       );
-      for (const name of ["truth", "stations", "follow"]) this[name].checked = true;
+      for (const name of FLAGS) this[name].checked = name !== "errors";
     }
 
     async #start() {
@@ -155,14 +157,14 @@ const MotionPlayer = (() => {
       });
       const reference = this.now.tracks.find((track) => track.role === "truth");
       for (const name of ["truth", "errors"]) this[name].parentElement.hidden = !(reference && estimates.length);
-      this.stations.parentElement.hidden = !this.now.stations;
+      for (const name of ["stations", "names"]) this[name].parentElement.hidden = !this.now.stations;
       const progress = (share) => { this.where.textContent = `loading ${Math.round(100 * share)} %`; };
       const clip = this.now;
       this.time = (await this.data.array(clip.time, 1e-4)).values;
       this.reference = reference ? await this.#track(reference, progress) : null;
       if (clip.stations) {
-        const [poses, states] = [await this.data.array(clip.stations.poses, 1), await this.data.array(clip.stations.states, 1)];
-        this.worn = { names: clip.stations.names, poses: poses.values, states: states.values };
+        const [poses, states, quality] = await Promise.all(["poses", "states", "quality"].map((name) => this.data.array(clip.stations[name], 1)));
+        this.worn = { names: clip.stations.names, poses: poses.values, states: states.values, quality: quality.values };
       } else this.worn = null;
       if (!names) this.camera.reset(clip.heading);
       this.slider.max = this.time.length - 1;
@@ -182,6 +184,7 @@ const MotionPlayer = (() => {
       const tracks = names.map((name) => this.now.tracks.find((track) => track.name === name));
       this.shown = await Promise.all(tracks.map((track) => this.#track(track, () => {})));
       this.layout.parentElement.hidden = this.shown.length < 2;
+      this.#showSignals();
       this.seek(this.frame);
     }
 
@@ -209,7 +212,36 @@ const MotionPlayer = (() => {
       this.frame = Math.max(0, Math.min(this.time.length - 1, frame));
       this.slider.value = this.frame;
       this.where.textContent = `frame ${this.frame + 1} of ${this.time.length} · ${this.time[this.frame].toFixed(3)} s`;
+      for (const mark of this.signals.querySelectorAll("i")) mark.style.left = `${(100 * this.frame) / Math.max(1, this.time.length - 1)}%`;
       this.redraw();
+    }
+
+    // Under the time line: the mean error of each method, the lowest quality of a station, the share of stations with readings.
+    #showSignals() {
+      const last = this.time.length - 1, every = Math.max(1, Math.ceil(last / MOST_POINTS)), frames = [], signals = [];
+      for (let frame = 0; frame <= last; frame += every) frames.push(frame);
+      const errors = this.reference ? this.shown.map((track, n) => [METHODS[n], frames.map((frame) => this.#meanErrorMm(track, frame))]) : [];
+      if (errors.length) signals.push(["error [mm]", Math.max(1, ...errors.flatMap(([, values]) => values)), errors]);
+      if (this.worn) {
+        const count = this.worn.names.length, row = (values, frame) => values.subarray(count * frame, count * (frame + 1));
+        const present = frames.map((frame) => (100 * row(this.worn.states, frame).filter((state) => state < 2).length) / count);
+        signals.push(["lowest quality [%]", 100, [[STATION[1], frames.map((frame) => Math.min(...row(this.worn.quality, frame)))]]]);
+        signals.push(["stations with readings [%]", 100, [[STATION[0], present]]]);
+      }
+      this.signals.replaceChildren(...signals.map(([text, most, lines]) => {
+        const box = make("div", { className: "signal", onclick: (event) => this.seek(Math.round((last * event.offsetX) / box.clientWidth)) });
+        const path = ([colour, values]) => `<path d="${values.map((value, n) => (value === null ? "" : `${n && values[n - 1] !== null ? "L" : "M"}${frames[n]} ${(30 - (28 * value) / most).toFixed(1)}`)).join("")}" stroke="${colour}"/>`;
+        box.innerHTML = `<svg viewBox="0 0 ${Math.max(1, last)} 32" preserveAspectRatio="none">${lines.map(path).join("")}</svg>`;
+        box.append(make("i", {}));
+        return make("div", {}, make("span", { textContent: `${text}, 0 to ${most.toFixed(0)}` }), box);
+      }));
+    }
+
+    // Mean over joints; null without an estimate or without the truth.
+    #meanErrorMm(track, frame) {
+      if (!this.reference || [track, this.reference].some((each) => each.states[frame] === NO_ESTIMATE)) return null;
+      const joints = this.data.bones.map(([, to]) => to);
+      return joints.reduce((sum, joint) => sum + this.errorMm(track, joint, frame), 0) / joints.length;
     }
 
     step(frames) {
@@ -253,7 +285,7 @@ const MotionPlayer = (() => {
       fields.set("t", this.time[this.frame].toFixed(4));
       fields.set("camera", this.camera.text());
       fields.set("layout", this.layout.value);
-      fields.set("show", ["truth", "stations", "errors", "follow"].filter((name) => this[name].checked).join(","));
+      fields.set("show", FLAGS.filter((name) => this[name].checked).join(","));
       return fields.toString();
     }
 
@@ -277,7 +309,7 @@ const MotionPlayer = (() => {
       if (["side", "over"].includes(fields.get("layout"))) this.layout.value = fields.get("layout");
       if (fields.has("show")) {
         const shown = fields.get("show").split(",");
-        for (const name of ["truth", "stations", "errors", "follow"]) this[name].checked = shown.includes(name);
+        for (const name of FLAGS) this[name].checked = shown.includes(name);
       }
       this.camera.reset((await this.data.clip(n)).heading);
       this.camera.restore(fields.get("camera"));
@@ -345,13 +377,13 @@ const MotionPlayer = (() => {
       return bodies;
     }
 
-    #point(track, joint) {
-      const at = this.frame * track.columns + 3 * joint;
+    #point(track, joint, frame = this.frame) {
+      const at = frame * track.columns + 3 * joint;
       return [track.joints[at], track.joints[at + 1], track.joints[at + 2]];
     }
 
-    errorMm(track, joint) {
-      const [p, q] = [this.#point(track, joint), this.#point(this.reference, joint)];
+    errorMm(track, joint, frame = this.frame) {
+      const [p, q] = [this.#point(track, joint, frame), this.#point(this.reference, joint, frame)];
       return 1000 * Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
     }
 
@@ -372,17 +404,28 @@ const MotionPlayer = (() => {
       return capsules;
     }
 
+    // The names of the stations, each where its station is in a view.
+    #stationNames(across, down) {
+      if (!this.worn || !this.names.checked || !this.stations.checked) return [];
+      const { poses, names } = this.worn, m = this.camera.matrix((this.stage.clientWidth / across) / (this.stage.clientHeight / down));
+      return names.map((name, n) => {
+        const at = 7 * (this.frame * names.length + n), [x, y, , w] = [0, 1, 2, 3].map((i) => m[12 + i] + [0, 1, 2].reduce((sum, k) => sum + (m[4 * k + i] * poses[at + k]) / 1000, 0));
+        const text = make("span", { className: "station", textContent: name.replaceAll("_", " "), hidden: w <= 0 });
+        text.style.left = `${50 + (50 * x) / w}%`;
+        text.style.top = `${50 - (50 * y) / w}%`;
+        return text;
+      });
+    }
+
     #label(views, across, down) {
-      const joints = this.data.bones.map(([, to]) => to);
       const text = (track) => {
         const state = track.states[this.frame], name = make("b", { textContent: track.name });
         name.style.color = METHODS[this.shown.indexOf(track)];
-        const known = this.reference && this.reference.states[this.frame] !== NO_ESTIMATE;
-        const mean = known && state !== NO_ESTIMATE ? joints.reduce((sum, j) => sum + this.errorMm(track, j), 0) / joints.length : null;
+        const mean = this.#meanErrorMm(track, this.frame);
         return make("span", {}, name, `${mean === null ? "" : ` ${mean.toFixed(0)} mm`}${STATES[state] || ""}`);
       };
       this.labels.style.gridTemplate = `repeat(${down}, 1fr) / repeat(${across}, 1fr)`;
-      this.labels.replaceChildren(...views.map((tracks) => make("div", {}, ...tracks.map(text))));
+      this.labels.replaceChildren(...views.map((tracks) => make("div", {}, ...tracks.map(text), ...this.#stationNames(across, down))));
       const chip = (colour, name) => {
         const dot = make("i", {});
         dot.style.background = colour;

@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
+from harness.report.kit.body_chart import standing_body
 from harness.report.kit.markup import Markup, join, tag
 
 NO_ESTIMATE = 3
@@ -66,6 +67,8 @@ class PlayerStations:
     """(F, S, 4) unit quaternions."""
     states: Ints
     """(F, S) 0 valid, 1 position or orientation missing or held, 2 lost."""
+    quality: Floats
+    """(F, S) quality of the readings, 0 (lost) to 1 (best)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +136,14 @@ def player_card(motion: PlayerMotion, label: str) -> Markup:
 
 
 def player_element(label: str) -> Markup:
-    """The element that the player fills, its style, and notes for print and for browsers without scripts."""
+    """The element that the player fills, its style, and notes for print and for browsers without scripts.
+
+    It shows a standing body until the player draws.
+    """
     style = Path(__file__).with_name("motion_player.css").read_text(encoding="utf-8")
     return join(
         tag("style", Markup(style)),
-        tag("div", class_="motion-player", id_="player", data_label=label),
+        tag("div", standing_body(), class_="motion-player", id_="player", data_label=label),
         tag("p", "The 3-D view is not printed before it has been shown: scroll to it once.", class_="player-note"),
         tag("noscript", tag("p", "The 3-D view needs JavaScript and WebGL.")),
     )
@@ -191,7 +197,9 @@ def pack_clip(skeleton: Skeleton, clip: PlayerClip, write: ChunkWriter, chunk_fr
     if clip.stations:
         poses = np.concatenate([1e3 * clip.stations.position_m, 1e3 * clip.stations.world_from_station], axis=2)
         states = chunks(clip.stations.states)
-        stations = {"names": list(clip.stations.names), "poses": chunks(poses), "states": states}
+        quality = chunks(100.0 * clip.stations.quality)
+        names = list(clip.stations.names)
+        stations = {"names": names, "poses": chunks(poses), "states": states, "quality": quality}
     return {
         "name": clip.name,
         "title": clip.title,

@@ -184,13 +184,15 @@ def _stations(frames: Sequence[_Frames], count: int) -> PlayerStations | None:
         return None
     position_m = np.full((count, len(known), 3), np.nan)
     orientation = np.full((count, len(known), 4), np.nan)
-    states = np.full((count, len(known)), 2)
+    states, quality = np.full((count, len(known)), 2), np.zeros((count, len(known)))
     columns = [n for n, _ in known]
     for part in frames:
         states[part.places] = _states(part.cell)[part.rows][:, columns]
+        quality[part.places] = part.cell.quality[part.rows][:, columns]
         for k, (_, mount) in enumerate(known):
             position_m[part.places, k], orientation[part.places, k] = station_poses(part.truth, mount)
-    return PlayerStations([cell.stations[n] for n in columns], hold_last(position_m), hold_last(orientation), states)
+    names = [cell.stations[n] for n in columns]
+    return PlayerStations(names, hold_last(position_m), hold_last(orientation), states, quality)
 
 
 def station_poses(motion: PoseSequence, mount: Mount) -> tuple[Floats, Floats]:

@@ -38,7 +38,8 @@ def motion(rng: np.random.Generator) -> PlayerMotion:
     solved = np.zeros(FRAMES, dtype=np.int64)
     estimates = [PlayerTrack(name, joints_m + offset, solved) for name, offset in (("ik", 0.05), ("<b>", 0.1))]
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 2, 1))
-    stations = PlayerStations(("head", "torso"), joints_m[:, :2], turn, np.zeros((FRAMES, 2), dtype=np.int64))
+    states, quality = np.zeros((FRAMES, 2), dtype=np.int64), np.ones((FRAMES, 2))
+    stations = PlayerStations(("head", "torso"), joints_m[:, :2], turn, states, quality)
     truth = PlayerTrack("truth", joints_m, solved)
     clip = PlayerClip("walk", "a walk", np.arange(FRAMES) / 40, 0.5, truth, estimates, stations)
     return PlayerMotion(standard_skeleton(), [clip], [PlayerMoment("worst", 0, "ik", 0.2, 0.5)])

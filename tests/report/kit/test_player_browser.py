@@ -51,7 +51,8 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         offsets = [np.array([0.0, 0.03 * n, 0.0]) for n in (1, 2, 3)]
         tracks = [PlayerTrack(n, motion.joints_m + o, states) for n, o in zip(METHODS, offsets, strict=True)]
         pose = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 1, 1))
-        stations = PlayerStations(("head",), motion.joints_m[:, 6:7], pose, solved[:, None])
+        quality = np.where(np.arange(FRAMES) < FRAMES // 2, 1.0, 0.5)[:, None]
+        stations = PlayerStations(("head",), motion.joints_m[:, 6:7], pose, solved[:, None], quality)
         time_s = np.arange(FRAMES) / RATE_HZ
         truth = PlayerTrack("truth", motion.joints_m, solved)
         clips.append(PlayerClip(behaviour, behaviour, time_s, 0.0, truth, tracks, stations))
@@ -215,7 +216,11 @@ def test_three_methods_stand_next_to_each_other(page: Any) -> None:
     _choose(page, method1="map", method2="pca")
     page.wait_for_function("() => document.querySelectorAll('.labels > div').length === 3")
     labels = page.locator(".labels > div").all_inner_texts()
-    assert [text.split() for text in labels] == [["ik", "30", "mm"], ["map", "60", "mm"], ["pca", "90", "mm"]]
+    assert [text.split() for text in labels] == [
+        ["ik", "30", "mm", "head"],
+        ["map", "60", "mm", "head"],
+        ["pca", "90", "mm", "head"],
+    ]
     page.locator("input[name=errors]").check()
     page.wait_for_timeout(500)
     ik, _, pca = page.evaluate(PIXELS)
@@ -282,3 +287,43 @@ def test_the_view_is_unpacked_only_when_it_is_seen(browser: Any, page_file: Path
     opened.emulate_media(media="screen")
     _wait_until_ready(opened)
     opened.close()
+
+
+def test_a_body_is_there_before_the_scripts_run(browser: Any, page_file: Path) -> None:
+    context = browser.new_context(java_script_enabled=False, viewport={"width": 700, "height": 800})
+    still = context.new_page()
+    still.goto(page_file.as_uri())
+    box = still.locator("#player .waiting").bounding_box()
+    assert box["height"] > 200
+    assert still.locator("#player .waiting polygon").count() > 20
+    context.close()
+
+
+def test_the_standing_body_gives_way_to_the_motion(page: Any) -> None:
+    assert page.locator("#player .waiting").is_hidden()
+    assert page.locator("#player canvas").is_visible()
+
+
+def test_signals_lie_under_the_time_line_and_lead_to_their_moment(page: Any) -> None:
+    texts = page.locator(".signals span").all_inner_texts()
+    assert [text.partition(" [")[0] for text in texts] == ["error", "lowest quality", "stations with readings"]
+    assert texts[0] == "error [mm], 0 to 30"
+    error, quality, _ = page.locator(".signals path").evaluate_all(
+        "(paths) => paths.map((each) => each.getAttribute('d'))"
+    )
+    assert error.count("M") == 2  # the frame without an estimate leaves a gap
+    heights = [float(point.split()[1]) for point in quality.lstrip("M").split("L")]
+    assert (heights[0], heights[-1]) == (2.0, 16.0)
+    box = page.locator(".signal").nth(1).bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 10)
+    assert page.evaluate("player.player.frame") == pytest.approx(0.5 * (FRAMES - 1), abs=2)
+
+
+def test_stations_have_their_names_where_they_are(page: Any) -> None:
+    name = page.locator(".labels .station")
+    assert name.all_inner_texts() == ["head"]
+    stage, at = page.locator(".stage").bounding_box(), name.bounding_box()
+    assert stage["x"] < at["x"] < stage["x"] + stage["width"]
+    assert stage["y"] < at["y"] < stage["y"] + 0.5 * stage["height"]
+    page.locator("input[name=names]").uncheck()
+    page.wait_for_function("!document.querySelector('.labels .station')")
