@@ -35,7 +35,7 @@ lint: $(VENV)/.dev
 
 # The site of docs/ with the API reference, in build/site. A broken link is an error.
 docs: $(VENV)/.dev
-	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/mkdocs build --strict
 
 # Exact versions come from requirements.lock, the ranges from pyproject.toml.
 $(VENV)/.ready: pyproject.toml requirements.lock
